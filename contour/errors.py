@@ -1,0 +1,28 @@
+"""Errors of the numeric core.
+
+ContourError
+├── PictureError        the array is no usable picture (shape, dtype, empty)
+├── ParameterError      a method's or renderer's parameter is out of its range
+├── NoBlockFound        the picture was usable, but no block could be traced in it
+└── CalibrationError    a calibration that contradicts itself, or does not fit the picture
+"""
+
+
+class ContourError(Exception):
+    """Base of all errors of the numeric core."""
+
+
+class PictureError(ContourError):
+    """The array is no usable picture: what was seen, what is expected."""
+
+
+class ParameterError(ContourError):
+    """A parameter is out of its range: its name, what was seen, the range."""
+
+
+class NoBlockFound(ContourError):
+    """The picture is usable, but no block could be traced in it; the message says what was found instead."""
+
+
+class CalibrationError(ContourError):
+    """The calibration contradicts itself, or does not fit the picture."""

@@ -1,0 +1,57 @@
+"""Cameras: a role of three verbs, and what is thrown when one cannot be kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class CameraError(Exception):
+    """Base of all camera errors. The message says what was seen, what was expected, and the next step."""
+
+
+class CameraUnavailable(CameraError):
+    """The device or the source is not there, or has gone; opening again later may help."""
+
+
+class CameraTimeout(CameraError):
+    """No frame exposed after the asked time arrived within the time-out."""
+
+
+class FrameUnusable(CameraError):
+    """A frame or file arrived that is no usable picture; the next one may be."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One exposure.
+
+    pixels: shape (H, W) grey or (H, W, 3) BGR, uint8. exposed_at_s: start of the exposure on `time.monotonic`'s
+    scale; a file counts as exposed when it is read. simulated: not from a live camera. source: what it came from,
+    for log and journal. sequence: counts frames of this camera from 1.
+    """
+
+    pixels: NDArray[np.uint8]
+    exposed_at_s: float
+    simulated: bool
+    source: str
+    sequence: int
+
+
+class Camera(Protocol):
+    """A source of frames. Blocking: the service gives it a thread of its own."""
+
+    def open(self) -> None:
+        """Make ready to grab; raise CameraUnavailable. Opening an open camera does nothing."""
+
+    def grab(self, exposed_after_s: float, timeout_s: float) -> Frame:
+        """Return the first good frame exposed at or after `exposed_after_s` (monotonic clock).
+
+        Raises CameraTimeout after `timeout_s`, CameraUnavailable where the source has gone, FrameUnusable.
+        """
+
+    def close(self) -> None:
+        """Let the device go; never raises. Closing a closed camera does nothing."""

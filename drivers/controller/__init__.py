@@ -4,37 +4,37 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from drivers.controller.errors import (
+    ContourTooLarge,
+    ControllerError,
+    ControllerNonsense,
+    ControllerRefused,
+    ControllerTimeout,
+    ControllerUnavailable,
+    MailboxError,
+)
 from drivers.controller.mailbox import LinkBlock, Page, ServiceBlock
 
-
-class ControllerError(Exception):
-    """Base of all controller errors. The message says what was seen, what was expected, and the next step."""
-
-
-class ControllerUnavailable(ControllerError):
-    """No connection, or it was lost: the request may have been done, may not, or may be done later."""
-
-
-class ControllerTimeout(ControllerUnavailable):
-    """No matching reply within the time-out: the request may have been done, may not, or may be done later."""
-
-
-class ControllerRefused(ControllerError):
-    """The controller answered with a Modbus exception; `code` is its exception code."""
-
-    def __init__(self, message: str, code: int) -> None:
-        super().__init__(message)
-        self.code = code
-
-
-class ControllerNonsense(ControllerUnavailable):
-    """A reply that does not match its request (class, unit, address, count): nothing on this connection counts."""
+__all__ = [
+    "ContourTooLarge",
+    "Controller",
+    "ControllerError",
+    "ControllerNonsense",
+    "ControllerRefused",
+    "ControllerTimeout",
+    "ControllerUnavailable",
+    "LinkBlock",
+    "MailboxError",
+    "Page",
+    "ServiceBlock",
+]
 
 
 class Controller(Protocol):
     """The controller's registers. asyncio; requests of several tasks are put in a queue, one in flight.
 
     After ControllerUnavailable (and its heirs) the connection is closed; `connect` opens a new one.
+    So it is after a request was cancelled: its reply may still come and must not be taken for another's.
     """
 
     @property

@@ -1,51 +1,69 @@
-"""The contour mailbox, version 1: what stands in which register. Pure: registers in, dataclasses out, and back."""
+"""The contour mailbox, version 1: what stands in which register. Pure: registers in, dataclasses out, and back.
+
+The one door to the codec; `protocol.md` is normative. Values cross it in the block's units (µm, mm², ms). What a
+register cannot hold raises MailboxError before anything is sent.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from drivers.controller.blocks import (
+    BLOCK_REGISTERS,
+    FINAL_ANSWERS,
+    LINK_FIELDS,
+    SERVICE_FIELDS,
+    TEST_VALUE,
+    Answer,
+    ControllerState,
+    LinkBlock,
+    ServiceBlock,
+    ServiceState,
+    decode_link,
+    decode_service,
+    encode_link,
+    encode_service,
+)
+from drivers.controller.errors import ContourTooLarge, MailboxError
+from drivers.controller.layout import MailboxLayout
+from drivers.controller.pages import (
+    HEADER_FIELDS,
+    HEADER_REGISTERS,
+    UNKNOWN_UNCERTAINTY,
+    ContourMessage,
+    Page,
+    crc32_of,
+    encode_pages,
+    micrometres,
+    withdrawal,
+)
+from drivers.controller.words import Field, WordOrder
 
-WordOrder = Literal["big", "little"]
-
-
-@dataclass(frozen=True)
-class LinkBlock:
-    """What the controller writes, 16 registers; names as in the protocol. Lengths in µm, times in ms."""
-
-    controller_state: int = 0
-    controller_heartbeat: int = 0
-    trigger_counter: int = 0
-    recipe: int = 0
-    block_thickness: int = 0
-    ack_transfer: int = 0
-    ack_result: int = 0
-    test_echo: int = 0
-    last_job: int = 0
-    last_result: int = 0
-    session: int = 0
-    clock: int = 0
-
-
-@dataclass(frozen=True)
-class ServiceBlock:
-    """What the service writes, 16 registers; names as in the protocol."""
-
-    protocol_version: int = 1
-    service_state: int = 1
-    service_heartbeat: int = 0
-    trigger_ack: int = 0
-    missed_triggers: int = 0
-    reject_reason: int = 0
-    job_id: int = 0
-    test_value: int = 0x01020304
-    session_ack: int = 0
-    owner: int = 0
-    settled_job: int = 0
-
-
-@dataclass(frozen=True)
-class Page:
-    """One page as registers: header offsets 1…31 (31 registers, without the commit register), then the payload."""
-
-    header: tuple[int, ...]
-    payload: tuple[int, ...]
+__all__ = [
+    "BLOCK_REGISTERS",
+    "FINAL_ANSWERS",
+    "HEADER_FIELDS",
+    "HEADER_REGISTERS",
+    "LINK_FIELDS",
+    "SERVICE_FIELDS",
+    "TEST_VALUE",
+    "UNKNOWN_UNCERTAINTY",
+    "Answer",
+    "ContourMessage",
+    "ContourTooLarge",
+    "ControllerState",
+    "Field",
+    "LinkBlock",
+    "MailboxError",
+    "MailboxLayout",
+    "Page",
+    "ServiceBlock",
+    "ServiceState",
+    "WordOrder",
+    "crc32_of",
+    "decode_link",
+    "decode_service",
+    "encode_link",
+    "encode_pages",
+    "encode_service",
+    "micrometres",
+    "withdrawal",
+]

@@ -1,0 +1,24 @@
+"""Real parts that a test needs and a machine may lack: there it skips and says how to get them; in CI it fails."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from typing import NoReturn
+
+import pytest
+
+
+def missing(reason: str) -> NoReturn:
+    """Skip the test for `reason`, or fail it where CI=true: there nothing may be left out in silence."""
+    if os.environ.get("CI", "").lower() == "true":
+        pytest.fail(reason, pytrace=False)
+    pytest.skip(reason)
+
+
+def need_program(name: str, install: str) -> str:
+    """The path of program `name`; without it the test skips with the command that installs it."""
+    path = shutil.which(name)
+    if path is None:
+        missing(f"{name} is not here. Install it: {install}")
+    return path

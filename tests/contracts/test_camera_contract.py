@@ -1,0 +1,112 @@
+"""What every camera driver promises. A new driver joins by one entry in CAMERAS."""
+
+from __future__ import annotations
+
+import time
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.camera import CameraTimeout, CameraUnavailable, Frame
+from drivers.camera.files import FileCamera
+from drivers.camera.simulated import SimulatedCamera
+
+
+def picture(number):
+    """A picture that tells frames apart."""
+    return np.full((48, 64), number % 256, np.uint8)
+
+
+def folder_camera(tmp_path):
+    for number in range(1, 4):
+        cv2.imwrite(str(tmp_path / f"{number}.png"), picture(number))
+    return FileCamera(tmp_path, loop=True)
+
+
+def single_file_camera(tmp_path):
+    cv2.imwrite(str(tmp_path / "only.png"), cv2.merge([picture(1)] * 3))
+    return FileCamera(tmp_path / "only.png", loop=True)
+
+
+CAMERAS = {
+    "folder": folder_camera,
+    "single file": single_file_camera,
+    "simulated": lambda _tmp_path: SimulatedCamera(picture),
+}
+
+
+@pytest.fixture(params=CAMERAS.values(), ids=CAMERAS.keys())
+def camera(request, tmp_path):
+    made = request.param(tmp_path)
+    yield made
+    made.close()
+
+
+def test_a_frame_is_a_grey_or_bgr_picture_of_bytes(camera):
+    camera.open()
+    frame = camera.grab(0.0, 5.0)
+    assert isinstance(frame, Frame)
+    assert frame.pixels.dtype == np.uint8
+    assert frame.pixels.ndim == 2 or frame.pixels.shape[2:] == (3,)
+    assert frame.pixels.flags.c_contiguous
+    assert frame.source
+    assert isinstance(frame.simulated, bool)
+
+
+def test_a_frame_is_exposed_at_or_after_the_time_asked_for(camera):
+    camera.open()
+    for ahead_s in (0.0, 0.02):
+        asked = time.monotonic() + ahead_s
+        frame = camera.grab(asked, 5.0)
+        assert asked <= frame.exposed_at_s <= time.monotonic()
+
+
+def test_sequence_numbers_rise_from_1(camera):
+    camera.open()
+    numbers = [camera.grab(0.0, 5.0).sequence for _ in range(4)]
+    assert numbers[0] == 1
+    assert numbers == sorted(set(numbers))
+
+
+def test_a_frame_asked_for_beyond_the_time_out_is_a_timeout_and_the_next_one_comes(camera):
+    camera.open()
+    with pytest.raises(CameraTimeout, match="expected"):
+        camera.grab(time.monotonic() + 3600.0, 0.01)
+    assert camera.grab(0.0, 5.0).sequence >= 1
+
+
+def test_a_frame_stays_as_it_is_when_the_next_one_comes(camera):
+    camera.open()
+    first = camera.grab(0.0, 5.0).pixels
+    before = first.copy()
+    camera.grab(0.0, 5.0)
+    np.testing.assert_array_equal(first, before)
+
+
+def test_a_closed_camera_gives_no_frame(camera):
+    with pytest.raises(CameraUnavailable, match="not open"):
+        camera.grab(0.0, 1.0)
+    camera.open()
+    camera.grab(0.0, 5.0)
+    camera.close()
+    with pytest.raises(CameraUnavailable, match="not open"):
+        camera.grab(0.0, 1.0)
+
+
+def test_opening_and_closing_twice_does_nothing_more(camera):
+    camera.close()
+    camera.open()
+    camera.grab(0.0, 5.0)
+    camera.open()
+    assert camera.grab(0.0, 5.0).sequence == 2
+    camera.close()
+    camera.close()
+
+
+def test_a_camera_can_be_opened_again(camera):
+    camera.open()
+    camera.grab(0.0, 5.0)
+    camera.close()
+    camera.open()
+    assert camera.grab(0.0, 5.0).sequence == 2

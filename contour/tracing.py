@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry import Contour
+from contour import binarize, direct_scan, find_contours, sliding_matrix
+from contour.cells import FEWEST_CELLS, Cells
+from contour.errors import NoBlockFound, ParameterError, PictureError
+from contour.geometry import Contour, oriented_contour
 
 Method = Literal["wall-tips", "sliding-matrix", "direct-scan", "find-contours"]
 Polarity = Literal["bright", "dark"]
@@ -44,7 +47,7 @@ class TraceSettings:
 
 @dataclass(frozen=True)
 class Trace:
-    """A traced contour in pixels: exterior counter-clockwise as seen in the work frame (negative shoelace in pixels)."""
+    """A traced contour in pixels: exterior counter-clockwise as seen in the work frame, so negative by the shoelace."""
 
     method: Method
     polarity: Polarity
@@ -66,4 +69,95 @@ def trace(
     known, lets a method fit straight edges in undistorted coordinates; methods on pixel centres ignore it.
     Raises PictureError, ParameterError, NoBlockFound.
     """
-    raise NotImplementedError
+    check_picture(picture)
+    method = _METHODS.get(settings.method)
+    if method is None:
+        raise ParameterError(f"method is {settings.method!r}: expected one of {', '.join(_METHODS)}.")
+    found = method(picture, settings, rectifier=rectifier, on_stage=on_stage)
+    # As seen is y up: counter-clockwise then is clockwise by the formula, whose y runs down in pixels.
+    return replace(found, contour=oriented_contour(found.contour, counter_clockwise=False))
+
+
+def check_picture(picture: NDArray[np.uint8]) -> None:
+    """Raise PictureError unless the array is a grey (H, W) or BGR (H, W, 3) picture, uint8, with pixels in it."""
+    kind = f"{picture.dtype} of shape {picture.shape}"
+    if picture.dtype != np.uint8:
+        raise PictureError(f"The picture is {kind}: expected 8 bits a channel (uint8). Convert it first.")
+    if picture.ndim != 2 and not (picture.ndim == 3 and picture.shape[2] == 3):
+        raise PictureError(f"The picture is {kind}: expected (H, W) grey or (H, W, 3) BGR. Convert it first.")
+    if picture.size == 0:
+        raise PictureError(f"The picture is {kind}: it has no pixels. Check the camera or the file.")
+
+
+class _MethodCall(Protocol):
+    def __call__(
+        self,
+        picture: NDArray[np.uint8],
+        settings: TraceSettings,
+        *,
+        rectifier: Rectifier | None,
+        on_stage: OnStage,
+    ) -> Trace: ...
+
+
+_FromMask = Callable[[binarize.WallMask, TraceSettings], Contour]
+
+
+def _on_mask(contour_of: _FromMask) -> _MethodCall:
+    """A method that works on the wall mask's pixel centres alone."""
+
+    def call(
+        picture: NDArray[np.uint8], settings: TraceSettings, *, rectifier: Rectifier | None, on_stage: OnStage
+    ) -> Trace:
+        walls = binarize.binarize(picture, settings.binarize, settings.polarity)
+        on_stage("mask")
+        contour = contour_of(walls, settings)
+        on_stage("trace")
+        pitch_px = walls.cells.pitch_px if walls.cells else None
+        return Trace(settings.method, walls.polarity, pitch_px, contour)
+
+    return call
+
+
+def _find_contours(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
+    return Contour(find_contours.largest_contour(walls.mask))
+
+
+def _direct_scan(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
+    gap, width = settings.max_gap_px, settings.min_width_px
+    if gap is None:
+        gap = direct_scan.default_gap_px(_cells(walls, "max_gap_px"))
+    if width is None:
+        width = direct_scan.default_width_px(_cells(walls, "min_width_px"))
+    return Contour(direct_scan.direct_scan_ring(walls.mask, gap, width))
+
+
+def _sliding_matrix(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
+    core, step, threshold = settings.core_px, settings.step_px, settings.threshold
+    if core is None:
+        core = sliding_matrix.default_core_px(_cells(walls, "core_px"))
+    if step is None:
+        step = sliding_matrix.default_step_px(core)
+    if threshold is None:
+        threshold = sliding_matrix.default_threshold(walls.cells)
+    filled = sliding_matrix.fill_windows(walls.mask, core, step, threshold)
+    smallest_hole_px2 = walls.cells.cell_px2 if walls.cells else float((2 * core) ** 2)
+    return sliding_matrix.sliding_matrix_contour(filled, smallest_hole_px2)
+
+
+def _cells(walls: binarize.WallMask, parameter: str) -> Cells:
+    if walls.cells is None:
+        share = np.count_nonzero(walls.mask) / walls.mask.size
+        raise NoBlockFound(
+            f"No block found: {walls.polarity} walls cover {100 * share:.1f} % of the picture, but they enclose fewer "
+            f"than {FEWEST_CELLS} regular cells, so there is no cell pitch to take {parameter} from. Check the light, "
+            f"the sharpness and the polarity, or give {parameter}."
+        )
+    return walls.cells
+
+
+_METHODS: dict[str, _MethodCall] = {
+    "sliding-matrix": _on_mask(_sliding_matrix),
+    "direct-scan": _on_mask(_direct_scan),
+    "find-contours": _on_mask(_find_contours),
+}

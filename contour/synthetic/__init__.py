@@ -1,0 +1,53 @@
+"""Renders a block of known outline through a known camera: truth for tests, demo, bench and docs.
+
+What it does not model: a lens's blur beyond a Gaussian, interreflection between foils, walls bent or crushed at the
+cut, rolling shutter, colour filter mosaics.
+"""
+
+from contour.synthetic.camera import CameraModel, camera_above, densified
+from contour.synthetic.cells import CellGeometry
+from contour.synthetic.coverage import area_coverage
+from contour.synthetic.outlines import (
+    blob,
+    convex,
+    crescent,
+    disc_ring,
+    l_shape,
+    moved,
+    polygon,
+    rectangle,
+    signed_distance,
+    u_shape,
+    with_holes,
+)
+from contour.synthetic.rendering import Rendered, pitch_px, render, truth_px
+from contour.synthetic.scene import Clutter, Light, Material, Scene, Sensor, Table
+
+__all__ = [
+    "CameraModel",
+    "CellGeometry",
+    "Clutter",
+    "Light",
+    "Material",
+    "Rendered",
+    "Scene",
+    "Sensor",
+    "Table",
+    "area_coverage",
+    "blob",
+    "camera_above",
+    "convex",
+    "crescent",
+    "densified",
+    "disc_ring",
+    "l_shape",
+    "moved",
+    "pitch_px",
+    "polygon",
+    "rectangle",
+    "render",
+    "signed_distance",
+    "truth_px",
+    "u_shape",
+    "with_holes",
+]

@@ -1,0 +1,63 @@
+"""The walls' faces below the top plane, seen by perspective, and how much of the table they leave visible.
+
+A point of the block at depth d below the top plane is seen where the top plane's picture is shifted by the parallax of
+d. So the cover by walls at any depth is the top plane's cover looked up at shifted pixels, and what hides first wins.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.synthetic.scene import Scene
+
+Floats = NDArray[np.float32]
+
+_NO_MAP = np.empty(0, dtype=np.float32)
+
+
+@dataclass(frozen=True)
+class Relief:
+    """All that is seen of the block: `cover` share of each pixel, `light` it returns (premultiplied), shape (H, W)."""
+
+    cover: Floats
+    light: Floats
+
+
+def relief(scene: Scene, cover: Floats, light: Floats) -> Relief:
+    """The top plane's cover and light completed by the walls' sides."""
+    shift = _parallax(scene)
+    longest = float(np.abs(shift).max(initial=0.0))
+    if longest < 0.25:
+        return Relief(cover, light)
+    steps = int(np.clip(math.ceil(longest), 2, 18))
+    height, width = cover.shape
+    fine = cv2.resize(shift / np.float32(steps), (width, height), interpolation=cv2.INTER_LINEAR)
+    at = np.stack(np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)), axis=-1)
+    pair = np.stack((cover, light), axis=-1)
+    total, radiance = cover.copy(), light.copy()
+    reach = 1.1 * scene.cells.pitch_mm
+    for k in range(1, steps + 1):
+        at += fine
+        here = cv2.remap(pair, at, _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
+        below, tone = here[..., 0], here[..., 1]
+        gain = np.maximum(below - total, 0.0)
+        depth = (k - 0.5) / steps * scene.thickness_mm
+        level = scene.material.side / scene.material.top * (0.25 + 0.75 * math.exp(-depth / reach))
+        radiance += gain * np.float32(level) * tone / np.maximum(below, np.float32(1e-3))
+        total += gain
+    return Relief(total, radiance)
+
+
+def _parallax(scene: Scene) -> Floats:
+    """Where the top plane shows the place that a pixel's ray meets on the table, relative to it; coarse, (h, w, 2)."""
+    camera, step = scene.camera, 16
+    u = np.linspace(-0.5, camera.width - 0.5, max(2, camera.width // step) * 2 + 1)[1::2]
+    v = np.linspace(-0.5, camera.height - 0.5, max(2, camera.height // step) * 2 + 1)[1::2]
+    grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    there = camera.project(camera.back_project(grid, 0.0), scene.thickness_mm)
+    return np.asarray((there - grid).reshape(len(v), len(u), 2), dtype=np.float32)

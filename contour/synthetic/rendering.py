@@ -1,0 +1,101 @@
+"""A scene becomes a picture with its exact truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry import Contour
+from contour.synthetic.camera import CameraModel
+from contour.synthetic.depth import Relief, relief
+from contour.synthetic.scene import Scene
+from contour.synthetic.sensor import dust, expose, illumination, patches
+from contour.synthetic.surface import surface
+from contour.synthetic.table import smooth_noise, table_light
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """A picture and what is true of it.
+
+    `picture` is uint8, (H, W) grey or (H, W, 3) BGR. `truth_mm` is the outline as given (work frame, top plane);
+    `truth_px` the same, densified in millimetres and projected. `pitch_px` is the root of the mean cell area × 1.1547.
+    """
+
+    picture: NDArray[np.uint8]
+    truth_px: Contour
+    truth_mm: Contour
+    camera: CameraModel
+    thickness_mm: float
+    pitch_px: float
+
+
+def render(scene: Scene) -> Rendered:
+    """The scene's picture; the same scene always gives the same bytes."""
+    cover, light = _tops(scene)
+    _texture(scene, light)
+    block = relief(scene, cover, light)
+    picture = expose(scene.sensor, _planes(scene, block), scene.seed)
+    return Rendered(picture, truth_px(scene), scene.outline, scene.camera, scene.thickness_mm, pitch_px(scene))
+
+
+def truth_px(scene: Scene) -> Contour:
+    """The outline in pixels, densified in millimetres (the lens bends it); orientation as seen in the work frame."""
+    step = 2.0 * scene.camera.mm_per_px(_middle(scene), scene.thickness_mm)
+    return scene.camera.project_contour(scene.outline, scene.thickness_mm, step)
+
+
+def pitch_px(scene: Scene) -> float:
+    """Pitch of a regular honeycomb whose cells have the same area, pixels."""
+    scale = scene.camera.mm_per_px(_middle(scene), scene.thickness_mm)
+    return float(np.sqrt(scene.cells.cell_area_mm2 * 2.0 / np.sqrt(3.0)) / scale)
+
+
+def _middle(scene: Scene) -> tuple[float, float]:
+    x, y = ((scene.outline.exterior.min(axis=0) + scene.outline.exterior.max(axis=0)) / 2.0).tolist()
+    return (x, y)
+
+
+def _tops(scene: Scene) -> tuple[Floats, Floats]:
+    """Cover and light of the top planes of all pieces, shape (H, W)."""
+    shape = (scene.camera.height, scene.camera.width)
+    cover, light = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
+    for number, outline in enumerate((scene.outline, *scene.clutter.neighbours)):
+        piece = surface(scene, outline, scene.seed + 1000 * number)
+        if piece is None:
+            continue
+        rows = slice(piece.top, piece.top + piece.cover.shape[0])
+        columns = slice(piece.left, piece.left + piece.cover.shape[1])
+        np.add(cover[rows, columns], piece.cover, out=cover[rows, columns])
+        np.add(light[rows, columns], piece.light, out=light[rows, columns])
+    return np.minimum(cover, 1.0), light
+
+
+def _texture(scene: Scene, light: Floats) -> None:
+    if scene.material.texture <= 0.0:
+        return
+    rng = np.random.default_rng([scene.seed, 51])
+    scale = scene.camera.mm_per_px(_middle(scene), scene.thickness_mm)
+    grain = max(1.6, 0.9 * scene.cells.wall_mm / scale)
+    light *= np.clip(1.0 + np.float32(scene.material.texture) * smooth_noise(rng, light.shape, grain), 0.1, 2.5)
+
+
+def _planes(scene: Scene, block: Relief) -> list[Floats]:
+    """Light that reaches the sensor, one plane for grey, three for colour."""
+    falling = illumination(scene)
+    shine = patches(scene)
+    walls = block.light * falling if shine is None else block.light * falling * shine
+    table = table_light(scene) * (1.0 - block.cover) * falling
+    if not scene.sensor.colour:
+        planes = [np.asarray(walls + table, dtype=np.float32)]
+    else:
+        planes = [
+            np.asarray(walls * np.float32(a) + table * np.float32(b), dtype=np.float32)
+            for a, b in zip(scene.material.colour, scene.table.colour, strict=True)
+        ]
+    dust(scene, planes)
+    return planes

@@ -1,0 +1,126 @@
+"""The block's top plane as the camera sees it: how much of each pixel is wall, and how bright that wall is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry import Contour
+from contour.synthetic.cells import Lattice, draw_lattice, lattice_centres, lattice_coordinates, wall_field
+from contour.synthetic.coverage import area_coverage
+from contour.synthetic.outlines import signed_distance
+from contour.synthetic.scene import Scene
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A piece's top plane over the window of the picture that starts at pixel (left, top).
+
+    `cover` is the share of each pixel that is material, `light` the light it returns (premultiplied by the share),
+    both shape (H, W), float32.
+    """
+
+    left: int
+    top: int
+    cover: Floats
+    light: Floats
+
+
+def surface(scene: Scene, outline: Contour, seed: int) -> Surface | None:
+    """The top plane of one piece of core; None if it lies outside the picture."""
+    camera, ss = scene.camera, scene.sensor.supersample
+    seen = camera.project_contour(outline, scene.thickness_mm)
+    low = np.floor(seen.exterior.min(axis=0)).astype(int) - 1
+    high = np.ceil(seen.exterior.max(axis=0)).astype(int) + 2
+    left, top = max(0, int(low[0])), max(0, int(low[1]))
+    right, bottom = min(camera.width, int(high[0])), min(camera.height, int(high[1]))
+    if left >= right or top >= bottom:
+        return None
+    width, height = (right - left) * ss, (bottom - top) * ss
+    rings = [(ring - [left - 0.5, top - 0.5]) * ss - 0.5 for ring in seen.rings]
+    inside = area_coverage(rings, width, height)
+    light = np.empty_like(inside)
+    _fill(scene, outline, seed, (left, top), inside, light)
+    size = (right - left, bottom - top)
+    return Surface(left, top, _shrunk(inside, size), _shrunk(light, size))
+
+
+def _shrunk(raster: Floats, size: tuple[int, int]) -> Floats:
+    if raster.shape == (size[1], size[0]):
+        return raster
+    return np.asarray(cv2.resize(raster, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
+
+
+def _fill(scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], inside: Floats, light: Floats) -> None:
+    """Turn `inside` (share inside the outline) into the share of material, and write its light beside it, by bands."""
+    camera, ss, cells = scene.camera, scene.sensor.supersample, scene.cells
+    scale = camera.mm_per_px(_middle(outline), scene.thickness_mm) / ss
+    step = int(np.clip(cells.pitch_mm / scale / 2.0, 4, 32))
+    height, width = inside.shape
+    rows, columns = math.ceil(height / step), math.ceil(width / step)
+    u = (np.arange(-1, columns + 1) + 0.5) * step - 0.5
+    v = (np.arange(-1, rows + 1) + 0.5) * step - 0.5
+    grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    work = camera.back_project((grid + 0.5) / ss - 0.5 + np.array(origin), scene.thickness_mm)
+    x, y = lattice_coordinates(cells, work[:, 0], work[:, 1], seed)
+    lattice = draw_lattice(cells, x, y, seed, scene.material.glints, scene.material.spread)
+    _close_rim(scene, outline, lattice)
+    nodes = np.stack((x, y), axis=-1).reshape(rows + 2, columns + 2, 2).astype(np.float32)
+    band = max(1, 96 // step)
+    for first in range(0, rows, band):
+        last = min(rows, first + band)
+        wide = ((columns + 2) * step, (last - first + 2) * step)
+        fine = cv2.resize(nodes[first : last + 2], wide, interpolation=cv2.INTER_LINEAR)
+        stop = min(height, last * step)
+        part = slice(first * step, stop)
+        fine = fine[step : step + stop - first * step, step : step + width]
+        _paint(
+            scene,
+            lattice,
+            np.ascontiguousarray(fine[..., 0]),
+            np.ascontiguousarray(fine[..., 1]),
+            scale,
+            inside[part],
+            light[part],
+        )
+
+
+def _paint(scene: Scene, lattice: Lattice, x: Floats, y: Floats, scale: float, cover: Floats, light: Floats) -> None:
+    material, cells = scene.material, scene.cells
+    field = wall_field(cells, lattice, x, y)
+    per_mm = np.float32(1.0 / scale)
+    near = np.clip((field.half_width - field.distance) * per_mm + np.float32(0.5), 0.0, 1.0)
+    far = np.clip((-field.half_width - field.distance) * per_mm + np.float32(0.5), 0.0, 1.0)
+    wall = near - far
+    top = np.float32(material.top)
+    if cells.skin <= 0.0:
+        cover *= wall
+        np.multiply(cover, field.tone * top, out=light)
+        return
+    closed = (field.cell < cells.skin).astype(np.float32)
+    bulge = np.clip(0.75 + 0.6 * field.lean + 0.5 * (field.cell * 7.0 % 1.0 - 0.5), 0.2, 1.8).astype(np.float32)
+    skin = closed * (1.0 - wall)
+    inside = cover.copy()
+    cover *= wall + skin
+    np.multiply(inside, wall * field.tone * top + skin * bulge * np.float32(material.skin), out=light)
+
+
+def _close_rim(scene: Scene, outline: Contour, lattice: Lattice) -> None:
+    """Leave out a perforated plate's holes that would come nearer to the outline than its rim."""
+    cells = scene.cells
+    if cells.kind != "perforated" or cells.rim_mm <= 0.0:
+        return
+    radius = 0.5 * (cells.pitch_mm - cells.wall_mm)
+    depth = signed_distance(outline, lattice_centres(cells, lattice))
+    lattice.keep[depth < cells.rim_mm + radius, 0] = -2.0
+
+
+def _middle(outline: Contour) -> tuple[float, float]:
+    x, y = ((outline.exterior.min(axis=0) + outline.exterior.max(axis=0)) / 2.0).tolist()
+    return (x, y)

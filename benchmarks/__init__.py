@@ -1,0 +1,1 @@
+"""Accuracy and speed of the tracing methods on rendered scenes and photographs."""

@@ -1,0 +1,109 @@
+"""The command `combtrace`: what there is to do, each command in a file of its own, imported when it runs."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+
+from service.cli.errors import EXIT_UNUSABLE, UserError
+
+COMMANDS = ("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema")
+
+DESCRIPTION = """\
+NAME
+    combtrace - the outline of a honeycomb block, from a camera to a cutting machine
+
+DESCRIPTION
+    combtrace grabs frames, traces the contour of the honeycomb block that lies
+    under the camera, turns pixels into millimetres by a calibration file, and
+    writes the polygon to the cutting machine's controller through Modbus
+    registers. What it is not sure of it refuses, with a reason.
+
+    A job begins with a trigger: by hand over a serial line, by the controller,
+    or by time. It ends accepted, written, refused or failed, and the journal
+    says which and why.
+"""
+
+EPILOG = """\
+FILES
+    config.yaml         the configuration; `combtrace schema` prints its JSON schema
+    calibration.yaml    pixels to millimetres, named by the configuration
+    var/                journal and lock, unless the configuration says otherwise
+
+EXIT STATUS
+    0   done; for `run --once`: accepted or written; for `trace`: traced and accepted
+    1   failed: something did not work
+    2   bad configuration, unusable input, or wrong usage
+    3   refused: the block or the picture was not good enough
+
+EXAMPLES
+    combtrace demo
+        Run the whole way once, with a simulated controller, and draw the result.
+    combtrace trace block.png --overlay seen.png
+        Trace one picture; no controller and no configuration needed.
+    combtrace check --config config.yaml
+        Say what is wrong with the configuration and every device it names.
+    combtrace run --config config.yaml
+        Run the daemon.
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser of all commands; imports nothing heavy."""
+    parser = argparse.ArgumentParser(
+        prog="combtrace", description=DESCRIPTION, epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--version", action="store_true", help="print the version and end")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="COMMANDS")
+    for name in COMMANDS:
+        module = _module(name)
+        command = commands.add_parser(
+            name,
+            help=module.HELP,
+            description=module.DESCRIPTION,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        module.add_arguments(command)
+        command.add_argument("--debug", action="store_true", help="show a traceback with an error")
+        command.set_defaults(handler=module.run)
+    return parser
+
+
+def _module(name: str):  # type: ignore[no-untyped-def]  # a command module: HELP, DESCRIPTION, add_arguments, run
+    return importlib.import_module(f"service.cli.{name.replace('-', '_')}")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; its exit status."""
+    parser = build_parser()
+    args = parser.parse_args(argv)
+    if args.version:
+        print(_version())
+        return 0
+    if args.command is None:
+        parser.print_help()
+        return EXIT_UNUSABLE
+    try:
+        return int(args.handler(args))
+    except UserError as error:
+        if args.debug:
+            raise
+        print(f"combtrace {args.command}: {error}", file=sys.stderr)
+        return error.exit_status
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:  # the reader of our output has gone; that is no error of ours
+        sys.stderr.close()
+        return 141
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return f"combtrace {version('combtrace')}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

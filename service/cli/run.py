@@ -1,0 +1,76 @@
+"""`combtrace run`: the daemon, or with --once one immediate trigger."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import logging
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_REFUSED, UserError
+
+if TYPE_CHECKING:
+    from service.config import Config
+    from service.journal import Job
+
+HELP = "run the daemon"
+DESCRIPTION = """\
+Run until stopped (SIGTERM, SIGINT). With --once: one immediate manual trigger, then end.
+Exit status of --once: 0 accepted or written, 3 refused, 1 failed, 2 bad configuration."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Configuration, once, log."""
+    parser.add_argument("--config", type=Path, default=Path("config.yaml"), metavar="FILE", help="default config.yaml")
+    parser.add_argument("--once", action="store_true", help="one immediate manual trigger, then end")
+    parser.add_argument("--verbose", action="store_true", help="log every attempt")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run."""
+    from service.config_file import ConfigError, load_config
+    from service.logs import start_logging
+
+    try:
+        config = load_config(args.config)
+    except ConfigError as error:
+        raise UserError(str(error)) from error
+    start_logging(logging.DEBUG if args.verbose else logging.INFO)
+    return asyncio.run(_run(config, once=args.once))
+
+
+async def _run(config: Config, *, once: bool) -> int:
+    from service.daemon import Daemon
+    from service.executor import TriggerRefused
+    from service.reasons import Outcome
+    from service.wiring import WiringError, build
+
+    try:
+        parts = build(config)
+    except WiringError as error:
+        raise UserError(str(error)) from error
+    daemon = Daemon(parts)
+    signals = (signal.SIGTERM, signal.SIGINT)
+    if not once:
+        await daemon.run(on_signals=signals)
+        return EXIT_OK
+    try:
+        job = await daemon.run_once(config.controller.ready_timeout_s, on_signals=signals)
+    except TriggerRefused as refused:
+        refusal = refused.reason.outcome is Outcome.REFUSED and not refused.not_ready
+        status = EXIT_REFUSED if refusal else EXIT_FAILED
+        raise UserError(f"not triggered: {int(refused.reason)} {refused.reason.label}: {refused}", status) from refused
+    print(job_line(job))
+    return {Outcome.REFUSED: EXIT_REFUSED, Outcome.FAILED: EXIT_FAILED}.get(job.outcome or Outcome.FAILED, EXIT_OK)
+
+
+def job_line(job: Job) -> str:
+    """How a job ended, for a person."""
+    text = f"job {job.job_id} {job.outcome}"
+    if job.reason is not None:
+        return f"{text}: {int(job.reason)} {job.reason.label}: {job.detail}"
+    report = job.report
+    area = report.get("area_mm2")
+    return text + (f": {report.get('vertices', 0)} vertices, {area:.1f} mm²" if area is not None else "")

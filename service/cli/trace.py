@@ -1,0 +1,278 @@
+"""`combtrace trace IMAGE…`: trace pictures; no controller is needed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
+
+if TYPE_CHECKING:
+    from contour.calibration import Calibration
+    from contour.geometry import Contour
+    from service.config import Config, Recipe
+    from service.measure import Measurement, Measurer
+
+HELP = "trace the contour in pictures"
+DESCRIPTION = """\
+Trace the block's contour in each picture. Without --config, embedded defaults
+apply. Sizes that are not given follow from the picture's own cell pitch.
+
+Exit status: 0 traced and accepted, 3 refused with a reason, 2 unusable input or
+usage; of several pictures the worst counts (0 < 3 < 2)."""
+
+METHODS = ("wall-tips", "sliding-matrix", "direct-scan", "find-contours")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Pictures, method and its sizes, configuration, outputs."""
+    parser.add_argument("images", nargs="+", type=Path, metavar="IMAGE", help="picture files")
+    parser.add_argument("--method", choices=METHODS)
+    parser.add_argument("--core-px", type=int, metavar="PX", help="sliding-matrix: half the window's side")
+    parser.add_argument("--step-px", type=int, metavar="PX", help="sliding-matrix: the window's step")
+    parser.add_argument("--threshold", type=float, metavar="0…255", help="sliding-matrix: mean that fills a window")
+    parser.add_argument("--max-gap-px", type=int, metavar="PX", help="direct-scan: longest dark run inside the block")
+    parser.add_argument("--min-width-px", type=int, metavar="PX", help="direct-scan: narrower pairs are noise")
+    parser.add_argument("--polarity", choices=("auto", "bright", "dark"), help="walls against the table")
+    parser.add_argument("--binarize", type=_binarize, metavar="flat|otsu|0…255", help="how walls are told from gaps")
+    parser.add_argument("--edge", choices=("cut", "cells"), help="cells: the border cells are closed")
+    parser.add_argument("--config", type=Path, metavar="FILE", help="configuration with recipes")
+    parser.add_argument("--recipe", metavar="NAME", help="recipe by name or number")
+    parser.add_argument("--calibration", type=Path, metavar="FILE", help="pixels to millimetres")
+    parser.add_argument("--thickness-mm", type=float, metavar="H", help="height of the traced plane above the table")
+    parser.add_argument("--json", metavar="FILE", help="JSON Lines, one object a picture; - is standard output")
+    parser.add_argument(
+        "--overlay", type=Path, metavar="FILE", help="picture with contour; a folder for several images"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Trace all pictures; the worst exit status."""
+    setup = _Setup.of(args)
+    texts = sys.stderr if args.json == "-" else sys.stdout
+    worst = EXIT_OK
+    records = []
+    for image in args.images:
+        record, line, status = _trace_one(image, setup)
+        records.append(record)
+        print(line, file=texts if status != EXIT_UNUSABLE else sys.stderr, flush=True)
+        worst = max(worst, status, key=(EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE).index)
+        if args.json == "-":
+            print(json.dumps(record, ensure_ascii=False), flush=True)
+    if args.json not in (None, "-"):
+        _write_records(Path(args.json), records)
+    return worst
+
+
+@dataclass(frozen=True)
+class _Setup:
+    """What all pictures share."""
+
+    measurer: Measurer
+    recipe: Recipe
+    thickness_mm: float
+    overlay: Path | None
+    overlay_is_folder: bool
+
+    @classmethod
+    def of(cls, args: argparse.Namespace) -> _Setup:
+        import numpy as np
+
+        from service.measure import Measurer
+
+        config = _config(args.config)
+        recipe = _recipe(config, args)
+        calibration = _calibration(config, args)
+        if args.thickness_mm is not None and not 0 <= args.thickness_mm <= 10_000:
+            raise UserError(f"--thickness-mm {args.thickness_mm:g}: expected 0 to 10000")
+        work_area = np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
+        overlay = args.overlay
+        folder = overlay is not None and (len(args.images) > 1 or overlay.is_dir())
+        if folder:
+            _make_folder(overlay)
+        return cls(
+            Measurer(calibration, work_area_mm=work_area),
+            recipe,
+            recipe.thickness_mm if args.thickness_mm is None else args.thickness_mm,
+            overlay,
+            folder,
+        )
+
+    def overlay_for(self, image: Path) -> Path | None:
+        """The overlay file of one picture."""
+        if self.overlay is None:
+            return None
+        return self.overlay / f"{image.stem}-contour.png" if self.overlay_is_folder else self.overlay
+
+
+def _config(path: Path | None) -> Config:
+    from service.config_file import ConfigError, default_config, load_config
+
+    try:
+        return default_config() if path is None else load_config(path)
+    except ConfigError as error:
+        raise UserError(str(error)) from error
+
+
+def _calibration(config: Config, args: argparse.Namespace) -> Calibration | None:
+    from service.calibration_file import CalibrationFileError, load_calibration
+
+    path = args.calibration
+    if path is None and args.config is not None and config.calibration is not None:
+        path = config.calibration.file
+    if path is None:
+        return None
+    try:
+        return load_calibration(path)
+    except CalibrationFileError as error:
+        raise UserError(str(error)) from error
+
+
+def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
+    """The recipe, by name, number or default, with what the command line says otherwise."""
+    from service.config import Recipe
+
+    wanted = str(config.default_recipe) if args.recipe is None else args.recipe
+    found = next((recipe for recipe in config.recipes if wanted in (recipe.name, str(recipe.number))), None)
+    if found is None:
+        known = ", ".join(f"{recipe.name} ({recipe.number})" for recipe in config.recipes)
+        raise UserError(f"--recipe {wanted}: there is no such recipe, there are: {known}")
+    changes: dict[str, Any] = {
+        name: getattr(args, name)
+        for name in ("method", "polarity", "binarize", "edge")
+        if getattr(args, name) is not None
+    }
+    given = {
+        name: getattr(args, name)
+        for name in ("core_px", "step_px", "threshold", "max_gap_px", "min_width_px")
+        if getattr(args, name) is not None
+    }
+    method_changed = changes.get("method", found.method) != found.method
+    if given or method_changed:
+        kept = {} if method_changed else found.parameters
+        changes["parameters"] = {**kept, **given}
+    if not changes:
+        return found
+    from pydantic import ValidationError
+
+    try:
+        return Recipe.model_validate({**found.model_dump(), **changes})
+    except ValidationError as error:
+        from service.config_file import describe
+
+        raise UserError("; ".join(describe(error, Recipe))) from error
+
+
+def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
+    """The JSON object, the line for people, and the exit status of one picture."""
+    from contour.errors import ContourError
+    from drivers.camera import CameraError
+    from drivers.camera.decode import read_picture
+
+    started = time.perf_counter()
+    try:
+        picture = read_picture(image)
+        read_ms = (time.perf_counter() - started) * 1000
+        measurement = setup.measurer.measure(picture, setup.recipe, setup.thickness_mm)
+    except (CameraError, ContourError) as error:
+        return _error_record(image, setup, str(error)), f"{image}: {error}", EXIT_UNUSABLE
+    times = {"read": read_ms, **measurement.timings_ms}
+    times["total"] = sum(value for name, value in times.items() if name != "total")
+    measurement = replace(measurement, timings_ms=times)
+    overlay = setup.overlay_for(image)
+    note = ""
+    if overlay is not None:
+        _write_overlay(overlay, picture, measurement)
+        note = f"  [{overlay}]"
+    status = EXIT_REFUSED if measurement.findings else EXIT_OK
+    return _record(image, measurement), f"{image}: {_sentence(measurement)}{note}", status
+
+
+def _sentence(measurement: Measurement) -> str:
+    if measurement.findings:
+        return "refused: " + "; ".join(f"{int(code)} {code.label}: {text}" for code, text in measurement.findings)
+    assert measurement.pixels is not None
+    text = f"{measurement.method}, {measurement.pixels.point_count} vertices"
+    if measurement.pixels.holes:
+        text += f", {len(measurement.pixels.holes)} holes"
+    size = measurement.size_mm
+    if size is not None:
+        text += f", {measurement.area_mm2:.0f} mm², {size[0]:.1f} x {size[1]:.1f} mm"
+    else:
+        text += f", {measurement.area_px2:.0f} px²"
+    return f"{text}, {measurement.timings_ms['total']:.0f} ms"
+
+
+def _record(image: Path, measurement: Measurement) -> dict[str, Any]:
+    """The contract's object for a picture that could be read."""
+    reasons = [reason.label for reason in measurement.reasons]
+    return {
+        "image": str(image),
+        "status": "refused" if reasons else "ok",
+        "reason": reasons[0] if reasons else None,
+        "reasons": reasons,
+        "reason_codes": [int(reason) for reason in measurement.reasons],
+        "method": measurement.method,
+        "polarity": measurement.polarity,
+        "pitch_px": measurement.pitch_px,
+        "pixels": _rings(measurement.pixels),
+        "area_px2": measurement.area_px2,
+        "uncertainty_px": measurement.uncertainty_px,
+        "frame": "machine",
+        "thickness_mm": measurement.thickness_mm,
+        "millimetres": _rings(measurement.millimetres),
+        "area_mm2": measurement.area_mm2,
+        "uncertainty_mm": measurement.uncertainty_mm,
+        "timings_ms": {name: round(value, 3) for name, value in measurement.timings_ms.items()},
+        "details": list(measurement.texts),
+    }
+
+
+def _error_record(image: Path, setup: _Setup, text: str) -> dict[str, Any]:
+    """The contract's object for a picture that could not be used."""
+    from service.measure import Measurement
+
+    record = _record(image, Measurement(method=setup.recipe.method))
+    return {**record, "status": "error", "details": [text]}
+
+
+def _rings(contour: Contour | None) -> dict[str, Any] | None:
+    if contour is None:
+        return None
+    return {"exterior": contour.exterior.tolist(), "holes": [hole.tolist() for hole in contour.holes]}
+
+
+def _write_overlay(path: Path, picture: Any, measurement: Measurement) -> None:
+    from service.pictures import PictureFileError, write_overlay
+
+    try:
+        write_overlay(path, picture, measurement)
+    except PictureFileError as error:
+        raise UserError(str(error)) from error
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--overlay {path}: cannot make the folder: {error.strerror}. Name another") from error
+
+
+def _write_records(path: Path, records: list[dict[str, Any]]) -> None:
+    try:
+        path.write_text("".join(json.dumps(record, ensure_ascii=False) + "\n" for record in records), encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"--json {path}: cannot be written: {error.strerror}. Name another file") from error
+
+
+def _binarize(text: str) -> str | int:
+    if text in ("flat", "otsu"):
+        return text
+    if text.isdigit() and int(text) <= 255:
+        return int(text)
+    raise argparse.ArgumentTypeError(f"{text!r}: expected flat, otsu, or a number 0 to 255")

@@ -1,0 +1,334 @@
+"""The configuration's models: what config.yaml may say, with bounds, units and a sentence for each key.
+
+Unknown keys are refused everywhere. Paths are resolved by `service.config_file`.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
+
+from contour.geometry import ring_defect
+from contour.tracing import Method
+
+DEFAULT_METHOD: Method = "sliding-matrix"
+METHOD_PARAMETERS: dict[str, dict[str, tuple[float, float]]] = {
+    "wall-tips": {},
+    "sliding-matrix": {"core_px": (1, 1000), "step_px": (1, 2000), "threshold": (0, 255)},
+    "direct-scan": {"max_gap_px": (0, 100_000), "min_width_px": (0, 100_000)},
+    "find-contours": {},
+}
+BLOCK_REGISTERS = 16
+HEADER_REGISTERS = 32
+REGISTERS = 65536
+
+Seconds = Annotated[float, Field(gt=0, le=86_400)]
+Port = Annotated[int, Field(ge=1, le=65_535)]
+Register = Annotated[int, Field(ge=0, lt=REGISTERS)]
+
+
+def no_truth_value(value: Any) -> Any:
+    """The value, refused where YAML read yes, no, on or off."""
+    if isinstance(value, bool):
+        raise ValueError(f"is a truth value ({value}), expected a number")
+    return value
+
+
+def _a_path(value: Any) -> Any:
+    """An empty path would be the file's own folder, and a NUL ends a name for the system."""
+    if isinstance(value, str) and (not value.strip() or "\0" in value):
+        raise ValueError(f"is {value!r}, expected the path of a file or folder")
+    return value
+
+
+Number = Annotated[float, BeforeValidator(no_truth_value)]
+FilePath = Annotated[Path, BeforeValidator(_a_path)]
+
+
+class Model(BaseModel):
+    """Frozen, and refuses keys it does not know."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _truth_values_are_no_numbers(cls, data: Any) -> Any:
+        """YAML's yes, no, on and off are truth values; pydantic would take them for 1 and 0."""
+        if isinstance(data, dict):
+            for name, value in data.items():
+                field = cls.model_fields.get(name)
+                if isinstance(value, bool) and field is not None and field.annotation is not bool:
+                    raise ValueError(f"{name} is a truth value ({value}). Write a number, or a word in quotes")
+        return data
+
+
+class FilesCamera(Model):
+    """Pictures from files: for tests, demonstrations, and replays."""
+
+    kind: Literal["files"]
+    path: FilePath = Field(description="A picture, or a folder whose pictures are taken in the order of their names.")
+    loop: bool = Field(True, description="Begin again after the last picture.")
+
+
+class V4l2Camera(Model):
+    """A camera of the Linux kernel's Video4Linux2."""
+
+    kind: Literal["v4l2"]
+    device: FilePath = Field(description="Device file; one below /dev/v4l/by-id keeps its name when it is replugged.")
+    width: int = Field(ge=16, le=32_768, description="Width of the picture, px.")
+    height: int = Field(ge=16, le=32_768, description="Height of the picture, px.")
+    pixel_format: str = Field(
+        "YUYV", min_length=3, max_length=4, description="Four-character code of the pixel format."
+    )
+    frame_rate: float | None = Field(None, gt=0, le=1000, description="Frames a second; none = the driver's default.")
+    controls: dict[str, int] = Field(
+        default_factory=dict, description="Controls to write at each open, by their names."
+    )
+    timeout_s: Seconds = Field(5.0, description="Longest wait for a frame, s.")
+
+
+class Calibration(Model):
+    """Where pixels become millimetres."""
+
+    file: FilePath = Field(description="Calibration file.")
+    max_age_days: float = Field(0, ge=0, le=36_500, description="Oldest accepted calibration, days; 0 = no limit.")
+
+
+class NoController(Model):
+    """No controller: contours are traced and kept, and go nowhere."""
+
+    kind: Literal["none"]
+    ready_timeout_s: Seconds = Field(30, description="Longest wait for the service to be ready, s.")
+
+
+class ModbusController(Model):
+    """What all controllers on Modbus share."""
+
+    device_id: int = Field(1, ge=0, le=255, description="Modbus device id (unit).")
+    word_order: Literal["big", "little"] = Field(
+        "big", description="Order of the two registers of a 32-bit value: big = ABCD, little = CDAB."
+    )
+    handshake: Literal["full", "none"] = Field(
+        "full", description="none: a controller that cannot answer; jobs end as written, never as accepted."
+    )
+    readback: bool = Field(True, description="Read each page back before it is committed.")
+    link_address: Register = Field(
+        0, description="First register of the block that the controller writes (PDU address)."
+    )
+    service_address: Register = Field(
+        16, description="First register of the block that the service writes (PDU address)."
+    )
+    contour_address: Register = Field(32, description="First register of header and payload (PDU address).")
+    payload_capacity: int = Field(1984, ge=8, le=REGISTERS, description="Registers of payload, an even number.")
+    timeout_s: Seconds = Field(1.0, description="Longest wait for the reply to one request, s.")
+    poll_period_s: float = Field(0.05, ge=0.001, le=0.5, description="Period of looking at the controller's block, s.")
+    heartbeat_timeout_s: float = Field(
+        3.0, ge=1.0, le=3600, description="Longest time without a change of the controller's heartbeat, s."
+    )
+    ready_timeout_s: Seconds = Field(30, description="Longest wait for the controller to be ready for a contour, s.")
+    ack_timeout_s: Seconds = Field(5, description="Longest wait for the answer to a page, s.")
+    max_repeats: int = Field(3, ge=1, le=100, description="Attempts in vain after which a job is withdrawn.")
+    valid_for_s: float = Field(
+        30, ge=0, le=86_400, description="Age at which the controller refuses a contour, s; 0 = no limit."
+    )
+    job_timeout_s: Seconds = Field(120, description="Longest wait to deliver a contour where valid_for_s is 0, s.")
+
+    @field_validator("payload_capacity")
+    @classmethod
+    def _even(cls, value: int) -> int:
+        if value % 2:
+            raise ValueError(f"is {value}, expected an even number: 32-bit values take two registers")
+        return value
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        blocks = {
+            "link_address": (self.link_address, BLOCK_REGISTERS),
+            "service_address": (self.service_address, BLOCK_REGISTERS),
+            "contour_address": (self.contour_address, HEADER_REGISTERS + self.payload_capacity),
+        }
+        for name, (start, length) in blocks.items():
+            if start + length > REGISTERS:
+                raise ValueError(f"{name} {start} and {length} registers end at {start + length - 1}, past 65535")
+        for (one, (start, length)), (other, (other_start, other_length)) in combinations(blocks.items(), 2):
+            if start < other_start + other_length and other_start < start + length:
+                raise ValueError(
+                    f"{one} ({start} to {start + length - 1}) and {other} "
+                    f"({other_start} to {other_start + other_length - 1}) overlap"
+                )
+        if self.ack_timeout_s <= self.poll_period_s:
+            raise ValueError(f"ack_timeout_s is {self.ack_timeout_s:g}, expected more than poll_period_s")
+        return self
+
+
+class ModbusTcp(ModbusController):
+    """A controller over Modbus TCP."""
+
+    kind: Literal["modbus-tcp"]
+    host: str = Field("127.0.0.1", min_length=1, description="Host name or address of the controller.")
+    port: Port = Field(502, description="TCP port.")
+
+
+class ModbusRtu(ModbusController):
+    """A controller over Modbus RTU on a serial port."""
+
+    kind: Literal["modbus-rtu"]
+    port: str = Field(min_length=1, description="Serial port.")
+    baudrate: int = Field(115_200, ge=300, le=4_000_000, description="Baud rate.")
+    parity: Literal["N", "E", "O"] = Field("N", description="Parity.")
+    stop_bits: Literal[1, 2] = Field(1, description="Stop bits.")
+
+
+class ModbusRtuOverTcp(ModbusController):
+    """A controller over Modbus RTU frames in a TCP connection (a serial server)."""
+
+    kind: Literal["modbus-rtu-over-tcp"]
+    host: str = Field("127.0.0.1", min_length=1, description="Host name or address of the serial server.")
+    port: Port = Field(4001, description="TCP port.")
+
+
+class IntervalTrigger(Model):
+    """A job at equal intervals."""
+
+    kind: Literal["interval"]
+    period_s: Annotated[float, Field(ge=0.05, le=86_400)] = Field(description="Period, s.")
+
+
+class ControllerTrigger(Model):
+    """A job when the controller asks for one."""
+
+    kind: Literal["controller"]
+
+
+class SerialTrigger(Model):
+    """A job by hand, over a line of text on a serial port."""
+
+    kind: Literal["serial"]
+    port: str = Field(min_length=1, description="Serial port; one below /dev/serial/by-id keeps its name.")
+    baudrate: int = Field(9600, ge=300, le=4_000_000, description="Baud rate.")
+    mode: Literal["text"] = Field("text", description="text: lines of TRIG, STAT, PING.")
+
+
+class Recipe(Model):
+    """A block type: how it is traced and what is accepted."""
+
+    number: int = Field(ge=1, le=65_535, description="Number by which triggers name it.")
+    name: str = Field(min_length=1, max_length=80, description="Name for people.")
+    method: Method = Field(DEFAULT_METHOD, description="How the contour is traced.")
+    thickness_mm: float = Field(20, ge=0, le=10_000, description="Height of the block's top above the table, mm.")
+    tolerance_mm: float = Field(0.1, ge=0, le=100, description="Largest shift by leaving vertices out, mm.")
+    max_vertices: int = Field(4000, ge=3, le=1_000_000, description="Most vertices of all rings together.")
+    min_area_mm2: float = Field(100, ge=0, le=4e9, description="Smallest accepted area, mm², holes taken off.")
+    max_area_mm2: float = Field(4_000_000, gt=0, le=4e9, description="Largest accepted area, mm², holes taken off.")
+    polarity: Literal["auto", "bright", "dark"] = Field("auto", description="Walls against the table.")
+    binarize: Literal["flat", "otsu"] | Annotated[int, Field(ge=0, le=255)] = Field(
+        "flat", description="How walls are told from gaps: flat, otsu, or a fixed grey level 0 to 255."
+    )
+    edge: Literal["cut", "cells"] = Field("cut", description="cut: cells are cut open at the edge; cells: closed.")
+    pieces: Literal["one", "largest"] = Field("one", description="one: several blocks are refused; largest: it counts.")
+    parameters: dict[str, Number] = Field(
+        default_factory=dict, description="Sizes of the method; left out, they follow from the picture."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.min_area_mm2 >= self.max_area_mm2:
+            raise ValueError(
+                f"min_area_mm2 is {self.min_area_mm2:g}, expected less than max_area_mm2, {self.max_area_mm2:g}"
+            )
+        known = METHOD_PARAMETERS[self.method]
+        for name, value in self.parameters.items():
+            if name not in known:
+                there = ", ".join(known) or "none"
+                raise ValueError(f"parameters.{name} is none of {self.method}'s; there are: {there}")
+            low, high = known[name]
+            if not low <= value <= high:
+                raise ValueError(f"parameters.{name} is {value:g}, expected {low:g} to {high:g}")
+            if name.endswith("_px") and value != int(value):
+                raise ValueError(f"parameters.{name} is {value:g}, expected a whole number of pixels")
+        return self
+
+
+class Service(Model):
+    """Where the service keeps its state, and how it queues."""
+
+    state_dir: FilePath = Field(Path("var"), description="Folder of the lock and other state.")
+    queue_depth: Literal[0] = Field(
+        0, description="Triggers kept while a job is executed; 0 = they are refused as busy."
+    )
+
+
+class JournalSettings(Model):
+    """Where jobs are kept."""
+
+    path: FilePath = Field(Path("var/journal.sqlite"), description="SQLite file.")
+
+
+class ArchiveSettings(Model):
+    """Where evidence of jobs is kept. Read and checked; nothing is archived yet."""
+
+    path: FilePath = Field(Path("var/archive"), description="Folder.")
+    max_bytes: int = Field(2_000_000_000, ge=0, le=10**15, description="Most bytes kept.")
+
+
+Camera = Annotated[FilesCamera | V4l2Camera, Field(discriminator="kind")]
+Controller = Annotated[NoController | ModbusTcp | ModbusRtu | ModbusRtuOverTcp, Field(discriminator="kind")]
+Trigger = Annotated[IntervalTrigger | ControllerTrigger | SerialTrigger, Field(discriminator="kind")]
+Point = tuple[Number, Number]
+
+
+class Config(Model):
+    """Everything that config.yaml says."""
+
+    camera: Camera = Field(description="Where frames come from.")
+    calibration: Calibration | None = Field(None, description="Pixels to millimetres; needed where a controller is.")
+    controller: Controller = Field(description="The cutting machine's controller.")
+    triggers: tuple[Trigger, ...] = Field((), description="What begins a job.")
+    default_recipe: int = Field(1, ge=1, le=65_535, description="Recipe of a trigger that names none.")
+    recipes: tuple[Recipe, ...] = Field((Recipe(number=1, name="default"),), description="Block types.")
+    work_area_mm: tuple[Point, ...] = Field((), description="Polygon in the machine frame, mm; empty = not checked.")
+    service: Service = Field(default_factory=Service, description="The service itself.")
+    journal: JournalSettings = Field(default_factory=JournalSettings, description="The durable list of jobs.")
+    archive: ArchiveSettings = Field(default_factory=ArchiveSettings, description="Where evidence is kept.")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if not self.recipes:
+            raise ValueError("recipes is empty, expected one or more")
+        for name in ("number", "name"):
+            values = [getattr(recipe, name) for recipe in self.recipes]
+            twice = sorted({str(value) for value in values if values.count(value) > 1})
+            if twice:
+                raise ValueError(f"recipes: {name} {', '.join(twice)} is there more than once")
+        if self.default_recipe not in {recipe.number for recipe in self.recipes}:
+            raise ValueError(f"default_recipe is {self.default_recipe}, but no recipe has that number")
+        if self.calibration is None and not isinstance(self.controller, NoController):
+            raise ValueError("calibration is missing: a controller needs millimetres. Set calibration.file")
+        controllers = [trigger for trigger in self.triggers if isinstance(trigger, ControllerTrigger)]
+        if controllers and (isinstance(self.controller, NoController) or self.controller.handshake == "none"):
+            raise ValueError("triggers: kind controller needs a controller with handshake full")
+        if len(controllers) > 1:
+            raise ValueError("triggers: kind controller is there more than once")
+        ports = [trigger.port for trigger in self.triggers if isinstance(trigger, SerialTrigger)]
+        if isinstance(self.controller, ModbusRtu):
+            ports.append(self.controller.port)
+        if len(set(ports)) != len(ports):
+            raise ValueError("a serial port is named more than once")
+        return self
+
+    @field_validator("work_area_mm")
+    @classmethod
+    def _polygon(cls, value: tuple[Point, ...]) -> tuple[Point, ...]:
+        if not value:
+            return value
+        import numpy as np
+
+        if len(value) < 3:
+            raise ValueError(f"has {len(value)} points, expected 3 or more, or none")
+        defect = ring_defect(np.array(value, dtype=np.float64))
+        if defect:
+            raise ValueError(f"is no simple polygon: {defect}")
+        return value

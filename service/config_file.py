@@ -1,0 +1,188 @@
+"""config.yaml on disk: read with line numbers, every mistake named, relative paths counted from the file's folder."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from service import config as models
+from service.config import Config
+
+LARGEST_FILE = 1_000_000
+SAMPLES = Path(__file__).parent / "samples"
+PATH_KEYS = (
+    ("camera", "path"),
+    ("calibration", "file"),
+    ("service", "state_dir"),
+    ("journal", "path"),
+    ("archive", "path"),
+)
+SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+class ConfigError(Exception):
+    """The configuration cannot be used; one line for each mistake: where, what was seen, what is expected."""
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML as usual, but a key that stands twice is an error: the first would be lost without a word."""
+
+
+def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+    seen: dict[Any, int] = {}
+    for key_node, _ in node.value:
+        key = loader.construct_object(key_node)
+        line = key_node.start_mark.line + 1
+        if not isinstance(key, str | int | float | bool | None):
+            raise yaml.constructor.ConstructorError(None, None, "a key is not a plain word", key_node.start_mark)
+        if key in seen:
+            raise yaml.constructor.ConstructorError(
+                None, None, f"key {key!r} stands twice, first in line {seen[key]}", key_node.start_mark
+            )
+        seen[key] = line
+    return loader.construct_mapping(node, deep=True)
+
+
+_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
+
+
+def read_yaml(path: Path) -> Any:
+    """What a YAML file holds; raise ConfigError that names file, line and column."""
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise ConfigError(f"{path}: {path.stat().st_size} bytes, expected {LARGEST_FILE} at most")
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}. Name another file with --config") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is no UTF-8 text (byte {error.start}). Save it as UTF-8") from error
+    try:
+        return yaml.load(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
+        raise ConfigError(f"{path}: {where}{error.problem or error.context}") from error
+    except (yaml.YAMLError, RecursionError, ValueError) as error:  # a date or number that is none is a ValueError
+        raise ConfigError(f"{path}: is no YAML: {' '.join(str(error).split())}") from error
+
+
+def load_config(path: Path) -> Config:
+    """The configuration of a file; raise ConfigError."""
+    data = read_yaml(path)
+    if not isinstance(data, dict):
+        seen = "is empty" if data is None else f"holds a {type(data).__name__}"
+        raise ConfigError(f"{path}: {seen}, expected keys such as camera, controller, recipes")
+    try:
+        config = Config.model_validate(data)
+    except ValidationError as error:
+        raise ConfigError("\n".join(f"{path}: {line}" for line in describe(error, Config))) from error
+    return _resolved(config, path.resolve().parent)
+
+
+def default_config() -> Config:
+    """The embedded defaults: the shipped pictures with their calibration, and a controller on this machine."""
+    return Config.model_validate(
+        {
+            "camera": {"kind": "files", "path": SAMPLES, "loop": True},
+            "calibration": {"file": SAMPLES / "calibration.yaml"},
+            "controller": {"kind": "modbus-tcp", "host": "127.0.0.1", "port": 5020},
+        }
+    )
+
+
+def config_schema() -> dict[str, Any]:
+    """The JSON schema of config.yaml."""
+    return {"$schema": SCHEMA_DIALECT, **Config.model_json_schema(), "title": "combtrace configuration"}
+
+
+def describe(error: ValidationError, model: type[BaseModel]) -> Iterator[str]:
+    """Each mistake in the data of `model` as a line: path of the key, what was seen, what is expected."""
+    for mistake in error.errors(include_url=False):
+        where = _where(mistake["loc"])
+        seen = mistake.get("input")
+        message = mistake["msg"].removeprefix("Value error, ")
+        if mistake["type"] == "extra_forbidden":
+            yield f"{where}: unknown key{_did_you_mean(model, mistake['loc'])}"
+        elif mistake["type"] == "missing":
+            yield f"{where}: is missing"
+        elif mistake["type"] == "union_tag_invalid":
+            yield f"{where}.kind: seen {seen.get('kind')!r}, expected {mistake['ctx']['expected_tags']}"
+        elif mistake["type"] == "union_tag_not_found":
+            yield f"{where}.kind: is missing"
+        elif mistake["type"] == "value_error" or isinstance(seen, dict | list | tuple):
+            yield f"{where}: {message}" if where else message
+        else:
+            yield f"{where}: seen {seen!r}: {message}"
+
+
+def _where(location: tuple[int | str, ...]) -> str:
+    """`recipes[0].tolerance_mm`; the kinds that pydantic puts into the path of a union are left out."""
+    text = ""
+    before: int | str = ""
+    for part in location:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        elif not (_is_kind(part, before) or "[" in part or "-int" in part):  # branches of a union of plain types
+            text += f".{part}" if text else part
+        before = part
+    return text
+
+
+def _is_kind(part: str, before: int | str) -> bool:
+    return part in _KINDS and (isinstance(before, int) or before in ("camera", "controller"))
+
+
+def _did_you_mean(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+    """The nearest of the keys that may stand there, or else the keys themselves."""
+    known = sorted({name for there in _models_at(model, location[:-1]) for name in there.model_fields})
+    near = difflib.get_close_matches(str(location[-1]), known, n=1)
+    return f"; did you mean {near[0]}?" if near else f", expected one of {', '.join(known)}"
+
+
+def _models_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[type[BaseModel]]:
+    """The models whose keys stand at a place in the data of `model`; more than one where `kind` is not known."""
+    here = [model]
+    for part in location:
+        of_kind = [there for there in here if part in _kinds_of(there)]
+        if of_kind:
+            here = of_kind
+        elif isinstance(part, str):
+            fields = [there.model_fields[part] for there in here if part in there.model_fields]
+            here = [inner for field in fields for inner in _models_in(field.annotation)]
+    return here
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models_in(inner)
+
+
+def _kinds_of(model: type[BaseModel]) -> tuple[Any, ...]:
+    kind = model.model_fields.get("kind")
+    return get_args(kind.annotation) if kind is not None else ()
+
+
+# The words that choose a model of a union, which pydantic puts into an error's path.
+_KINDS = frozenset(
+    word
+    for model in vars(models).values()
+    if isinstance(model, type) and issubclass(model, BaseModel)
+    for word in _kinds_of(model)
+)
+
+
+def _resolved(config: Config, folder: Path) -> Config:
+    """The same with relative paths counted from the file's folder."""
+    updates: dict[str, Any] = {}
+    for section, key in PATH_KEYS:
+        model = getattr(config, section)
+        if model is not None and hasattr(model, key):
+            updates[section] = model.model_copy(update={key: folder / getattr(model, key)})
+    return config.model_copy(update=updates)

@@ -1,0 +1,221 @@
+"""The daemon: its parts as tasks, the camera kept open, stopped in order."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import signal
+from collections.abc import Awaitable, Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+from drivers.camera import Camera, CameraError
+from service.executor import Executor, Ticket, TriggerRefused
+from service.health import Fault, Health
+from service.journal import Job, Journal, JournalError, TriggerStamp
+from service.link import Link
+from service.lock import Lock
+from service.reasons import Reason
+from service.state import State
+
+log = logging.getLogger("combtrace.daemon")
+
+CAMERA_RETRY_S = 1.0
+JOURNAL_RETRY_S = 1.0
+WATCH_PERIOD_S = 0.1
+STOP_BOUND_S = 8.0
+
+
+@dataclass
+class Parts:
+    """What wiring built from a configuration."""
+
+    camera: Camera
+    journal: Journal
+    health: Health
+    executor: Executor
+    link: Link | None
+    pool: ThreadPoolExecutor
+    lock: Lock
+    triggers: list[Callable[[], Awaitable[None]]] = field(default_factory=list)
+    serial_pool: ThreadPoolExecutor | None = None
+
+
+class Daemon:
+    """Runs the parts until it is stopped, or, with `once`, until one manual trigger has come to its end."""
+
+    def __init__(self, parts: Parts) -> None:
+        self._parts = parts
+        self._stop = asyncio.Event()
+
+    def stop(self) -> None:
+        """Ask for the end: no new trigger, the running job gets a bounded time."""
+        self._stop.set()
+
+    async def run(self, *, on_signals: Iterable[signal.Signals] = ()) -> None:
+        """Run until `stop` or a signal."""
+        for number in on_signals:
+            asyncio.get_running_loop().add_signal_handler(number, self.stop)
+        tasks = self._start(self._parts.triggers)
+        try:
+            await self._stopped_or_dead(tasks)
+            await self._let_the_job_end()
+        finally:
+            await self._end(tasks)
+
+    async def run_once(self, ready_timeout_s: float, *, on_signals: Iterable[signal.Signals] = ()) -> Job:
+        """The settled job of one immediate manual trigger; raise TriggerRefused where it is not taken in time."""
+        for number in on_signals:
+            asyncio.get_running_loop().add_signal_handler(number, self.stop)
+        tasks = self._start([])
+        try:
+            ticket = await self._submit_when_ready(ready_timeout_s)
+            job = await self._settled_or_dead(ticket, tasks)
+            if self._parts.link is not None:
+                await self._parts.link.flush(1.0)
+            return job
+        finally:
+            await self._end(tasks)
+
+    # --- parts --------------------------------------------------------------------------------------------------
+
+    def _start(self, triggers: Iterable[Callable[[], Awaitable[None]]]) -> list[asyncio.Task[None]]:
+        parts = self._parts
+        runs: list[Callable[[], Awaitable[None]]] = [
+            self._watch_camera,
+            self._watch_link,
+            self._watch_journal,
+            parts.executor.run,
+            *triggers,
+        ]
+        if parts.link is not None:
+            runs.append(parts.link.run)
+            self._report_link(parts.link)
+        self._report_camera(Fault(Reason.NO_FRAME, "the camera is being opened", starting=True))
+        parts.health.start()
+        return [asyncio.ensure_future(_as_task(run)) for run in runs]
+
+    async def _watch_camera(self) -> None:
+        """Open the camera, and open it again after it was lost."""
+        parts, loop = self._parts, asyncio.get_running_loop()
+        fault: str | None = None
+        while True:
+            if parts.health.fault("camera") is not None and parts.health.job is None:
+                try:
+                    await loop.run_in_executor(parts.pool, _reopen, parts.camera)
+                except CameraError as error:
+                    if str(error) != fault:
+                        log.warning("camera: %s", error)
+                        fault = str(error)
+                    self._report_camera(Fault(Reason.NO_FRAME, str(error)))
+                    await asyncio.sleep(CAMERA_RETRY_S)
+                else:
+                    fault = None
+                    self._report_camera(None)
+            await asyncio.sleep(WATCH_PERIOD_S)
+
+    def _report_camera(self, fault: Fault | None) -> None:
+        self._parts.health.report("camera", fault)
+
+    async def _watch_journal(self) -> None:
+        """Try the journal again after it could not be written; until then no trigger is taken."""
+        parts = self._parts
+        while True:
+            if parts.health.fault("journal") is not None and parts.health.job is None:
+                try:
+                    await asyncio.to_thread(parts.journal.probe)
+                except JournalError as error:
+                    log.debug("journal: %s", error)
+                else:
+                    parts.health.report("journal", None)
+            await asyncio.sleep(JOURNAL_RETRY_S)
+
+    async def _watch_link(self) -> None:
+        """Let health follow the link: some faults show by silence, so looking at each reply would not find them."""
+        link = self._parts.link
+        while link is not None:
+            self._report_link(link)
+            await asyncio.sleep(WATCH_PERIOD_S)
+
+    def _report_link(self, link: Link) -> None:
+        fault = link.fault()
+        found = None if fault is None else Fault(Reason.CONTROLLER_LOST, fault, starting=link.starting)
+        self._parts.health.report("controller", found)
+        self._parts.executor.wake()
+
+    # --- ends ---------------------------------------------------------------------------------------------------
+
+    async def _submit_when_ready(self, ready_timeout_s: float) -> Ticket:
+        loop = asyncio.get_running_loop()
+        give_up_at = loop.time() + ready_timeout_s
+        while True:
+            why_not = self._parts.link.controller_not_ready() if self._parts.link else None
+            ready = self._parts.health.state is State.READY and why_not is None
+            if ready or loop.time() >= give_up_at:
+                return await self._parts.executor.submit(TriggerStamp("manual"))
+            if self._stop.is_set():
+                raise TriggerRefused(Reason.ABORTED, "stopped before the service was ready")
+            await asyncio.sleep(WATCH_PERIOD_S / 5)
+
+    async def _settled_or_dead(self, ticket: Ticket, tasks: list[asyncio.Task[None]]) -> Job:
+        stop = asyncio.ensure_future(self._stop.wait())
+        try:
+            waiting: list[asyncio.Future[Any]] = [ticket.settled, stop, *tasks]
+            await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            stop.cancel()
+        _raise_first(tasks)
+        if not ticket.settled.done():
+            await self._let_the_job_end()
+        if not ticket.settled.done():
+            raise TriggerRefused(Reason.ABORTED, f"stopped; job {ticket.job.job_id} is settled by the next start")
+        return ticket.settled.result()
+
+    async def _stopped_or_dead(self, tasks: list[asyncio.Task[None]]) -> None:
+        stop = asyncio.ensure_future(self._stop.wait())
+        try:
+            await asyncio.wait([stop, *tasks], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            stop.cancel()
+        _raise_first(tasks)
+
+    async def _let_the_job_end(self) -> None:
+        """Give the running job its bounded time; what is sent and not decided by then stays in flight."""
+        log.info("stopping")
+        self._parts.health.halt("the service is being stopped")
+        loop = asyncio.get_running_loop()
+        give_up_at = loop.time() + STOP_BOUND_S
+        while self._parts.health.job is not None and loop.time() < give_up_at:
+            await asyncio.sleep(WATCH_PERIOD_S / 5)
+
+    async def _end(self, tasks: list[asyncio.Task[None]]) -> None:
+        parts = self._parts
+        if parts.health.state is not State.HALTED:
+            parts.health.halt("the service is being stopped")
+        if parts.link is not None and parts.link.fault() is None:
+            await parts.link.flush(1.0)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        parts.pool.shutdown(wait=True)
+        if parts.serial_pool is not None:
+            parts.serial_pool.shutdown(wait=True)
+        parts.camera.close()
+        parts.journal.close()
+        parts.lock.release()
+
+
+async def _as_task(run: Callable[[], Awaitable[None]]) -> None:
+    await run()
+
+
+def _raise_first(tasks: list[asyncio.Task[None]]) -> None:
+    for task in tasks:
+        if task.done() and not task.cancelled():
+            task.result()
+
+
+def _reopen(camera: Camera) -> None:
+    camera.close()
+    camera.open()

@@ -1,0 +1,239 @@
+"""Takes triggers, one job at a time, and sees every job to its end."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from service.health import Fault, Health
+from service.journal import Job, Journal, JournalError, JournalFull, TriggerStamp
+from service.link import Link
+from service.reasons import Outcome, Reason
+from service.state import State
+
+log = logging.getLogger("combtrace.jobs")
+
+COUNTER_VALUES = 65535  # a trigger counter runs 1…65535; 0 means none yet
+
+
+class TriggerRefused(Exception):
+    """A trigger was not taken: `reason` as on the wire, and a sentence."""
+
+    def __init__(self, reason: Reason, text: str) -> None:
+        super().__init__(text)
+        self.reason = reason
+
+    @property
+    def not_ready(self) -> bool:
+        """True where no part of the job was begun because something did not work."""
+        return self.reason is Reason.NOT_READY
+
+
+@dataclass(frozen=True)
+class Ticket:
+    """A job that is durable in the journal, and its settled form once it has ended."""
+
+    job: Job
+    settled: asyncio.Future[Job]
+
+
+class JobRunner(Protocol):
+    """What carries a job out; `service.cycle.Cycle` in the daemon."""
+
+    async def run(self, job: Job) -> Job:
+        """Bring a new job to its end; the settled job."""
+
+    async def resume(self, job: Job) -> Job:
+        """Bring a job found in flight after a start to its end; the settled job."""
+
+
+def missed_between(last: tuple[int, int], session: int, counter: int) -> int:
+    """Trigger values of the controller that were skipped between the pair last taken and (session, counter)."""
+    before = last[1] if last[0] == session else 0
+    return (counter - before - 1) % COUNTER_VALUES
+
+
+class Executor:
+    """One job at a time, from any trigger. Jobs found in flight come first, then the controller's trigger."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        runner: JobRunner,
+        health: Health,
+        link: Link | None,
+        *,
+        controller_triggers: bool,
+        on_settled: Callable[[Job], Awaitable[None]] | None = None,
+    ) -> None:
+        self._journal = journal
+        self._runner = runner
+        self._health = health
+        self._link = link
+        self._controller_triggers = controller_triggers and link is not None
+        self._on_settled = on_settled
+        self._wake = asyncio.Event()
+        self._submitted: Ticket | None = None
+        self._taking = False
+        self._missed = 0
+        self.settled_job = 0
+        self._last_pair = journal.last_controller_trigger()
+        self._restore_published()
+
+    def _restore_published(self) -> None:
+        """What the service block said before the restart: it is true still."""
+        taken, settled = self._journal.last_taken(), self._journal.last_settled()
+        self.settled_job = settled.job_id if settled else 0
+        if self._link is None:
+            return
+        self._link.publish(
+            job_id=taken.job_id if taken else 0,
+            trigger_ack=self._last_pair[1],
+            session_ack=self._last_pair[0],
+            settled_job=self.settled_job,
+            reject_reason=int(settled.reason) if settled and settled.reason else 0,
+            owner=self._journal.owner,
+        )
+
+    @property
+    def missed(self) -> int:
+        """Triggers not taken since the start, modulo 65536."""
+        return self._missed
+
+    def wake(self) -> None:
+        """Something changed that may let a job begin."""
+        self._wake.set()
+
+    async def submit(self, trigger: TriggerStamp) -> Ticket:
+        """A ticket for the job, durable in the journal; raise TriggerRefused where it cannot be taken now."""
+        try:
+            self._check_free()
+            self._taking = True
+            try:
+                job = await self._take(trigger)
+            finally:
+                self._taking = False
+        except TriggerRefused as refused:
+            self._count_missed(1)
+            log.warning("trigger %s not taken: %s: %s", trigger.kind, refused.reason.label, refused)
+            raise
+        self._submitted = Ticket(job, asyncio.get_running_loop().create_future())
+        self._wake.set()
+        return self._submitted
+
+    def _check_free(self) -> None:
+        if self._health.job is not None or self._submitted is not None or self._taking:
+            raise TriggerRefused(Reason.BUSY, f"job {self._health.job or 'before it'} is being executed")
+        if self._health.state is not State.READY:
+            fault = self._health.first()
+            raise TriggerRefused(Reason.NOT_READY, fault.text if fault else f"state {self._health.state.label}")
+        why_not = self._link.controller_not_ready() if self._link else None
+        if why_not is not None:
+            raise TriggerRefused(Reason.NOT_READY, why_not)
+
+    async def _take(self, trigger: TriggerStamp) -> Job:
+        view = self._link.view if self._link else None
+        try:
+            job = await asyncio.to_thread(self._journal.take, trigger, above=view.last_job if view else 0)
+        except JournalError as error:
+            full = isinstance(error, JournalFull)
+            self._health.report("journal", Fault(Reason.STORAGE_FULL if full else Reason.INTERNAL_ERROR, str(error)))
+            raise TriggerRefused(Reason.STORAGE_FULL if full else Reason.INTERNAL_ERROR, str(error)) from error
+        self._health.report("journal", None)
+        log.info("job %d taken: trigger %s recipe %d", job.job_id, trigger.kind, trigger.recipe)
+        if self._link is not None:
+            self._link.publish(job_id=job.job_id)
+        return job
+
+    def _count_missed(self, count: int) -> None:
+        self._missed = (self._missed + count) & 0xFFFF
+        if self._link is not None:
+            self._link.publish(missed_triggers=self._missed)
+
+    # --- the loop -----------------------------------------------------------------------------------------------
+
+    async def run(self) -> None:
+        """Execute jobs for ever; first those that a restart found in flight."""
+        await self._settle_in_flight()
+        while True:
+            self._wake.clear()
+            if self._submitted is not None:
+                await self._execute_submitted(self._submitted)
+                continue
+            trigger = self._pending()
+            if trigger is not None:
+                await self._take_pending(trigger)
+                continue
+            await self._wake.wait()
+
+    async def _execute_submitted(self, ticket: Ticket) -> None:
+        try:
+            job = await self._execute(ticket.job)
+        finally:
+            self._submitted = None
+        if not ticket.settled.done():
+            ticket.settled.set_result(job)
+
+    async def _settle_in_flight(self) -> None:
+        unsettled = self._journal.unsettled()
+        for job in unsettled:
+            log.warning("job %d was in flight when the service ended", job.job_id)
+            self._health.report(
+                "in-flight",
+                Fault(Reason.SERVICE_RESTARTED, f"job {job.job_id} of before the restart is not settled yet"),
+            )
+            await self._finish(await self._runner.resume(job))
+        self._health.report("in-flight", None)
+
+    def _pending(self) -> TriggerStamp | None:
+        """The controller's open trigger, where there is one and it can be taken now."""
+        if not self._controller_triggers or self._link is None or self._link.view is None:
+            return None
+        if self._health.state is not State.READY or self._taking:
+            return None
+        view = self._link.view
+        if view.session == 0 or view.trigger_counter == 0 or self._link.fault() is not None:
+            return None
+        if (view.session, view.trigger_counter) == self._last_pair:
+            return None
+        return TriggerStamp("controller", view.recipe, view.block_thickness, view.session, view.trigger_counter)
+
+    async def _take_pending(self, trigger: TriggerStamp) -> None:
+        assert self._link is not None
+        assert trigger.session is not None
+        assert trigger.counter is not None
+        self._taking = True
+        try:
+            job = await self._take(trigger)
+        except TriggerRefused as refused:  # it stays pending, and is taken once the journal works again
+            log.warning("trigger controller not taken yet: %s: %s", refused.reason.label, refused)
+            return
+        finally:
+            self._taking = False
+        self._count_missed(missed_between(self._last_pair, trigger.session, trigger.counter))
+        self._last_pair = (trigger.session, trigger.counter)
+        self._link.publish(job_id=job.job_id, trigger_ack=trigger.counter, session_ack=trigger.session)
+        await self._execute(job)
+
+    async def _execute(self, job: Job) -> Job:
+        self._health.executing(job.job_id)
+        try:
+            return await self._finish(await self._runner.run(job))
+        finally:
+            self._health.executing(None)
+
+    async def _finish(self, job: Job) -> Job:
+        """Tell how the job ended: register block, log, and whoever asked to be told."""
+        assert job.outcome is not None
+        done = job.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
+        text = "" if job.reason is None else f": {int(job.reason)} {job.reason.label}: {job.detail}"
+        log.log(logging.INFO if done else logging.WARNING, "job %d %s%s", job.job_id, job.outcome, text)
+        self.settled_job = job.job_id
+        if self._link is not None:
+            self._link.publish(settled_job=job.job_id, reject_reason=int(job.reason or 0))
+        if self._on_settled is not None:
+            await self._on_settled(job)
+        return job

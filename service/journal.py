@@ -1,0 +1,289 @@
+"""The journal: every job, durable before its trigger is acknowledged, and how it ended. SQLite.
+
+WAL keeps readers out of the way; synchronous=FULL makes the last commit survive a power cut (NORMAL does not).
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+import sqlite3
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from drivers.controller.mailbox import Page
+from service.reasons import Outcome, Reason
+
+SCHEMA_VERSION = 1
+HEADER_REGISTERS = 31
+UNSETTLED = "outcome IS NULL"
+
+SCHEMA = """
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+CREATE TABLE jobs (
+    job_id INTEGER PRIMARY KEY CHECK (job_id > 0),
+    taken_at TEXT NOT NULL,
+    trigger_kind TEXT NOT NULL,
+    trigger_session INTEGER,
+    trigger_counter INTEGER,
+    recipe INTEGER NOT NULL,
+    thickness_um INTEGER NOT NULL,
+    session INTEGER,
+    pages TEXT,
+    withdraw_reason INTEGER,
+    outcome TEXT CHECK (outcome IN ('accepted', 'written', 'refused', 'failed')),
+    reason INTEGER,
+    detail TEXT,
+    settled_at TEXT,
+    report TEXT
+) STRICT;
+CREATE INDEX jobs_unsettled ON jobs (job_id) WHERE outcome IS NULL;
+CREATE INDEX jobs_by_controller ON jobs (job_id) WHERE trigger_counter IS NOT NULL;
+"""
+
+
+class JournalError(Exception):
+    """The journal cannot be read or written; without it no trigger is taken."""
+
+
+class JournalFull(JournalError):
+    """The disk that holds the journal is full."""
+
+
+class JournalConflict(Exception):
+    """A job is not there, or has ended already: a defect of the caller, which trying again does not mend."""
+
+
+@dataclass(frozen=True)
+class TriggerStamp:
+    """Where a job came from. `session` and `counter` are set for triggers of the controller only.
+
+    recipe 0 means the configured default, thickness_um 0 the recipe's.
+    """
+
+    kind: str
+    recipe: int = 0
+    thickness_um: int = 0
+    session: int | None = None
+    counter: int | None = None
+
+
+@dataclass(frozen=True)
+class Job:
+    """One job as the journal holds it. `pages` are set once any request of theirs may have been sent."""
+
+    job_id: int
+    taken_at: str
+    trigger: TriggerStamp
+    session: int | None = None
+    pages: tuple[Page, ...] = ()
+    withdraw_reason: Reason | None = None
+    outcome: Outcome | None = None
+    reason: Reason | None = None
+    detail: str | None = None
+    settled_at: str | None = None
+    report: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def sent(self) -> bool:
+        """True where a request of a transfer may have been sent: such a job is never called failed by ourselves."""
+        return bool(self.pages)
+
+
+class Journal:
+    """Jobs in one SQLite file. Methods block for a commit (milliseconds) and may be called from any thread."""
+
+    def __init__(self, path: Path, *, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> None:
+        self._path = path
+        self._now = now
+        self._lock = threading.Lock()
+        with self._translated():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
+        try:
+            with self._translated():
+                self._prepare()
+        except JournalError:
+            self._db.close()
+            raise
+
+    def _prepare(self) -> None:
+        self._db.execute("PRAGMA journal_mode = WAL")
+        self._db.execute("PRAGMA synchronous = FULL")
+        version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        if version == 0:
+            self._db.executescript(
+                f"BEGIN IMMEDIATE; {SCHEMA} INSERT INTO meta VALUES ('owner', '{1 + secrets.randbelow(0xFFFF)}');"
+                f" PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;"
+            )
+        elif version != SCHEMA_VERSION:
+            raise JournalError(
+                f"{self._path}: journal of schema version {version}, expected {SCHEMA_VERSION}. "
+                "It was written by another version of combtrace: use that one, or name another journal.path."
+            )
+        check = self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
+        if check != "ok":
+            raise JournalError(f"{self._path}: the journal is damaged ({check}). Move it away and start again.")
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode == sqlite3.SQLITE_FULL:
+                raise JournalFull(
+                    f"{self._path}: the disk is full. Free space; no trigger is taken until then."
+                ) from error
+            raise JournalError(f"{self._path}: cannot use the journal: {error}") from error
+        except (sqlite3.Error, OSError) as error:
+            raise JournalError(
+                f"{self._path}: cannot use the journal: {error}. Check the path, or move the file away."
+            ) from error
+
+    @contextmanager
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
+        """One durable step: all of it is in the file when the block has ended, or none of it is."""
+        with self._lock, self._translated():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._db
+            except BaseException:
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
+                raise
+            self._db.execute("COMMIT")
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._lock:
+            self._db.close()
+
+    @property
+    def owner(self) -> int:
+        """The number drawn once for this journal, 1…65535: the protocol's `owner`."""
+        return int(self._one("SELECT value FROM meta WHERE key = 'owner'")[0])
+
+    def probe(self) -> None:
+        """Write and commit something that changes nothing; raise JournalError where that does not work."""
+        with self._transaction() as db:
+            db.execute("UPDATE meta SET value = value WHERE key = 'owner'")
+
+    def take(self, trigger: TriggerStamp, *, above: int = 0) -> Job:
+        """A new job, durable on return; its id is above all in the journal and above `above`."""
+        taken_at = self._stamp()
+        with self._transaction() as db:
+            highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
+            job_id = max(highest, above) + 1
+            db.execute(
+                "INSERT INTO jobs (job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe,"
+                " thickness_um) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                (
+                    job_id,
+                    taken_at,
+                    trigger.kind,
+                    trigger.session,
+                    trigger.counter,
+                    trigger.recipe,
+                    trigger.thickness_um,
+                ),
+            )
+        return Job(job_id, taken_at, trigger)
+
+    def store_pages(self, job_id: int, session: int, pages: tuple[Page, ...]) -> None:
+        """Make the pages durable, before the first request of theirs is sent."""
+        text = json.dumps([[*page.header, *page.payload] for page in pages], separators=(",", ":"))
+        self._update(job_id, "session = ?, pages = ?", (session, text))
+
+    def store_withdrawal(self, job_id: int, reason: Reason) -> None:
+        """Make durable that the job is being withdrawn, and why; the first reason stands."""
+        self._update(job_id, "withdraw_reason = COALESCE(withdraw_reason, ?)", (int(reason),))
+
+    def settle(
+        self,
+        job_id: int,
+        outcome: Outcome,
+        reason: Reason | None,
+        detail: str | None,
+        report: dict[str, Any] | None = None,
+    ) -> Job:
+        """The job with its final state, durable. A job settles once: raise JournalConflict."""
+        self._update(
+            job_id,
+            "outcome = ?, reason = ?, detail = ?, settled_at = ?, report = ?",
+            (str(outcome), None if reason is None else int(reason), detail, self._stamp(), json.dumps(report or {})),
+        )
+        job = self.find(job_id)
+        assert job is not None
+        return job
+
+    def _update(self, job_id: int, assignments: str, values: tuple[Any, ...]) -> None:
+        with self._transaction() as db:
+            cursor = db.execute(f"UPDATE jobs SET {assignments} WHERE job_id = ? AND {UNSETTLED}", (*values, job_id))
+            if cursor.rowcount != 1:
+                raise JournalConflict(f"{self._path}: job {job_id} is not there, or has ended already")
+
+    def find(self, job_id: int) -> Job | None:
+        """The job, or None."""
+        return next(iter(self._jobs("WHERE job_id = ?", (job_id,))), None)
+
+    def unsettled(self) -> tuple[Job, ...]:
+        """Jobs without a final state, oldest first: after a crash at most the one in flight."""
+        return self._jobs(f"WHERE {UNSETTLED} ORDER BY job_id")
+
+    def last_settled(self) -> Job | None:
+        """The settled job with the highest id."""
+        return next(iter(self._jobs("WHERE outcome IS NOT NULL ORDER BY job_id DESC LIMIT 1")), None)
+
+    def last_taken(self) -> Job | None:
+        """The job with the highest id."""
+        return next(iter(self._jobs("ORDER BY job_id DESC LIMIT 1")), None)
+
+    def last_controller_trigger(self) -> tuple[int, int]:
+        """(session, trigger_counter) last taken from the controller; (0, 0) where there was none."""
+        row = self._one(
+            "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL"
+            " ORDER BY job_id DESC LIMIT 1"
+        )
+        return (int(row[0]), int(row[1])) if row else (0, 0)
+
+    def _one(self, query: str) -> Any:
+        with self._lock, self._translated():
+            return self._db.execute(query).fetchone()
+
+    def _jobs(self, where: str, values: tuple[Any, ...] = ()) -> tuple[Job, ...]:
+        columns = (
+            "job_id, taken_at, trigger_kind, recipe, thickness_um, trigger_session, trigger_counter,"
+            " session, pages, withdraw_reason, outcome, reason, detail, settled_at, report"
+        )
+        with self._lock, self._translated():
+            rows = self._db.execute(f"SELECT {columns} FROM jobs {where}", values).fetchall()
+        return tuple(_job(row) for row in rows)
+
+    def _stamp(self) -> str:
+        return self._now().isoformat(timespec="milliseconds")
+
+
+def _job(row: tuple[Any, ...]) -> Job:
+    job_id, taken_at, kind, recipe, thickness_um, trigger_session, counter, session, pages = row[:9]
+    withdraw_reason, outcome, reason, detail, settled_at, report = row[9:]
+    return Job(
+        job_id=job_id,
+        taken_at=taken_at,
+        trigger=TriggerStamp(kind, recipe, thickness_um, trigger_session, counter),
+        session=session,
+        pages=tuple(
+            Page(tuple(registers[:HEADER_REGISTERS]), tuple(registers[HEADER_REGISTERS:]))
+            for registers in json.loads(pages or "[]")
+        ),
+        withdraw_reason=None if withdraw_reason is None else Reason(withdraw_reason),
+        outcome=None if outcome is None else Outcome(outcome),
+        reason=None if reason is None else Reason(reason),
+        detail=detail,
+        settled_at=settled_at,
+        report=json.loads(report or "{}"),
+    )

@@ -1,0 +1,290 @@
+"""The link to the controller: connection, heartbeats, polling, and what its block says.
+
+Policy is here; one attempt is the driver's.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from drivers.controller import Controller, ControllerError, ControllerUnavailable
+from drivers.controller.mailbox import LinkBlock, ServiceBlock
+
+log = logging.getLogger("combtrace.link")
+
+RETRY_PAUSES_S = (0.1, 0.2, 0.5, 1.0)  # the last one again and again: back within 2 s of the controller's return
+HEARTBEAT_PERIOD_S = 0.4  # the protocol wants a change at least once a second
+CLOCK_TOLERANCE_MS = 1000  # protocol: a clock reading counts only if it fits the one before within 1 s
+READS_FOR_TWO_ALIKE = 20
+CLOCK_MODULUS = 1 << 32
+
+
+class LinkUnsteady(ControllerError):
+    """The controller's block did not show the same content twice in a row."""
+
+
+@dataclass(frozen=True)
+class LinkSettings:
+    """How the link is kept. `handshake` False is a controller that cannot answer: its block is not read."""
+
+    handshake: bool = True
+    poll_period_s: float = 0.05
+    heartbeat_timeout_s: float = 3.0
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """What the controller's clock said, and in which session; clock_ms 0 where it has no clock."""
+
+    session: int
+    clock_ms: int
+
+
+def steady(block: LinkBlock) -> LinkBlock:
+    """The part of a block that two reads in a row must show alike: all but heartbeat, clock and test echo."""
+    return replace(block, controller_heartbeat=0, clock=0, test_echo=0)
+
+
+class Link:
+    """Keeps one connection to the controller, reads its block, writes ours.
+
+    view: the controller's block as two reads in a row showed it, None while there is none to act on.
+    """
+
+    def __init__(
+        self,
+        controller: Controller,
+        settings: LinkSettings,
+        *,
+        on_look: Callable[[], None] = lambda: None,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.controller = controller
+        self.settings = settings
+        self.view: LinkBlock | None = None
+        self.on_look = on_look
+        self._now = now
+        self._up = asyncio.Event()
+        self._wake = asyncio.Event()
+        self._written = asyncio.Event()
+        self._block = ServiceBlock()
+        self._dirty = True
+        self._written_at = -1e9
+        self._trouble = "not connected yet"
+        self._well_or_failed = False
+        self._since: float | None = None
+        self._forget()
+
+    def _forget(self) -> None:
+        """Drop all that an earlier connection said: nothing of it may be combined with what comes next."""
+        self.view = None
+        self._previous: LinkBlock | None = None
+        self._beat_at: float | None = None
+        self._beat: int | None = None
+        self._clock: tuple[int, int, float] | None = None  # session, clock in ms, when it was read
+        self._clock_fits = False
+
+    # --- what it says -------------------------------------------------------------------------------------------
+
+    @property
+    def starting(self) -> bool:
+        """True until the link was well or failed for the first time, or that takes too long."""
+        if self._well_or_failed or self._since is None:
+            return not self._well_or_failed
+        return self._now() - self._since < self.settings.heartbeat_timeout_s
+
+    def fault(self) -> str | None:
+        """Why nothing can be sent now, as a sentence; None when contours can be sent."""
+        fault = self._fault()
+        self._well_or_failed = self._well_or_failed or fault is None
+        return fault
+
+    def _fault(self) -> str | None:
+        if not self._up.is_set():
+            return self._trouble
+        if not self.settings.handshake:
+            return None
+        view = self.view
+        if view is None or view.session == 0:
+            return "the controller's program is starting (session 0)"
+        if not self._beating():
+            return (
+                f"the controller's heartbeat has not changed for {self.settings.heartbeat_timeout_s:g} s: "
+                "its program does not run"
+            )
+        return self._echo_fault(view)
+
+    def _beating(self) -> bool:
+        return self._beat_at is not None and self._now() - self._beat_at <= self.settings.heartbeat_timeout_s
+
+    def _echo_fault(self, view: LinkBlock) -> str | None:
+        expected = self._block.test_value + 1
+        if view.test_echo == expected:
+            return None
+        swapped = (view.test_echo & 0xFFFF) << 16 | view.test_echo >> 16
+        swapped_value = (self._block.test_value & 0xFFFF) << 16 | self._block.test_value >> 16
+        hint = (
+            "the word order differs: change controller.word_order"
+            if swapped == swapped_value + 1
+            else "check controller.word_order and the register addresses"
+        )
+        return f"test_echo is 0x{view.test_echo:08X}, expected 0x{expected:08X}: {hint}"
+
+    def controller_not_ready(self) -> str | None:
+        """Why the controller would not take a contour at this moment; None where it would."""
+        fault = self.fault()
+        if fault is not None or not self.settings.handshake:
+            return fault
+        assert self.view is not None
+        states = {0: "not ready", 2: "busy", 3: "in fault"}
+        state = self.view.controller_state
+        return None if state == 1 else f"the controller is {states.get(state, f'in unknown state {state}')}"
+
+    def stamp(self) -> Stamp | None:
+        """Session and clock as last read, None where the reading does not count (no session, or the clock jumped)."""
+        if not self.settings.handshake:
+            return Stamp(0, 0)
+        if self.view is None or self.view.session == 0 or self._clock is None:
+            return None
+        session, clock_ms, _ = self._clock
+        if session != self.view.session:
+            return None
+        if clock_ms == 0:
+            return Stamp(session, 0)
+        return Stamp(session, clock_ms) if self._clock_fits else None
+
+    # --- reading ------------------------------------------------------------------------------------------------
+
+    async def look(self) -> LinkBlock:
+        """The controller's block, as two reads in a row show it; raise ControllerError."""
+        for _ in range(READS_FOR_TWO_ALIKE):
+            block = await self.controller.read_link()
+            self._heard(block)
+            previous, self._previous = self._previous, block
+            if previous is not None and steady(previous) == steady(block):
+                self.view = block
+                self.on_look()
+                return block
+        raise LinkUnsteady(
+            f"the controller's block changed at each of {READS_FOR_TWO_ALIKE} reads, expected two alike in a row. "
+            "Check controller.link_address"
+        )
+
+    def _heard(self, block: LinkBlock) -> None:
+        now = self._now()
+        if self._beat is not None and block.controller_heartbeat != self._beat:
+            self._beat_at = now
+        self._beat = block.controller_heartbeat
+        before, self._clock = self._clock, (block.session, block.clock, now)
+        if before is None or before[0] != block.session:
+            self._clock_fits = False
+            return
+        passed_ms = (block.clock - before[1]) % CLOCK_MODULUS
+        off_ms = passed_ms - (now - before[2]) * 1000
+        off_ms = (off_ms + CLOCK_MODULUS / 2) % CLOCK_MODULUS - CLOCK_MODULUS / 2
+        self._clock_fits = abs(off_ms) <= CLOCK_TOLERANCE_MS
+
+    # --- writing ------------------------------------------------------------------------------------------------
+
+    def publish(self, **changes: Any) -> None:
+        """Change fields of the service block; it is written at once, whole."""
+        block = replace(self._block, **changes)
+        if block != self._block:
+            self._block = block
+            self._dirty = True
+            self._written.clear()
+            self._wake.set()
+
+    @property
+    def published(self) -> ServiceBlock:
+        """The service block as it stands, or will stand with the next write."""
+        return self._block
+
+    async def flush(self, timeout_s: float) -> bool:
+        """Wait until the last `publish` was confirmed by the controller; False where that took too long."""
+        if not self._dirty:
+            return True
+        try:
+            await asyncio.wait_for(self._written.wait(), timeout_s)
+        except TimeoutError:
+            return False
+        return True
+
+    async def _write_service(self) -> None:
+        self._block = replace(self._block, service_heartbeat=(self._block.service_heartbeat + 1) & 0xFFFF)
+        writing = self._block
+        await self.controller.write_service(writing)
+        self._written_at = self._now()
+        if writing is self._block:  # nothing was published while it was on its way
+            self._dirty = False
+            self._written.set()
+
+    # --- the loop -----------------------------------------------------------------------------------------------
+
+    async def wait_connected(self) -> None:
+        """Return when there is a connection; ask for one where there is none."""
+        if not self.controller.connected:
+            self._up.clear()
+            self._wake.set()
+        await self._up.wait()
+
+    async def run(self) -> None:
+        """Keep the link for ever: connect, poll, beat; after a loss again, with growing pauses."""
+        failures = 0
+        self._since = self._now()
+        try:
+            while True:
+                try:
+                    await self.controller.connect()
+                    self._forget()
+                    if failures:
+                        log.info("link: controller is back")
+                    failures = 0
+                    self._dirty = True
+                    self._up.set()
+                    await self._serve()
+                except ControllerError as error:
+                    self._lost(error, first=failures == 0)
+                pause = RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)]
+                failures += 1
+                await asyncio.sleep(pause)
+        finally:
+            self._up.clear()
+            await self.controller.close()
+
+    def _lost(self, error: ControllerError, *, first: bool) -> None:
+        self._up.clear()
+        self._forget()
+        self._trouble = str(error)
+        self._well_or_failed = True
+        log.log(logging.WARNING if first else logging.DEBUG, "link: %s", error)
+        self.on_look()
+
+    async def _serve(self) -> None:
+        while True:
+            if not self.controller.connected:  # another's request has found it out
+                raise ControllerUnavailable("the connection was lost. It is being opened again")
+            if self.settings.handshake:
+                try:
+                    await self.look()
+                except ControllerUnavailable:
+                    raise
+                except LinkUnsteady as error:
+                    self.view = None
+                    log.warning("link: %s", error)
+            if self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S:
+                await self._write_service()
+                self.on_look()
+            await self._pause()
+
+    async def _pause(self) -> None:
+        try:
+            await asyncio.wait_for(self._wake.wait(), self.settings.poll_period_s)
+        except TimeoutError:
+            return
+        self._wake.clear()

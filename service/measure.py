@@ -1,0 +1,190 @@
+"""A picture becomes the polygon that would be sent, with what speaks against sending it. No device is touched."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.acceptance import Limits, judge
+from contour.calibration import Calibration
+from contour.errors import CalibrationError, NoBlockFound, PictureError
+from contour.geometry import Contour, Ring
+from contour.polygon import cutting_polygon
+from contour.tracing import Trace, TraceSettings, trace
+from service.config import Recipe
+from service.reasons import Reason
+
+STAGES = ("read", "mask", "trace", "convert", "simplify")
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What was seen in one picture: the contour, where there is one, and the findings against it, lowest code first.
+
+    pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
+    has a figure for each stage that ran, and "total".
+    """
+
+    method: str
+    polarity: str | None = None
+    pitch_px: float | None = None
+    pixels: Contour | None = None
+    millimetres: Contour | None = None
+    area_px2: float | None = None
+    area_mm2: float | None = None
+    uncertainty_px: float | None = None
+    uncertainty_mm: float | None = None
+    thickness_mm: float | None = None
+    aligned: bool = False
+    findings: tuple[tuple[Reason, str], ...] = ()
+    timings_ms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """Why it is refused, lowest code first; empty where it is not."""
+        return tuple(reason for reason, _ in self.findings)
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The findings as sentences, each with the measured value and the limit."""
+        return tuple(text for _, text in self.findings)
+
+    @property
+    def size_mm(self) -> tuple[float, float] | None:
+        """Width and height of the contour's box in the machine frame."""
+        if self.millimetres is None:
+            return None
+        width, height = np.ptp(self.millimetres.exterior, axis=0).tolist()
+        return width, height
+
+    def summary(self) -> dict[str, Any]:
+        """What the journal keeps of it."""
+        return {
+            "method": self.method,
+            "polarity": self.polarity,
+            "pitch_px": _rounded(self.pitch_px),
+            "vertices": 0 if self.pixels is None else self.pixels.point_count,
+            "area_mm2": _rounded(self.area_mm2),
+            "uncertainty_mm": _rounded(self.uncertainty_mm),
+            "thickness_mm": self.thickness_mm,
+            "timings_ms": {name: _rounded(value) for name, value in self.timings_ms.items()},
+        }
+
+
+class _Stopwatch:
+    """Times of stages, as they end one after another."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._last = clock()
+        self.milliseconds: dict[str, float] = {}
+
+    def lap(self, stage: str) -> None:
+        """The stage that ran since the last lap has ended."""
+        now = self._clock()
+        self.milliseconds[stage] = self.milliseconds.get(stage, 0.0) + (now - self._last) * 1000
+        self._last = now
+
+
+class Measurer:
+    """Traces pictures with recipes. Without a calibration it works in pixels; limits in mm do not apply."""
+
+    def __init__(
+        self,
+        calibration: Calibration | None,
+        *,
+        work_area_mm: Ring | None = None,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._calibration = calibration
+        self._work_area_mm = work_area_mm
+        self._clock = clock
+
+    @property
+    def calibrated(self) -> bool:
+        """True where pixels become millimetres."""
+        return self._calibration is not None
+
+    def measure(self, picture: NDArray[np.uint8], recipe: Recipe, thickness_mm: float) -> Measurement:
+        """The measurement of one picture; raise PictureError or ParameterError where that or the recipe is unusable."""
+        watch = _Stopwatch(self._clock)
+        result = Measurement(
+            method=recipe.method,
+            thickness_mm=None if self._calibration is None else thickness_mm,
+            aligned=self._calibration is not None and self._calibration.aligned,
+        )
+        try:
+            result = self._traced(picture, recipe, thickness_mm, result, watch)
+        except NoBlockFound as error:
+            result = replace(result, findings=((Reason.NO_BLOCK_FOUND, str(error)),))
+        except CalibrationError as error:
+            result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))
+        total = sum(watch.milliseconds.values())
+        return replace(result, timings_ms={**watch.milliseconds, "total": total})
+
+    def _traced(
+        self,
+        picture: NDArray[np.uint8],
+        recipe: Recipe,
+        thickness_mm: float,
+        result: Measurement,
+        watch: _Stopwatch,
+    ) -> Measurement:
+        height, width = picture.shape[:2]
+        calibration = self._calibration
+        if calibration is not None:
+            calibration.check_fits(width, height)
+        rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
+        traced: Trace = trace(picture, trace_settings(recipe), rectifier=rectifier, on_stage=watch.lap)
+        result = replace(result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour)
+        polygon = cutting_polygon(
+            traced.contour,
+            calibration,
+            height_mm=thickness_mm,
+            tolerance_mm=recipe.tolerance_mm,
+            on_stage=watch.lap,
+        )
+        findings = judge(polygon, (width, height), self._limits(recipe))
+        watch.lap("judge")
+        return replace(
+            result,
+            pixels=polygon.pixels,
+            millimetres=polygon.millimetres,
+            area_px2=polygon.area_px2,
+            area_mm2=polygon.area_mm2,
+            uncertainty_px=traced.uncertainty_px,
+            findings=tuple((Reason(int(finding.refusal)), finding.text) for finding in findings),
+        )
+
+    def _limits(self, recipe: Recipe) -> Limits:
+        return Limits(
+            min_area_mm2=recipe.min_area_mm2,
+            max_area_mm2=recipe.max_area_mm2,
+            max_vertices=recipe.max_vertices,
+            work_area_mm=self._work_area_mm,
+        )
+
+
+def trace_settings(recipe: Recipe) -> TraceSettings:
+    """The recipe's part that tracing needs."""
+    sizes = {name: int(value) for name, value in recipe.parameters.items() if name.endswith("_px")}
+    return TraceSettings(
+        method=recipe.method,
+        polarity=recipe.polarity,
+        binarize=recipe.binarize,
+        edge=recipe.edge,
+        threshold=recipe.parameters.get("threshold"),
+        **sizes,
+    )
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(float(value), 3)
+
+
+__all__ = ["STAGES", "Measurement", "Measurer", "PictureError", "trace_settings"]

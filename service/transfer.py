@@ -1,0 +1,318 @@
+"""One job's pages to the controller, by the protocol's "A transfer": it ends only where the controller has decided.
+
+Of one job, `before_sending` is called once, before the first request that carries any of it; `before_withdrawal` before
+the first request that takes it back. Both make it durable, so that a restart goes on where this left off.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import NoReturn
+
+from drivers.controller import ControllerError, ControllerUnavailable
+from drivers.controller.mailbox import Answer, LinkBlock, Page
+from service.link import Link
+from service.reasons import Outcome, Reason
+
+log = logging.getLogger("combtrace.transfer")
+
+FIRST_LOOKS_S = 0.002  # between looks for an answer, growing to the poll period: most answers come within a scan
+WITHDRAWAL_PAUSE_S = 0.5
+CAN_BE_REPEATED = (Answer.BAD_CRC, Answer.BAD_LAYOUT, Answer.OUTDATED)
+
+
+@dataclass(frozen=True)
+class TransferSettings:
+    """Bounds of one transfer; names and meaning as in the configuration's `controller`."""
+
+    handshake: bool = True
+    readback: bool = True
+    ready_timeout_s: float = 30.0
+    ack_timeout_s: float = 5.0
+    max_repeats: int = 3
+    poll_period_s: float = 0.05
+
+
+@dataclass(frozen=True)
+class Settlement:
+    """How a job ended: outcome, reason where it was not accepted or written, and a sentence of detail."""
+
+    outcome: Outcome
+    reason: Reason | None = None
+    detail: str | None = None
+
+
+class _Ended(Exception):
+    """The controller's block settles the job: leaves the steps from wherever it was looked at."""
+
+    def __init__(self, settlement: Settlement) -> None:
+        super().__init__(settlement)
+        self.settlement = settlement
+
+
+class TransferCounter:
+    """Values for the commit register: the next one at each attempt, never 0, never the one last answered."""
+
+    def __init__(self, start: int) -> None:
+        self._last = start & 0xFFFF
+
+    def next(self, ack_transfer: int) -> int:
+        """A value that is neither 0, nor `ack_transfer`, nor the one given before."""
+        value = self._last
+        while value in (0, ack_transfer, self._last):
+            value = (value + 1) & 0xFFFF
+        self._last = value
+        return value
+
+
+class Transfer:
+    """Brings one job to its end at the controller. `expires_at_s` is on the monotonic clock `now`."""
+
+    def __init__(
+        self,
+        link: Link,
+        settings: TransferSettings,
+        counter: TransferCounter,
+        *,
+        job_id: int,
+        session: int,
+        pages: tuple[Page, ...],
+        withdrawal: Page,
+        expires_at_s: float,
+        before_sending: Callable[[], Awaitable[None]],
+        before_withdrawal: Callable[[Reason], Awaitable[None]],
+        sent: bool = False,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._link = link
+        self._settings = settings
+        self._counter = counter
+        self._job_id = job_id
+        self._session = session
+        self._pages = pages
+        self._withdrawal = withdrawal
+        self._expires_at_s = expires_at_s
+        self._before_sending = before_sending
+        self._before_withdrawal = before_withdrawal
+        self._sent = sent
+        self._now = now
+        self._withdrawn_for: tuple[Reason, str] | None = None
+        self._trouble = ""
+
+    async def run(self) -> Settlement:
+        """Send until the controller has decided; withdraw what it does not take."""
+        try:
+            if not self._settings.handshake:
+                return await self._write_only()
+            reason, detail = await self._deliver()
+            if not self._sent and not self._link.controller.connected:
+                return Settlement(Outcome.FAILED, reason, detail)  # it never left: there is nothing to take back
+            return await self.withdraw(reason, detail)
+        except _Ended as ended:
+            return ended.settlement
+
+    async def withdraw(self, reason: Reason, detail: str) -> Settlement:
+        """Step 8: take the job back, again and again, until the controller has decided."""
+        log.warning("job %d: withdrawing: %s (%s)", self._job_id, reason.label, detail)
+        self._withdrawn_for = (reason, detail)
+        await self._before_withdrawal(reason)
+        try:
+            while True:
+                try:
+                    await self._gate()
+                    await self._attempt(self._withdrawal)
+                except ControllerUnavailable:
+                    await self._link.wait_connected()
+                except ControllerError as error:
+                    self._told(str(error))
+                await asyncio.sleep(WITHDRAWAL_PAUSE_S)
+        except _Ended as ended:
+            return ended.settlement
+
+    # --- step 7's conditions, "whenever else it looks" ----------------------------------------------------------
+
+    async def _look(self) -> LinkBlock:
+        """The controller's block; raise _Ended where it settles the job."""
+        view = await self._link.look()
+        if view.session == 0:
+            return view
+        if view.last_job == self._job_id and view.last_result != 0:
+            self._end_by(view.last_result)
+        if view.session != self._session:
+            raise _Ended(
+                Settlement(
+                    Outcome.FAILED,
+                    Reason.CONTROLLER_RESTARTED,
+                    f"session {view.session}, the job was for session {self._session}",
+                )
+            )
+        if view.last_job > self._job_id:
+            raise _Ended(
+                Settlement(
+                    Outcome.FAILED, Reason.OTHER_SERVICE, f"the controller's last job is {view.last_job} already"
+                )
+            )
+        return view
+
+    def _end_by(self, last_result: int) -> NoReturn:
+        if last_result == Answer.ACCEPTED:
+            raise _Ended(Settlement(Outcome.ACCEPTED))
+        if self._withdrawn_for is not None:
+            reason, detail = self._withdrawn_for
+            raise _Ended(Settlement(Outcome.FAILED, reason, detail))
+        raise _Ended(
+            Settlement(Outcome.REFUSED, Reason.CONTROLLER_REFUSED, f"answer {last_result} {_answer_name(last_result)}")
+        )
+
+    # --- steps 1 to 7 -------------------------------------------------------------------------------------------
+
+    async def _deliver(self) -> tuple[Reason, str]:
+        """Send page after page; return why the job is to be withdrawn. A settled job leaves by _Ended."""
+        page, in_vain = 0, 0
+        while in_vain < self._settings.max_repeats:
+            try:
+                give_up = await self._ready()
+                if give_up is not None:
+                    return give_up
+                answer = await self._attempt(self._pages[page])
+            except ControllerUnavailable as error:
+                self._told(str(error))
+                if not await self._reconnected():
+                    return Reason.CONTROLLER_LOST, f"not back before the job expired: {error}"
+                continue
+            except ControllerError as error:  # an exception response: a reply, so nothing was done
+                self._told(str(error))
+                answer = None
+                await asyncio.sleep(self._settings.poll_period_s)
+            if answer is Answer.ACCEPTED:
+                page, in_vain = page + 1, 0
+            elif answer is not Answer.NOT_READY:
+                page = 0 if answer is Answer.PAGE_MISSING else page
+                in_vain += 1
+        return Reason.CONTROLLER_TIMEOUT, f"{in_vain} attempts in vain, last: {self._trouble}"
+
+    async def _ready(self) -> tuple[Reason, str] | None:
+        """Step 1: None when the controller is ready, else why the job is to be withdrawn."""
+        give_up_at = self._now() + self._settings.ready_timeout_s
+        while True:
+            await self._look()
+            why_not = self._link.controller_not_ready()
+            now = self._now()
+            if now >= self._expires_at_s:
+                return Reason.EXPIRED, why_not or "the contour became too old on its way"
+            if why_not is None:
+                return None
+            if now >= give_up_at:
+                return Reason.CONTROLLER_TIMEOUT, f"{why_not} for {self._settings.ready_timeout_s:g} s"
+            await asyncio.sleep(self._settings.poll_period_s)
+
+    async def _gate(self) -> None:
+        """Return when what is written will be read as it is meant; a controller that is not ready is no hindrance."""
+        while True:
+            await self._look()
+            fault = self._link.fault()
+            if fault is None:
+                return
+            self._told(fault)
+            await asyncio.sleep(self._settings.poll_period_s)
+
+    async def _attempt(self, page: Page) -> Answer | None:
+        """Steps 2 to 7 for one page: the controller's answer, None where there was none."""
+        controller = self._link.controller
+        await controller.write_transfer(0)
+        await self._about_to_send()
+        await controller.write_page(page)
+        if self._settings.readback and await controller.read_page(len(page.payload)) != page:
+            self._told("read-back differs from what was written: check contour_address and payload_capacity")
+            return None
+        view = self._link.view
+        transfer = self._counter.next(view.ack_transfer if view else 0)
+        try:
+            await controller.write_transfer(transfer)
+        except ControllerUnavailable as error:  # it may have been done: go on with step 7
+            self._told(str(error))
+            if not await self._reconnected():
+                return None
+        return await self._answer(transfer)
+
+    async def _about_to_send(self) -> None:
+        """Make durable that the job may have been sent, before the first request of step 3."""
+        if not self._sent:
+            await self._before_sending()
+            self._sent = True
+
+    async def _answer(self, transfer: int) -> Answer | None:
+        """Step 7: the answer to `transfer`, None where none came within ack_timeout. Final ones leave by _Ended."""
+        give_up_at = self._now() + self._settings.ack_timeout_s
+        pause = FIRST_LOOKS_S
+        while True:
+            view = await self._look()
+            if view.session == self._session and view.ack_transfer == transfer:
+                answer = _as_answer(view.ack_result)
+                if answer in CAN_BE_REPEATED or answer in (Answer.PAGE_MISSING, Answer.NOT_READY):
+                    self._told(f"answer {view.ack_result} {_answer_name(view.ack_result)}")
+                    return answer
+                if answer is Answer.ACCEPTED and self._withdrawn_for is None and view.last_job < self._job_id:
+                    return answer  # of a page that is not the last one; the last one's is in last_job, looked at above
+            if self._now() >= give_up_at:
+                self._told(f"no answer within {self._settings.ack_timeout_s:g} s")
+                return None
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, self._settings.poll_period_s)
+
+    async def _reconnected(self) -> bool:
+        """Wait for a new connection, at most until the job expires; a withdrawal waits for ever."""
+        if self._withdrawn_for is not None:
+            await self._link.wait_connected()
+            return True
+        try:
+            await asyncio.wait_for(self._link.wait_connected(), max(0.0, self._expires_at_s - self._now()))
+        except TimeoutError:
+            return False
+        return True
+
+    # --- handshake: none ----------------------------------------------------------------------------------------
+
+    async def _write_only(self) -> Settlement:
+        """Steps 2 to 5, for a controller that cannot answer; repeats carry the same transfer value."""
+        controller, page = self._link.controller, self._pages[0]
+        transfer = self._counter.next(0)
+        in_vain = 0
+        while in_vain < self._settings.max_repeats and self._now() < self._expires_at_s:
+            try:
+                await controller.write_transfer(0)
+                await self._about_to_send()
+                await controller.write_page(page)
+                if not self._settings.readback or await controller.read_page(len(page.payload)) == page:
+                    await controller.write_transfer(transfer)
+                    return Settlement(Outcome.WRITTEN)
+                self._told("read-back differs from what was written: check contour_address and payload_capacity")
+                in_vain += 1
+            except ControllerUnavailable as error:
+                self._told(str(error))
+                if not await self._reconnected():
+                    break
+            except ControllerError as error:
+                self._told(str(error))
+                in_vain += 1
+                await asyncio.sleep(self._settings.poll_period_s)
+        return Settlement(Outcome.FAILED, Reason.CONTROLLER_LOST, self._trouble or "not written before the job expired")
+
+    def _told(self, trouble: str) -> None:
+        """Keep the last trouble for the settlement's detail, and log it when it is a new one."""
+        if trouble != self._trouble:
+            log.warning("job %d: %s", self._job_id, trouble)
+        self._trouble = trouble
+
+
+def _as_answer(value: int) -> Answer | None:
+    return Answer(value) if value in Answer.__members__.values() else None
+
+
+def _answer_name(value: int) -> str:
+    answer = _as_answer(value)
+    return "unknown" if answer is None else answer.name.lower()

@@ -1,0 +1,181 @@
+"""A configuration becomes parts: with the device commands, the only place that names concrete drivers."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from drivers.camera.files import FileCamera
+from drivers.trigger.serial import SerialLineTrigger
+from numpy.typing import NDArray
+
+from contour.calibration import Calibration
+from drivers.camera import Camera
+from drivers.controller import Controller
+from drivers.controller.mailbox import MailboxLayout
+from drivers.controller.modbus import ModbusTcpController
+from service.calibration_file import CalibrationFileError, load_calibration
+from service.config import Config, ControllerTrigger, FilesCamera, IntervalTrigger, ModbusTcp, NoController
+from service.config import SerialTrigger as SerialTriggerSettings
+from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation
+from service.daemon import Parts
+from service.executor import Executor
+from service.health import Fault, Health
+from service.journal import Journal, JournalError
+from service.link import Link, LinkSettings
+from service.lock import Lock, LockError
+from service.measure import Measurer
+from service.reasons import Reason
+from service.state import State, StateMachine
+from service.status import status_line
+from service.transfer import TransferCounter, TransferSettings
+from service.triggers import SerialTrigger, interval_trigger
+
+
+class WiringError(Exception):
+    """The configuration names what cannot be had: seen, expected, next step."""
+
+
+def build(config: Config, *, observe: Callable[[Observation], None] = lambda _observation: None) -> Parts:
+    """The daemon's parts; raise WiringError. Must be called in the event loop's thread."""
+    calibration, calibration_fault = find_calibration(config)
+    camera = make_camera(config)
+    try:
+        lock = Lock(config.service.state_dir / "combtrace.lock")
+        journal = Journal(config.journal.path)
+    except (LockError, JournalError) as error:
+        raise WiringError(str(error)) from error
+    link = _make_link(config)
+    health = Health(StateMachine(_publisher(link)))
+    health.report("calibration", calibration_fault)
+    pool = ThreadPoolExecutor(1, "camera")
+    cycle = Cycle(
+        camera,
+        Measurer(calibration, work_area_mm=_work_area(config)),
+        {recipe.number: recipe for recipe in config.recipes},
+        journal,
+        health,
+        link,
+        TransferCounter(secrets.randbelow(0xFFFF) + 1),
+        cycle_settings(config),
+        pool,
+        observe=observe,
+    )
+    kinds = {type(trigger) for trigger in config.triggers}
+    executor = Executor(journal, cycle, health, link, controller_triggers=ControllerTrigger in kinds)
+    if link is not None:
+        link.on_look = executor.wake
+    parts = Parts(camera, journal, health, executor, link, pool, lock)
+    _add_triggers(config, parts)
+    return parts
+
+
+def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:
+    """The calibration, and the fault where a controller waits for millimetres that cannot be had."""
+    if config.calibration is None:
+        fault = Fault(Reason.CALIBRATION_MISSING, "no calibration file is configured. Set calibration.file")
+        return None, None if isinstance(config.controller, NoController) else fault
+    try:
+        return load_calibration(config.calibration.file), None
+    except CalibrationFileError as error:
+        return None, Fault(Reason.CALIBRATION_MISSING, str(error))
+
+
+def make_camera(config: Config) -> Camera:
+    """The camera; raise WiringError for a kind that this version cannot drive."""
+    if isinstance(config.camera, FilesCamera):
+        return FileCamera(config.camera.path, loop=config.camera.loop)
+    raise WiringError(f"camera.kind {config.camera.kind!r} is not built in yet, expected 'files'. Use a file camera")
+
+
+def make_controller(config: Config) -> Controller | None:
+    """The controller's driver, None for `kind: none`; raise WiringError for a kind that this version cannot drive."""
+    settings = config.controller
+    if isinstance(settings, NoController):
+        return None
+    if not isinstance(settings, ModbusTcp):
+        raise WiringError(f"controller.kind {settings.kind!r} is not built in yet, expected 'modbus-tcp' or 'none'")
+    layout = MailboxLayout(
+        settings.link_address,
+        settings.service_address,
+        settings.contour_address,
+        settings.payload_capacity,
+        settings.word_order,
+    )
+    return ModbusTcpController(settings.host, settings.port, settings.device_id, layout, timeout_s=settings.timeout_s)
+
+
+def cycle_settings(config: Config) -> CycleSettings:
+    """The bounds of a job."""
+    settings = config.controller
+    if isinstance(settings, NoController):
+        return CycleSettings(default_recipe=config.default_recipe)
+    return CycleSettings(
+        default_recipe=config.default_recipe,
+        valid_for_s=settings.valid_for_s,
+        job_timeout_s=settings.job_timeout_s,
+        mailbox=MailboxFormat(settings.word_order, settings.payload_capacity),
+        transfer=TransferSettings(
+            handshake=settings.handshake == "full",
+            readback=settings.readback,
+            ready_timeout_s=settings.ready_timeout_s,
+            ack_timeout_s=settings.ack_timeout_s,
+            max_repeats=settings.max_repeats,
+            poll_period_s=settings.poll_period_s,
+        ),
+    )
+
+
+def _make_link(config: Config) -> Link | None:
+    controller = make_controller(config)
+    if controller is None or isinstance(config.controller, NoController):
+        return None
+    settings = config.controller
+    return Link(
+        controller,
+        LinkSettings(settings.handshake == "full", settings.poll_period_s, settings.heartbeat_timeout_s),
+    )
+
+
+def _publisher(link: Link | None) -> Callable[[State, str | None], None]:
+    def publish(state: State, _reason: str | None) -> None:
+        if link is not None:
+            link.publish(service_state=int(state))
+
+    return publish
+
+
+def _work_area(config: Config) -> NDArray[np.float64] | None:
+    return np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
+
+
+def _add_triggers(config: Config, parts: Parts) -> None:
+    ports = sum(isinstance(trigger, SerialTriggerSettings) for trigger in config.triggers)
+    if ports:
+        parts.serial_pool = ThreadPoolExecutor(ports, "serial")
+    for trigger in config.triggers:
+        if isinstance(trigger, IntervalTrigger):
+            parts.triggers.append(_interval(parts.executor, trigger.period_s))
+        elif isinstance(trigger, SerialTriggerSettings):
+            parts.triggers.append(_serial(parts, trigger).run)
+
+
+def _interval(executor: Executor, period_s: float) -> Callable[[], Awaitable[None]]:
+    async def run() -> None:
+        await interval_trigger(executor, period_s)
+
+    return run
+
+
+def _serial(parts: Parts, trigger: SerialTriggerSettings) -> SerialTrigger:
+    assert parts.serial_pool is not None
+    return SerialTrigger(
+        SerialLineTrigger(trigger.port, trigger.baudrate),
+        trigger.port,
+        parts.executor,
+        parts.health,
+        lambda: status_line(parts.health, parts.executor.settled_job, parts.executor.missed),
+        parts.serial_pool,
+    )

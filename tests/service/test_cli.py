@@ -1,0 +1,92 @@
+"""The command line: reads like a manual page, loads nothing heavy for it, and says what is wrong in one line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.system.processes import combtrace
+
+COMMANDS = ("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema")
+
+
+def test_help_reads_like_a_manual_page() -> None:
+    done = combtrace("--help")
+    assert done.returncode == 0
+    for heading in ("NAME", "DESCRIPTION", "COMMANDS", "FILES", "EXIT STATUS", "EXAMPLES"):
+        assert f"\n{heading}" in f"\n{done.stdout}"
+    for command in COMMANDS:
+        assert f"\n    {command}" in done.stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_command_has_its_own_help(command: str) -> None:
+    done = combtrace(command, "--help")
+    assert done.returncode == 0
+    assert len(done.stdout) > 100
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["trace", "--help"], ["run", "--help"], ["--version"]])
+def test_help_loads_neither_numpy_nor_cv2_nor_pydantic_nor_pymodbus(arguments: list[str]) -> None:
+    code = (
+        "import sys\nfrom service.cli.main import main\n"
+        "try:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'cv2', 'pydantic', 'pymodbus', 'yaml', 'serial'} & set(sys.modules)\n"
+        "sys.exit(f'loaded: {heavy}' if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_without_a_command_help_is_shown_and_the_status_is_2() -> None:
+    done = combtrace()
+    assert done.returncode == 2
+    assert "COMMANDS" in done.stdout
+
+
+def test_an_unknown_command_is_a_usage_error() -> None:
+    done = combtrace("tarce")
+    assert done.returncode == 2
+    assert "tarce" in done.stderr
+
+
+def test_an_error_is_one_line_without_a_traceback(tmp_path: Path) -> None:
+    done = combtrace("run", "--config", tmp_path / "nowhere.yaml")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "nowhere.yaml: cannot be read" in done.stderr
+
+
+def test_debug_shows_the_traceback(tmp_path: Path) -> None:
+    done = combtrace("run", "--config", tmp_path / "nowhere.yaml", "--debug")
+    assert "Traceback" in done.stderr
+
+
+@pytest.mark.parametrize("address", ["5020", "127.0.0.1:", "127.0.0.1:99999", ":5020", "127.0.0.1:x"])
+def test_a_bad_address_is_a_usage_error(address: str) -> None:
+    done = combtrace("simulate-controller", "--tcp", address)
+    assert done.returncode == 2
+    assert "expected HOST:PORT" in done.stderr
+
+
+def test_an_address_in_use_is_an_error_that_names_it() -> None:
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = combtrace("simulate-controller", "--tcp", f"127.0.0.1:{port}")
+    assert done.returncode == 2
+    assert str(port) in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_missing_serial_port_is_an_error_that_names_it() -> None:
+    done = combtrace("trigger", "--port", "/dev/nowhere")
+    assert done.returncode == 2
+    assert "/dev/nowhere" in done.stderr
+    assert done.stderr.count("\n") == 1

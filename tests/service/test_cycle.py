@@ -1,0 +1,396 @@
+"""One job from trigger to end: each thing that can go wrong on the way has its reason, and every job ends."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contour.geometry import Contour
+from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable
+from drivers.camera.simulated import SimulatedCamera
+from drivers.controller.mailbox import Answer, Page
+from service.config import Recipe
+from service.cycle import Cycle, CycleSettings, Observation
+from service.health import Health
+from service.journal import Job, Journal, TriggerStamp
+from service.link import Link, LinkSettings
+from service.measure import Measurement
+from service.reasons import Outcome, Reason
+from service.state import State, StateMachine
+from service.transfer import TransferCounter, TransferSettings
+from tests.protocol_decoder import Contour as Decoded
+from tests.protocol_decoder import decode_contour
+from tests.service.scripted_controller import ScriptedController
+
+RECTANGLE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0], [0.0, 50.0]])
+QUICK = TransferSettings(ready_timeout_s=0.3, ack_timeout_s=0.2, max_repeats=2, poll_period_s=0.01)
+SETTINGS = CycleSettings(transfer=QUICK, camera_timeout_s=0.3)
+
+
+def decoded(page: Page) -> Decoded:
+    """A page as the protocol's text reads it."""
+    return decode_contour([((1, *page.header), page.payload)])
+
+
+def measured(**changes: object) -> Measurement:
+    contour = Contour(RECTANGLE)
+    good = Measurement("sliding-matrix", "bright", 20.0, contour, contour, 5000.0, 5000.0, thickness_mm=20.0)
+    return replace(good, **changes)  # type: ignore[arg-type]
+
+
+class Plan:
+    """Stands in for the measurer: the tracing has its own tests."""
+
+    def __init__(self) -> None:
+        self.result: Measurement | Exception = measured()
+        self.calls: list[tuple[int, float]] = []
+
+    def measure(self, picture: object, recipe: Recipe, thickness_mm: float) -> Measurement:
+        self.calls.append((recipe.number, thickness_mm))
+        if isinstance(self.result, Exception):
+            raise self.result
+        return self.result
+
+
+class Rig:
+    """A cycle with a real journal, a camera of the simulated kind and a scripted controller."""
+
+    def __init__(self, folder: Path, settings: CycleSettings, *, controller: ScriptedController | None) -> None:
+        self.journal = Journal(folder / "journal.sqlite")
+        self.controller = controller
+        self.camera = SimulatedCamera(lambda _n: np.zeros((60, 80), np.uint8))
+        self.plan = Plan()
+        self.machine = StateMachine()
+        self.health = Health(self.machine)
+        self.link = None
+        if controller is not None:
+            handshake = settings.transfer.handshake
+            self.link = Link(controller, LinkSettings(handshake, poll_period_s=0.01, heartbeat_timeout_s=0.5))
+        self.pool = ThreadPoolExecutor(1)
+        self.seen: list[Observation] = []
+        recipes = {1: Recipe(number=1, name="one"), 2: Recipe(number=2, name="two", thickness_mm=35)}
+        self.cycle = Cycle(
+            self.camera,
+            self.plan,  # type: ignore[arg-type]
+            recipes,
+            self.journal,
+            self.health,
+            self.link,
+            TransferCounter(50),
+            settings,
+            self.pool,
+            observe=self.seen.append,
+        )
+
+    async def job(self, trigger: TriggerStamp | None = None) -> Job:
+        taken = self.journal.take(trigger or TriggerStamp("serial"))
+        return await asyncio.wait_for(self.cycle.run(taken), 15)
+
+
+@asynccontextmanager
+async def rig(
+    folder: Path, settings: CycleSettings = SETTINGS, *, controller: ScriptedController | str | None = "default"
+) -> AsyncIterator[Rig]:
+    built = Rig(folder, settings, controller=ScriptedController() if controller == "default" else controller)  # type: ignore[arg-type]
+    built.health.start()
+    task = asyncio.ensure_future(built.link.run()) if built.link else None
+    try:
+        if built.link is not None:
+            await asyncio.wait_for(built.link.wait_connected(), 5)
+        yield built
+    finally:
+        if task is not None:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
+        built.pool.shutdown()
+        built.journal.close()
+
+
+async def test_a_good_job_is_accepted_and_its_page_says_what_the_protocol_says(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        job = await built.job(TriggerStamp("controller", 2, 25_000, session=9, counter=5))
+        assert (job.outcome, job.reason) == (Outcome.ACCEPTED, None)
+        (page,) = built.controller.accepted
+        contour = decoded(page)
+        assert contour.header.job_id == job.job_id
+        assert contour.header.recipe == 2
+        assert (contour.header.session, contour.header.trigger) == (9, 5)
+        assert contour.header.valid_for == 30_000
+        assert contour.header.area == 5000
+        assert contour.header.uncertainty == 0xFFFFFFFF
+        assert [list(point) for point in contour.rings[0]] == (RECTANGLE * 1000).astype(int).tolist()
+        assert built.plan.calls == [(2, 25.0)], "the controller's thickness goes before the recipe's"
+        assert job.report["vertices"] == 4
+        assert job.report["transfer_ms"] > 0
+
+
+async def test_captured_at_was_read_before_the_exposure(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        await built.job()
+        (page,) = built.controller.accepted
+        captured = decoded(page).header.captured_at
+        exposed_at = built.seen[0].frame.exposed_at_s
+        on_the_controllers_clock = (exposed_at - built.controller.started_at) * 1000 + 1000
+        assert 0 < captured <= on_the_controllers_clock
+
+
+async def test_a_trigger_that_is_not_the_controllers_carries_trigger_0(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        await built.job(TriggerStamp("interval"))
+        (page,) = built.controller.accepted
+        assert decoded(page).header.trigger == 0
+
+
+async def test_without_a_clock_captured_at_and_valid_for_are_0(tmp_path: Path) -> None:
+    controller = ScriptedController()
+    controller.clock_runs = False
+    async with rig(tmp_path, controller=controller) as built:
+        await built.job()
+        (page,) = controller.accepted
+        header = decoded(page).header
+        assert (header.captured_at, header.valid_for) == (0, 0)
+
+
+async def test_the_recipes_thickness_applies_where_the_trigger_names_none(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        await built.job(TriggerStamp("serial", recipe=2))
+        assert built.plan.calls == [(2, 35.0)]
+
+
+async def test_a_trigger_without_a_recipe_gets_the_default(tmp_path: Path) -> None:
+    async with rig(tmp_path, replace(SETTINGS, default_recipe=2)) as built:
+        await built.job()
+        assert built.plan.calls == [(2, 35.0)]
+
+
+async def test_an_unknown_recipe_is_refused_with_122_and_no_frame_is_grabbed(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        job = await built.job(TriggerStamp("serial", recipe=9))
+        assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.UNKNOWN_RECIPE)
+        assert job.detail == "recipe 9 is not configured; there are 1, 2"
+        assert built.seen == []
+
+
+@pytest.mark.parametrize(
+    ("error", "state"),
+    [
+        (CameraUnavailable("gone"), State.ERROR),
+        (CameraTimeout("silent for 5 s"), State.ERROR),
+        (FrameUnusable("half a picture"), State.READY),
+    ],
+)
+async def test_a_camera_that_fails_ends_the_job_with_100(tmp_path: Path, error: Exception, state: State) -> None:
+    def fail(_number: int) -> np.ndarray:
+        raise error
+
+    async with rig(tmp_path) as built:
+        built.camera._make_picture = fail
+        job = await built.job()
+        assert (job.outcome, job.reason, job.detail) == (Outcome.FAILED, Reason.NO_FRAME, str(error))
+        assert built.machine.state is state
+        assert built.controller.count("clear") == 0
+
+
+async def test_a_frame_of_before_the_trigger_is_refused_with_101(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        grab = built.camera.grab
+
+        def stale(exposed_after_s: float, timeout_s: float) -> Frame:
+            frame = grab(exposed_after_s, timeout_s)
+            return replace(frame, exposed_at_s=exposed_after_s - 0.02)
+
+        built.camera.grab = stale  # type: ignore[method-assign]
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.STALE_FRAME)
+        assert "20 ms before the trigger" in (job.detail or "")
+
+
+async def test_findings_refuse_the_job_with_the_lowest_code_and_all_texts(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        built.plan.result = measured(
+            findings=((Reason.AREA_OUT_OF_LIMITS, "area 3"), (Reason.TOO_MANY_POINTS, "points 9"))
+        )
+        job = await built.job()
+        assert (job.outcome, job.reason, job.detail) == (
+            Outcome.REFUSED,
+            Reason.AREA_OUT_OF_LIMITS,
+            "area 3; points 9",
+        )
+        assert built.controller.count("clear") == 0
+
+
+async def test_a_contour_of_more_than_one_page_is_refused_with_130(tmp_path: Path) -> None:
+    angle = np.linspace(0, 2 * np.pi, 600, endpoint=False)
+    ring = 100 * np.column_stack([np.cos(angle), np.sin(angle)])
+    async with rig(tmp_path) as built:
+        built.plan.result = measured(millimetres=Contour(ring), pixels=Contour(ring))
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.TOO_MANY_POINTS)
+        assert "600 vertices need 2 pages" in (job.detail or "")
+
+
+async def test_a_contour_without_millimetres_is_never_sent(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        built.plan.result = measured(millimetres=None, area_mm2=None)
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.CALIBRATION_MISSING)
+
+
+async def test_a_defect_ends_the_job_with_190_and_not_the_service(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        built.plan.result = ZeroDivisionError("a defect")
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.INTERNAL_ERROR)
+        assert job.detail == "ZeroDivisionError: a defect"
+        built.plan.result = measured()
+        assert (await built.job()).outcome is Outcome.ACCEPTED
+
+
+async def test_a_defect_after_sending_withdraws_the_job_first(tmp_path: Path) -> None:
+    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
+        read_page = built.controller.read_page
+
+        async def broken(payload_length: int) -> object:
+            built.controller.read_page = read_page  # type: ignore[method-assign]
+            raise ZeroDivisionError("a defect")
+
+        built.controller.read_page = broken  # type: ignore[method-assign,assignment]
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.INTERNAL_ERROR)
+        assert built.controller.link.last_result == Answer.WITHDRAWN
+
+
+async def test_a_trigger_of_another_session_ends_with_153(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        job = await built.job(TriggerStamp("controller", session=8, counter=3))
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.CONTROLLER_RESTARTED)
+        assert built.seen == []
+
+
+async def test_a_controller_that_has_gone_before_the_exposure_ends_the_job_with_152(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        built.controller.reachable = False
+        await asyncio.sleep(0.05)
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.CONTROLLER_LOST)
+
+
+async def test_without_a_controller_a_job_is_traced_and_ends_as_written(tmp_path: Path) -> None:
+    async with rig(tmp_path, controller=None) as built:
+        job = await built.job()
+        assert job.outcome is Outcome.WRITTEN
+        assert job.report["area_mm2"] == 5000.0
+
+
+async def test_without_handshake_the_page_carries_neither_session_nor_clock_nor_trigger(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, transfer=replace(QUICK, handshake=False))
+    async with rig(tmp_path, settings) as built:
+        job = await built.job()
+        assert job.outcome is Outcome.WRITTEN
+        header = decoded(built.controller.page).header
+        assert (header.session, header.captured_at, header.trigger) == (0, 0, 0)
+
+
+# --- after a restart --------------------------------------------------------------------------------------------
+
+
+async def resumed(built: Rig, prepare: Callable[[int], None]) -> Job:
+    """A job that an earlier process left in flight, brought to its end."""
+    taken = built.journal.take(TriggerStamp("controller", session=9, counter=5))
+    prepare(taken.job_id)
+    (job,) = built.journal.unsettled()
+    return await asyncio.wait_for(built.cycle.resume(job), 15)
+
+
+def sent_page(job_id: int):
+    from tests.service.test_transfer import page
+
+    return page(job_id)
+
+
+async def test_a_job_of_which_nothing_was_sent_ends_with_154(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        job = await resumed(built, lambda _job: None)
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
+        assert built.controller.count("write_page") == 0
+
+
+async def test_a_sent_job_is_sent_again_bit_identical(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        job = await resumed(built, lambda job_id: built.journal.store_pages(job_id, 9, (sent_page(job_id),)))
+        assert job.outcome is Outcome.ACCEPTED
+        assert built.controller.accepted == [sent_page(job.job_id)]
+
+
+async def test_a_job_that_was_accepted_before_the_crash_is_accepted_without_being_sent(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+
+        def prepare(job_id: int) -> None:
+            built.journal.store_pages(job_id, 9, (sent_page(job_id),))
+            built.controller.link = replace(built.controller.link, last_job=job_id, last_result=1)
+
+        job = await resumed(built, prepare)
+        assert job.outcome is Outcome.ACCEPTED
+        assert built.controller.count("write_page") == 0
+
+
+async def test_a_job_of_an_earlier_session_ends_with_153_and_is_not_sent(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        job = await resumed(built, lambda job_id: built.journal.store_pages(job_id, 8, (sent_page(job_id),)))
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.CONTROLLER_RESTARTED)
+        assert built.controller.count("write_page") == 0
+
+
+async def test_a_withdrawal_that_was_cut_short_is_finished_with_its_first_reason(tmp_path: Path) -> None:
+    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
+
+        def prepare(job_id: int) -> None:
+            built.journal.store_pages(job_id, 9, (sent_page(job_id),))
+            built.journal.store_withdrawal(job_id, Reason.EXPIRED)
+
+        job = await resumed(built, prepare)
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.EXPIRED)
+        assert built.controller.accepted == []
+
+
+async def test_without_handshake_a_sent_job_found_in_flight_ends_with_154(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, transfer=replace(QUICK, handshake=False))
+    async with rig(tmp_path, settings) as built:
+        job = await resumed(built, lambda job_id: built.journal.store_pages(job_id, 0, (sent_page(job_id),)))
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
+
+
+async def test_a_stop_before_sending_ends_the_job_with_161(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        built.camera._make_picture = lambda _n: time.sleep(0.3) or np.zeros((6, 8), np.uint8)
+        taken = built.journal.take(TriggerStamp("serial"))
+        task = asyncio.ensure_future(built.cycle.run(taken))
+        await asyncio.sleep(0.1)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        job = built.journal.find(taken.job_id)
+        assert job is not None
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.ABORTED)
+
+
+async def test_a_stop_after_sending_leaves_the_job_in_flight(tmp_path: Path) -> None:
+    async with rig(tmp_path, controller=ScriptedController([None])) as built:
+        taken = built.journal.take(TriggerStamp("serial"))
+        task = asyncio.ensure_future(built.cycle.run(taken))
+        while built.controller.count("commit") == 0:
+            await asyncio.sleep(0.01)
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        (job,) = built.journal.unsettled()
+        assert job.sent

@@ -1,0 +1,280 @@
+"""Triggers: one job at a time, acknowledged only once durable, refused with a reason, never repeated or invented."""
+
+from __future__ import annotations
+
+import asyncio
+import sqlite3
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.controller.mailbox import LinkBlock
+from service.executor import Executor, TriggerRefused, missed_between
+from service.health import Fault, Health
+from service.journal import Job, Journal, JournalError, TriggerStamp
+from service.link import Link, LinkSettings
+from service.reasons import Outcome, Reason
+from service.state import State, StateMachine
+
+
+class HeldRunner:
+    """Carries a job out when it is let go."""
+
+    def __init__(self, journal: Journal) -> None:
+        self.journal = journal
+        self.begun: list[int] = []
+        self.resumed: list[int] = []
+        self.go = asyncio.Event()
+        self.go.set()
+
+    async def run(self, job: Job) -> Job:
+        self.begun.append(job.job_id)
+        await self.go.wait()
+        return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"vertices": 4})
+
+    async def resume(self, job: Job) -> Job:
+        self.resumed.append(job.job_id)
+        await self.go.wait()
+        return self.journal.settle(job.job_id, Outcome.FAILED, Reason.SERVICE_RESTARTED, "sent before")
+
+
+class DeafController:
+    """Stands in where a test sets the link's view itself."""
+
+    connected = True
+
+
+class Bench:
+    """An executor with a real journal and a link whose view the test sets."""
+
+    def __init__(self, folder: Path) -> None:
+        self.journal = Journal(folder / "journal.sqlite")
+        self.health = Health(StateMachine())
+        self.runner = HeldRunner(self.journal)
+        self.link = Link(DeafController(), LinkSettings(), now=lambda: 0.0)  # type: ignore[arg-type]
+        self.settled: list[Job] = []
+        self.executor = Executor(
+            self.journal, self.runner, self.health, self.link, controller_triggers=True, on_settled=self._note
+        )
+
+    async def _note(self, job: Job) -> None:
+        self.settled.append(job)
+
+    def controller_says(self, **fields: int) -> None:
+        values = {"controller_state": 1, "session": 9, "test_echo": 0x01020305, **fields}
+        self.link.view = LinkBlock(**values)
+        self.link._beat_at = 0.0
+        self.link._up.set()
+        self.executor.wake()
+
+
+@asynccontextmanager
+async def running(folder: Path) -> AsyncIterator[Bench]:
+    bench = Bench(folder)
+    task = asyncio.ensure_future(bench.executor.run())
+    bench.health.start()
+    bench.controller_says()
+    await asyncio.sleep(0)
+    try:
+        yield bench
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+        bench.journal.close()
+
+
+async def until(condition, bound_s: float = 5.0) -> None:
+    loop = asyncio.get_running_loop()
+    give_up_at = loop.time() + bound_s
+    while not condition():
+        assert loop.time() < give_up_at, "it did not come"
+        await asyncio.sleep(0.005)
+
+
+async def test_a_trigger_becomes_a_durable_job_before_the_ticket_is_handed_out(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        ticket = await bench.executor.submit(TriggerStamp("serial", recipe=2))
+        reader = sqlite3.connect(tmp_path / "journal.sqlite")
+        assert reader.execute("SELECT recipe, outcome FROM jobs WHERE job_id = ?", (ticket.job.job_id,)).fetchall() == [
+            (2, None)
+        ]
+        reader.close()
+        bench.runner.go.set()
+        assert (await ticket.settled).outcome is Outcome.ACCEPTED
+
+
+async def test_a_trigger_during_a_job_is_refused_as_busy_and_counted(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        ticket = await bench.executor.submit(TriggerStamp("serial"))
+        for _ in range(3):
+            with pytest.raises(TriggerRefused) as refusal:
+                await bench.executor.submit(TriggerStamp("interval"))
+            assert refusal.value.reason is Reason.BUSY
+        assert bench.link.published.missed_triggers == 3
+        bench.runner.go.set()
+        await ticket.settled
+        assert bench.runner.begun == [ticket.job.job_id]
+
+
+async def test_two_triggers_at_the_same_instant_give_one_job(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        results = await asyncio.gather(
+            bench.executor.submit(TriggerStamp("serial")),
+            bench.executor.submit(TriggerStamp("interval")),
+            return_exceptions=True,
+        )
+        refused = [result for result in results if isinstance(result, TriggerRefused)]
+        assert [refusal.reason for refusal in refused] == [Reason.BUSY]
+        await until(lambda: len(bench.settled) == 1)
+
+
+async def test_a_trigger_in_error_is_refused_as_not_ready_with_the_fault(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.health.report("camera", Fault(Reason.NO_FRAME, "camera silent"))
+        with pytest.raises(TriggerRefused, match="camera silent") as refusal:
+            await bench.executor.submit(TriggerStamp("serial"))
+        assert refusal.value.reason is Reason.NOT_READY
+
+
+async def test_a_trigger_of_ours_is_refused_while_the_controller_cuts(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(controller_state=2)
+        with pytest.raises(TriggerRefused, match="busy") as refusal:
+            await bench.executor.submit(TriggerStamp("interval"))
+        assert refusal.value.reason is Reason.NOT_READY
+
+
+async def test_a_trigger_of_the_controller_is_acknowledged_with_its_pair_and_job(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=1, recipe=3, block_thickness=25_000)
+        await until(lambda: bench.settled)
+        block = bench.link.published
+        assert (block.trigger_ack, block.session_ack, block.job_id, block.settled_job) == (1, 9, 1, 1)
+        assert bench.settled[0].trigger == TriggerStamp("controller", 3, 25_000, 9, 1)
+        assert block.missed_triggers == 0
+
+
+async def test_one_trigger_of_the_controller_gives_one_job_also_after_a_restart(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=4)
+        await until(lambda: bench.settled)
+    async with running(tmp_path) as bench:
+        assert bench.link.published.trigger_ack == 4
+        bench.controller_says(trigger_counter=4)
+        await asyncio.sleep(0.05)
+        assert bench.settled == []
+        bench.controller_says(trigger_counter=5)
+        await until(lambda: bench.settled)
+
+
+async def test_the_same_counter_in_another_session_is_another_trigger(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=4)
+        await until(lambda: len(bench.settled) == 1)
+        bench.controller_says(trigger_counter=4, session=10)
+        await until(lambda: len(bench.settled) == 2)
+
+
+async def test_triggers_skipped_over_count_as_missed(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=1)
+        await until(lambda: len(bench.settled) == 1)
+        bench.controller_says(trigger_counter=4)
+        await until(lambda: len(bench.settled) == 2)
+        assert bench.link.published.missed_triggers == 2
+
+
+async def test_a_trigger_of_the_controller_waits_for_the_job_in_flight(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        await bench.executor.submit(TriggerStamp("serial"))
+        bench.controller_says(trigger_counter=1)
+        await asyncio.sleep(0.05)
+        assert bench.link.published.trigger_ack == 0
+        bench.runner.go.set()
+        await until(lambda: len(bench.settled) == 2)
+        assert bench.settled[1].trigger.kind == "controller"
+
+
+async def test_a_trigger_of_the_controller_is_not_taken_in_error(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.health.report("camera", Fault(Reason.NO_FRAME, "camera silent"))
+        bench.controller_says(trigger_counter=1)
+        await asyncio.sleep(0.05)
+        assert bench.journal.last_taken() is None
+        bench.health.report("camera", None)
+        bench.executor.wake()
+        await until(lambda: bench.settled)
+
+
+async def test_a_job_in_flight_at_the_start_is_settled_before_any_trigger_is_taken(tmp_path: Path) -> None:
+    before = Journal(tmp_path / "journal.sqlite")
+    old = before.take(TriggerStamp("controller", session=9, counter=6))
+    before.close()
+    bench = Bench(tmp_path)
+    bench.runner.go.clear()
+    bench.health.start()
+    bench.controller_says(trigger_counter=7)
+    task = asyncio.ensure_future(bench.executor.run())
+    try:
+        await until(lambda: bench.runner.resumed == [old.job_id])
+        assert bench.health.state is State.ERROR
+        with pytest.raises(TriggerRefused):
+            await bench.executor.submit(TriggerStamp("serial"))
+        assert bench.link.published.trigger_ack == 6
+        bench.runner.go.set()
+        await until(lambda: len(bench.settled) == 2)
+        assert [job.job_id for job in bench.settled] == [old.job_id, old.job_id + 1]
+        assert bench.link.published.settled_job == old.job_id + 1
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+        bench.journal.close()
+
+
+async def test_a_job_id_is_above_the_controllers_last_job(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(last_job=70_000, last_result=1)
+        ticket = await bench.executor.submit(TriggerStamp("serial"))
+        assert ticket.job.job_id == 70_001
+        await ticket.settled
+
+
+async def test_a_journal_that_cannot_be_written_acknowledges_nothing(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.journal._db.execute("PRAGMA query_only = ON")
+        with pytest.raises(TriggerRefused):
+            await bench.executor.submit(TriggerStamp("serial"))
+        assert bench.health.state is State.ERROR
+        bench.controller_says(trigger_counter=1)
+        await asyncio.sleep(0.05)
+        assert bench.link.published.trigger_ack == 0
+        with pytest.raises(JournalError):
+            bench.journal.probe()
+        bench.journal._db.execute("PRAGMA query_only = OFF")
+        assert bench.journal.last_taken() is None
+        bench.journal.probe()
+        bench.health.report("journal", None)
+        bench.executor.wake()
+        await until(lambda: bench.settled)
+
+
+@given(st.integers(1, 65535), st.integers(1, 65535))
+def test_missed_counts_the_values_between_on_a_ring_without_zero(last: int, new: int) -> None:
+    expected, value = 0, last
+    while (value := value % 65535 + 1) != new:
+        expected += 1
+    assert missed_between((3, last), 3, new) == expected
+
+
+def test_missed_in_a_new_session_counts_from_its_beginning() -> None:
+    assert missed_between((3, 17), 4, 1) == 0
+    assert missed_between((3, 17), 4, 3) == 2

@@ -1,0 +1,136 @@
+"""The journal keeps what it promised: durable jobs, ids that rise, one settlement each."""
+
+from __future__ import annotations
+
+import sqlite3
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from drivers.controller.mailbox import Page
+from service.journal import Journal, JournalConflict, JournalError, TriggerStamp
+from service.reasons import Outcome, Reason
+
+PAGE = Page(tuple(range(31)), (1, 2, 3, 4, 0xFFFF, 0))
+
+
+@pytest.fixture
+def journal(tmp_path: Path):
+    opened = Journal(tmp_path / "var" / "journal.sqlite")
+    yield opened
+    opened.close()
+
+
+def test_job_ids_rise_above_the_journal_and_above_what_the_controller_knows(journal: Journal) -> None:
+    assert journal.take(TriggerStamp("interval")).job_id == 1
+    assert journal.take(TriggerStamp("interval"), above=400).job_id == 401
+    assert journal.take(TriggerStamp("interval"), above=7).job_id == 402
+
+
+def test_a_taken_job_is_unsettled_until_it_is_settled(journal: Journal) -> None:
+    job = journal.take(TriggerStamp("serial", recipe=3))
+    assert [found.job_id for found in journal.unsettled()] == [job.job_id]
+    settled = journal.settle(job.job_id, Outcome.REFUSED, Reason.NO_BLOCK_FOUND, "empty", {"total_ms": 1.5})
+    assert (settled.outcome, settled.reason, settled.detail) == (Outcome.REFUSED, Reason.NO_BLOCK_FOUND, "empty")
+    assert settled.report == {"total_ms": 1.5}
+    assert journal.unsettled() == ()
+    assert journal.last_settled() == settled
+
+
+def test_a_job_settles_once(journal: Journal) -> None:
+    job = journal.take(TriggerStamp("serial"))
+    journal.settle(job.job_id, Outcome.ACCEPTED, None, None)
+    with pytest.raises(JournalConflict, match="has ended already"):
+        journal.settle(job.job_id, Outcome.FAILED, Reason.EXPIRED, "late")
+    found = journal.find(job.job_id)
+    assert found is not None
+    assert found.outcome is Outcome.ACCEPTED
+
+
+def test_pages_come_back_register_for_register(journal: Journal) -> None:
+    job = journal.take(TriggerStamp("controller", 2, 20_000, session=9, counter=5))
+    journal.store_pages(job.job_id, 9, (PAGE, PAGE))
+    (found,) = journal.unsettled()
+    assert found.pages == (PAGE, PAGE)
+    assert found.session == 9
+    assert found.sent
+    assert found.trigger == TriggerStamp("controller", 2, 20_000, 9, 5)
+
+
+def test_the_first_reason_of_a_withdrawal_stands(journal: Journal) -> None:
+    job = journal.take(TriggerStamp("serial"))
+    journal.store_withdrawal(job.job_id, Reason.EXPIRED)
+    journal.store_withdrawal(job.job_id, Reason.CONTROLLER_TIMEOUT)
+    assert journal.unsettled()[0].withdraw_reason is Reason.EXPIRED
+
+
+def test_the_controllers_last_trigger_is_that_of_the_newest_job_it_asked_for(journal: Journal) -> None:
+    assert journal.last_controller_trigger() == (0, 0)
+    journal.take(TriggerStamp("controller", session=9, counter=5))
+    journal.take(TriggerStamp("serial"))
+    assert journal.last_controller_trigger() == (9, 5)
+
+
+def test_owner_is_drawn_once_and_is_not_zero(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    first = Journal(path)
+    owner = first.owner
+    first.close()
+    again = Journal(path)
+    assert again.owner == owner
+    assert 1 <= owner <= 0xFFFF
+    again.close()
+
+
+def test_a_killed_process_leaves_its_taken_job_behind(tmp_path: Path) -> None:
+    """kill -9 right after `take` returned: the job is there. (A power cut needs a real disk.)"""
+    path = tmp_path / "journal.sqlite"
+    code = f"""
+        import os
+        from pathlib import Path
+        from service.journal import Journal, TriggerStamp
+        job = Journal(Path({str(path)!r})).take(TriggerStamp("serial", recipe=4))
+        print(job.job_id, flush=True)
+        os.kill(os.getpid(), 9)
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=False)
+    assert done.returncode == -9, done.stderr
+    journal = Journal(path)
+    (job,) = journal.unsettled()
+    journal.close()
+    assert str(job.job_id) == done.stdout.strip()
+    assert job.trigger.recipe == 4
+
+
+def test_every_commit_reaches_the_disk(journal: Journal) -> None:
+    """WAL without synchronous=FULL (2) would lose the last commits at a power cut."""
+    assert journal._one("PRAGMA journal_mode")[0] == "wal"
+    assert journal._one("PRAGMA synchronous")[0] == 2
+
+
+def test_a_file_that_is_no_journal_is_an_error_and_stays_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    path.write_bytes(b"not a database, but somebody's notes" * 40)
+    before = path.read_bytes()
+    with pytest.raises(JournalError, match=r"journal\.sqlite: cannot use the journal"):
+        Journal(path)
+    assert path.read_bytes() == before
+
+
+def test_a_journal_of_another_version_is_refused_by_its_number(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    Journal(path).close()
+    database = sqlite3.connect(path)
+    database.execute("PRAGMA user_version = 99")
+    database.close()
+    with pytest.raises(JournalError, match="schema version 99, expected 1"):
+        Journal(path)
+
+
+def test_a_path_below_a_file_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(JournalError, match="cannot use the journal"):
+        Journal(tmp_path / "file" / "journal.sqlite")

@@ -1,0 +1,234 @@
+"""The link: two reads alike, heartbeats both ways, the clock that must fit, losses found and resumed alone."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
+
+import pytest
+
+from drivers.controller.mailbox import LinkBlock
+from service.link import Link, LinkSettings, LinkUnsteady, steady
+from tests.service.scripted_controller import ScriptedController
+
+QUICK = LinkSettings(poll_period_s=0.01, heartbeat_timeout_s=0.15)
+
+
+@asynccontextmanager
+async def linked(controller: ScriptedController, settings: LinkSettings = QUICK) -> AsyncIterator[Link]:
+    link = Link(controller, settings)
+    task = asyncio.ensure_future(link.run())
+    try:
+        yield link
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+
+
+async def until(condition, bound_s: float = 5.0) -> None:
+    loop = asyncio.get_running_loop()
+    give_up_at = loop.time() + bound_s
+    while not condition():
+        assert loop.time() < give_up_at, "it did not come"
+        await asyncio.sleep(0.005)
+
+
+class Reading:
+    """A controller whose link block is read from a list, one a read."""
+
+    connected = True
+
+    def __init__(self, *blocks: LinkBlock) -> None:
+        self.blocks = list(blocks)
+
+    async def read_link(self) -> LinkBlock:
+        return self.blocks.pop(0)
+
+
+def link_over(*blocks: LinkBlock, times: list[float] | None = None) -> Link:
+    ticks = iter(times) if times else None
+    return Link(Reading(*blocks), QUICK, now=lambda: next(ticks) if ticks else 0.0)  # type: ignore[arg-type]
+
+
+async def test_a_block_counts_only_when_two_reads_in_a_row_show_it() -> None:
+    half = LinkBlock(session=9, last_result=1)
+    whole = LinkBlock(session=9, last_result=1, last_job=7)
+    link = link_over(LinkBlock(session=9), half, whole, whole)
+    assert await link.look() == whole
+    assert link.view == whole
+
+
+async def test_heartbeat_clock_and_echo_may_differ_between_the_two_reads() -> None:
+    first = LinkBlock(session=9, controller_heartbeat=1, clock=10, test_echo=5)
+    second = replace(first, controller_heartbeat=2, clock=20, test_echo=6)
+    assert await link_over(first, second).look() == second
+
+
+@pytest.mark.parametrize(
+    "field", ["controller_state", "trigger_counter", "recipe", "block_thickness", "ack_transfer", "last_job", "session"]
+)
+def test_every_other_field_must_be_alike(field: str) -> None:
+    assert steady(LinkBlock(**{field: 1})) != steady(LinkBlock(**{field: 2}))
+
+
+async def test_a_block_that_changes_at_every_read_is_never_acted_on() -> None:
+    link = link_over(*(LinkBlock(session=9, last_job=n) for n in range(40)))
+    with pytest.raises(LinkUnsteady, match="two alike"):
+        await link.look()
+    assert link.view is None
+
+
+async def test_what_an_earlier_connection_said_does_not_count_as_one_of_the_two() -> None:
+    controller = ScriptedController()
+    async with linked(controller) as link:
+        await until(lambda: link.view is not None)
+        controller.reachable = False
+        await until(lambda: link.view is None)
+        assert link._previous is None
+
+
+async def test_a_clock_reading_counts_when_it_fits_the_one_before_within_a_second() -> None:
+    blocks = [LinkBlock(session=9, clock=clock) for clock in (1000, 1500, 9000, 9500)]
+    link = link_over(*blocks, times=[0.0, 0.5, 1.0, 1.5])
+    await link.look()
+    assert link.stamp().clock_ms == 1500
+    link._previous = None
+    link.controller.blocks = [blocks[2]]
+    with pytest.raises(IndexError):
+        await link.look()
+    assert link.stamp() is None
+
+
+async def test_a_clock_may_wrap() -> None:
+    link = link_over(
+        LinkBlock(session=9, clock=0xFFFFFFFF - 99), LinkBlock(session=9, clock=400), times=[0.0, 0.5, 0.5]
+    )
+    await link.look()
+    assert link.stamp().clock_ms == 400
+
+
+async def test_a_controller_without_a_clock_gives_a_stamp_of_0() -> None:
+    link = link_over(LinkBlock(session=9), LinkBlock(session=9), times=[0.0, 60.0])
+    await link.look()
+    assert (link.stamp().session, link.stamp().clock_ms) == (9, 0)
+
+
+async def test_a_clock_of_another_session_does_not_count() -> None:
+    link = link_over(
+        LinkBlock(session=9, clock=500), LinkBlock(session=10, clock=510), LinkBlock(session=10, clock=520)
+    )
+    await link.look()
+    assert link.stamp().clock_ms == 520
+    assert link.stamp().session == 10
+
+
+async def test_no_stamp_while_the_session_is_0() -> None:
+    link = link_over(LinkBlock(clock=500), LinkBlock(clock=510))
+    await link.look()
+    assert link.stamp() is None
+
+
+async def test_our_heartbeat_changes_at_least_once_a_second_and_the_block_is_written_whole() -> None:
+    controller = ScriptedController()
+    async with linked(controller) as link:
+        link.publish(job_id=41, missed_triggers=3)
+        await until(lambda: controller.count("write_service") >= 3)
+        beats = [block.service_heartbeat for name, block in controller.requests if name == "write_service"]
+        assert len(set(beats)) == len(beats)
+        assert (controller.service.job_id, controller.service.missed_triggers) == (41, 3)
+
+
+async def test_a_change_is_written_at_once_and_flush_waits_for_it() -> None:
+    controller = ScriptedController()
+    slow = replace(QUICK, poll_period_s=5.0)
+    async with linked(controller, slow) as link:
+        await until(lambda: controller.count("write_service") == 1)
+        link.publish(job_id=42)
+        assert await link.flush(2.0)
+        assert controller.service.job_id == 42
+
+
+async def test_flush_gives_up_when_the_controller_is_away() -> None:
+    controller = ScriptedController()
+    controller.reachable = False
+    async with linked(controller) as link:
+        link.publish(job_id=42)
+        assert not await link.flush(0.05)
+
+
+async def test_a_service_block_whose_reply_was_lost_is_written_again() -> None:
+    controller = ScriptedController()
+    async with linked(controller) as link:
+        await until(lambda: link.fault() is None)
+        controller.faults["write_service"] = ["reply"]
+        link.publish(settled_job=8)
+        assert await link.flush(3.0)
+        assert controller.connects == 2
+
+
+async def test_a_heartbeat_that_stands_still_is_a_fault_though_the_server_answers() -> None:
+    controller = ScriptedController()
+    async with linked(controller) as link:
+        await until(lambda: link.fault() is None)
+        controller.beating = False
+        await until(lambda: "heartbeat" in (link.fault() or ""))
+        controller.beating = True
+        await until(lambda: link.fault() is None)
+        assert controller.connects == 1
+
+
+async def test_a_controller_that_never_beat_is_not_trusted() -> None:
+    controller = ScriptedController()
+    controller.beating = False
+    async with linked(controller) as link:
+        await until(lambda: link.view is not None)
+        assert "heartbeat" in (link.fault() or "")
+
+
+async def test_a_lost_controller_is_found_and_taken_up_again_alone(caplog: pytest.LogCaptureFixture) -> None:
+    controller = ScriptedController()
+    async with linked(controller) as link:
+        await until(lambda: link.fault() is None)
+        controller.reachable = False
+        await until(lambda: link.fault() is not None)
+        await asyncio.sleep(0.3)
+        controller.reachable = True
+        await until(lambda: link.fault() is None)
+    warnings = [record for record in caplog.records if record.levelname == "WARNING"]
+    assert len(warnings) == 1, "one line a loss, however many attempts it takes"
+
+
+async def test_swapped_words_are_named_as_such() -> None:
+    controller = ScriptedController()
+    controller.link = replace(controller.link, test_echo=0x01030304)
+    async with linked(controller) as link:
+        await until(lambda: link.view is not None and link._beat_at is not None)
+        assert "change controller.word_order" in (link.fault() or "")
+
+
+@pytest.mark.parametrize(
+    ("state", "text"), [(0, "not ready"), (2, "busy"), (3, "in fault"), (77, "unknown state 77"), (1, None)]
+)
+async def test_the_controllers_state_is_told_in_words(state: int, text: str | None) -> None:
+    controller = ScriptedController()
+    controller.link = replace(controller.link, controller_state=state)
+    async with linked(controller) as link:
+        await until(lambda: link.fault() is None)
+        told = link.controller_not_ready()
+        assert told is None if text is None else text in (told or "")
+
+
+async def test_without_handshake_the_controllers_block_is_not_read() -> None:
+    controller = ScriptedController()
+
+    async def never() -> LinkBlock:
+        raise AssertionError("read")
+
+    controller.read_link = never  # type: ignore[method-assign]
+    async with linked(controller, LinkSettings(handshake=False, poll_period_s=0.01)) as link:
+        await until(lambda: controller.count("write_service") >= 2)
+        assert link.fault() is None
+        assert link.stamp() == type(link.stamp())(0, 0)

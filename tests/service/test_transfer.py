@@ -1,0 +1,343 @@
+"""Each rule of "A transfer", alone: what is sent next, what settles the job, and that nothing else does."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+
+import numpy as np
+import pytest
+
+from drivers.controller.mailbox import Answer, ContourMessage, Page, encode_pages, withdrawal
+from service.link import Link, LinkSettings
+from service.reasons import Outcome, Reason
+from service.transfer import Settlement, Transfer, TransferCounter, TransferSettings
+from tests.service.scripted_controller import ScriptedController
+
+JOB, SESSION = 7, 9
+QUICK = TransferSettings(ready_timeout_s=0.3, ack_timeout_s=0.1, max_repeats=3, poll_period_s=0.01)
+
+
+def page(job_id: int = JOB, session: int = SESSION) -> Page:
+    ring = np.array([[0, 0], [100_000, 0], [100_000, 50_000], [0, 50_000]])
+    message = ContourMessage(job_id, (ring,), 5000, 200, 60_000, 1, False, False, 30_000, session, 5)
+    (only,) = encode_pages(message, 1984, "big")
+    return only
+
+
+class Run:
+    """One transfer and what it made durable on its way."""
+
+    def __init__(
+        self, controller: ScriptedController, link: Link, settings: TransferSettings, lifetime_s: float
+    ) -> None:
+        self.controller, self.link = controller, link
+        self.durable: list[str] = []
+        self.transfer = Transfer(
+            link,
+            settings,
+            TransferCounter(100),
+            job_id=JOB,
+            session=SESSION,
+            pages=(page(),),
+            withdrawal=withdrawal(JOB, SESSION, "big"),
+            expires_at_s=time.monotonic() + lifetime_s,
+            before_sending=self._sending,
+            before_withdrawal=self._withdrawing,
+        )
+
+    async def _sending(self) -> None:
+        assert self.controller.count("write_page") == 0, "sent before it was durable"
+        self.durable.append("sent")
+
+    async def _withdrawing(self, reason: Reason) -> None:
+        self.durable.append(f"withdraw {reason.label}")
+
+    async def end(self, bound_s: float = 10.0) -> Settlement:
+        return await asyncio.wait_for(self.transfer.run(), bound_s)
+
+
+@asynccontextmanager
+async def transferring(
+    controller: ScriptedController, settings: TransferSettings = QUICK, lifetime_s: float = 5.0
+) -> AsyncIterator[Run]:
+    link = Link(controller, LinkSettings(handshake=settings.handshake, poll_period_s=0.01, heartbeat_timeout_s=0.3))
+    task = asyncio.ensure_future(link.run())
+    try:
+        yield Run(controller, link, settings, lifetime_s)
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+
+
+async def test_a_page_is_cleared_written_read_back_and_committed_in_this_order() -> None:
+    controller = ScriptedController()
+    async with transferring(controller) as run:
+        assert await run.end() == Settlement(Outcome.ACCEPTED)
+    steps = [name for name, _ in controller.requests if name != "write_service"]
+    assert steps == ["clear", "write_page", "read_page", "commit"]
+    assert controller.accepted == [page()]
+    assert run.durable == ["sent"]
+
+
+async def test_without_readback_nothing_is_read_back() -> None:
+    controller = ScriptedController()
+    async with transferring(controller, TransferSettings(readback=False)) as run:
+        await run.end()
+    assert controller.count("read_page") == 0
+
+
+async def test_a_readback_that_differs_starts_again_without_a_commit() -> None:
+    controller = ScriptedController()
+    controller.faults["readback_differs"] = ["once"]
+    async with transferring(controller) as run:
+        assert (await run.end()).outcome is Outcome.ACCEPTED
+    steps = [name for name, _ in controller.requests if name != "write_service"]
+    assert steps == ["clear", "write_page", "read_page", "clear", "write_page", "read_page", "commit"]
+
+
+@pytest.mark.parametrize("request_name", ["clear", "write_page", "read_page", "commit"])
+@pytest.mark.parametrize("fault", ["request", "reply"])
+async def test_one_lost_request_or_reply_costs_a_reconnect_and_nothing_else(request_name: str, fault: str) -> None:
+    controller = ScriptedController()
+    controller.faults[request_name] = [fault]
+    async with transferring(controller) as run:
+        assert await run.end() == Settlement(Outcome.ACCEPTED)
+    assert controller.accepted == [page()]
+    assert controller.connects >= (1 if (request_name, fault) == ("read_page", "reply") else 2)
+
+
+async def test_after_a_lost_commit_reply_the_answer_is_looked_for_before_anything_is_sent_again() -> None:
+    controller = ScriptedController()
+    controller.faults["commit"] = ["reply"]
+    async with transferring(controller) as run:
+        await run.end()
+    assert controller.count("commit") == 1
+
+
+async def test_every_attempt_commits_a_new_value_that_is_neither_0_nor_the_one_last_answered() -> None:
+    controller = ScriptedController([Answer.BAD_CRC, None, Answer.ACCEPTED])
+    async with transferring(controller) as run:
+        assert (await run.end()).outcome is Outcome.ACCEPTED
+    values = [value for name, value in controller.requests if name == "commit"]
+    assert len(set(values)) == 3
+    assert 0 not in values
+
+
+def test_the_counter_never_gives_0_nor_what_was_last_answered() -> None:
+    counter = TransferCounter(0xFFFD)
+    assert [counter.next(0xFFFF), counter.next(0), counter.next(2), counter.next(2)] == [0xFFFE, 0xFFFF, 1, 3]
+
+
+async def test_repeats_are_bit_identical() -> None:
+    controller = ScriptedController([Answer.BAD_CRC, Answer.BAD_LAYOUT, Answer.ACCEPTED])
+    async with transferring(controller) as run:
+        await run.end()
+    pages = {value for name, value in controller.requests if name == "write_page"}
+    assert pages == {page()}
+
+
+@pytest.mark.parametrize("answer", [Answer.BAD_CRC, Answer.BAD_LAYOUT, Answer.PAGE_MISSING, None])
+async def test_after_three_attempts_in_vain_the_job_is_withdrawn_and_failed_with_150(answer: int | None) -> None:
+    controller = ScriptedController([answer, answer, answer, Answer.WITHDRAWN])
+    async with transferring(controller) as run:
+        settlement = await run.end()
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.CONTROLLER_TIMEOUT)
+    assert run.durable == ["sent", "withdraw controller_timeout"]
+    pages = [value for name, value in controller.requests if name == "write_page"]
+    assert pages == [page()] * 3 + [withdrawal(JOB, SESSION, "big")]
+
+
+async def test_a_job_that_was_accepted_before_its_withdrawal_arrived_is_accepted() -> None:
+    controller = ScriptedController([None])
+    async with transferring(controller) as run:
+
+        def accept_late() -> None:
+            if controller.count("commit") == 4:
+                controller.link = type(controller.link)(
+                    **{**vars(controller.link), "last_job": JOB, "last_result": int(Answer.ACCEPTED)}
+                )
+
+        controller.before_commit = accept_late
+        assert await run.end() == Settlement(Outcome.ACCEPTED)
+
+
+@pytest.mark.parametrize("answer", [Answer.GEOMETRY_REFUSED, Answer.EXPIRED, Answer.OPERATOR_REFUSED])
+async def test_a_refusal_of_the_controller_settles_the_job_as_refused_with_its_answer(answer: Answer) -> None:
+    async with transferring(ScriptedController([answer])) as run:
+        settlement = await run.end()
+    assert (settlement.outcome, settlement.reason) == (Outcome.REFUSED, Reason.CONTROLLER_REFUSED)
+    assert settlement.detail == f"answer {int(answer)} {answer.name.lower()}"
+
+
+async def test_an_acknowledgement_alone_settles_nothing() -> None:
+    """ack_result 1 without last_job is no acceptance: the controller may have answered another's page."""
+    controller = ScriptedController([None])
+
+    def acknowledge_only() -> None:
+        controller.link = type(controller.link)(
+            **{**vars(controller.link), "ack_transfer": controller.transfer, "ack_result": int(Answer.OPERATOR_REFUSED)}
+        )
+
+    controller.before_commit = acknowledge_only
+    async with transferring(controller) as run:
+        task = asyncio.ensure_future(run.end())
+        await asyncio.sleep(0.8)
+        assert not task.done()
+        controller.before_commit = lambda: None
+        controller.answers = [Answer.WITHDRAWN]
+        settlement = await task
+    assert settlement.reason is Reason.CONTROLLER_TIMEOUT
+
+
+async def test_not_ready_answers_are_waited_out_and_not_counted() -> None:
+    controller = ScriptedController([Answer.NOT_READY] * 6 + [Answer.ACCEPTED])
+    async with transferring(controller) as run:
+        assert (await run.end()).outcome is Outcome.ACCEPTED
+
+
+async def test_nothing_is_written_to_the_contour_block_while_the_controller_is_busy() -> None:
+    controller = ScriptedController()
+    controller.link = type(controller.link)(**{**vars(controller.link), "controller_state": 2})
+    async with transferring(controller) as run:
+        task = asyncio.ensure_future(run.end())
+        await asyncio.sleep(0.1)
+        assert controller.count("clear") == 0
+        controller.link = type(controller.link)(**{**vars(controller.link), "controller_state": 1})
+        assert (await task).outcome is Outcome.ACCEPTED
+
+
+async def test_a_controller_that_does_not_become_ready_has_the_job_withdrawn() -> None:
+    controller = ScriptedController()
+    controller.link = type(controller.link)(**{**vars(controller.link), "controller_state": 2})
+    async with transferring(controller) as run:
+        settlement = await run.end()
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.CONTROLLER_TIMEOUT)
+    assert "busy" in (settlement.detail or "")
+    assert controller.accepted == []
+
+
+async def test_a_job_that_expires_while_it_waits_is_withdrawn_with_156() -> None:
+    controller = ScriptedController()
+    controller.link = type(controller.link)(**{**vars(controller.link), "controller_state": 2})
+    async with transferring(controller, lifetime_s=0.1) as run:
+        settlement = await run.end()
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.EXPIRED)
+
+
+async def test_contours_are_sent_only_while_the_test_echo_is_right() -> None:
+    controller = ScriptedController()
+    controller.link = type(controller.link)(**{**vars(controller.link), "test_echo": 0x01030304})
+    async with transferring(controller) as run:
+        task = asyncio.ensure_future(run.end())
+        await asyncio.sleep(0.15)
+        assert "word order differs" in (run.link.fault() or "")
+        assert controller.count("clear") == 0
+        controller.link = type(controller.link)(**{**vars(controller.link), "test_echo": 0x01020305})
+        assert (await task).outcome is Outcome.ACCEPTED
+
+
+async def test_a_restart_of_the_controller_without_memory_fails_the_job_with_153_and_sends_it_never_again() -> None:
+    controller = ScriptedController([None])
+    async with transferring(controller) as run:
+        task = asyncio.ensure_future(run.end())
+        await asyncio.sleep(0.05)
+        controller.restart(10, memory=False)
+        settlement = await task
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.CONTROLLER_RESTARTED)
+    assert controller.accepted == []
+
+
+async def test_a_restart_of_the_controller_after_it_accepted_settles_the_job_by_its_memory() -> None:
+    controller = ScriptedController()
+    controller.faults["commit"] = ["reply"]
+    async with transferring(controller) as run:
+        controller.reachable = True
+
+        def restart_soon() -> None:
+            asyncio.get_running_loop().call_later(0.01, lambda: controller.restart(10, memory=True))
+
+        controller.before_commit = restart_soon
+        assert await run.end() == Settlement(Outcome.ACCEPTED)
+
+
+async def test_a_session_of_0_is_disregarded() -> None:
+    controller = ScriptedController([None, Answer.ACCEPTED])
+    kept = controller.link
+
+    def blank_for_a_while() -> None:
+        controller.link = type(kept)(test_echo=0x01020305, last_job=JOB + 5, last_result=1)
+        asyncio.get_running_loop().call_later(0.05, lambda: setattr(controller, "link", kept))
+
+    async with transferring(controller) as run:
+        controller.before_commit = blank_for_a_while
+        task = asyncio.ensure_future(run.end())
+        await asyncio.sleep(0.09)
+        controller.before_commit = lambda: None
+        assert (await task).outcome is Outcome.ACCEPTED
+
+
+async def test_a_higher_last_job_means_that_another_service_was_here() -> None:
+    controller = ScriptedController()
+    controller.link = type(controller.link)(**{**vars(controller.link), "last_job": JOB + 1, "last_result": 1})
+    async with transferring(controller) as run:
+        settlement = await run.end()
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.OTHER_SERVICE)
+
+
+async def test_a_sent_job_stays_in_flight_while_the_controller_is_away_and_is_settled_when_it_is_back() -> None:
+    controller = ScriptedController([None])
+    async with transferring(controller, lifetime_s=0.3) as run:
+        task = asyncio.ensure_future(run.end())
+        await asyncio.sleep(0.05)
+        controller.reachable = False
+        await asyncio.sleep(0.8)
+        assert not task.done()
+        controller.answers = [Answer.WITHDRAWN]
+        controller.reachable = True
+        settlement = await task
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.CONTROLLER_LOST)
+    assert controller.link.last_job == JOB
+
+
+async def test_a_job_of_which_nothing_was_sent_fails_when_the_controller_stays_away() -> None:
+    controller = ScriptedController()
+    controller.reachable = False
+    async with transferring(controller, lifetime_s=0.2) as run:
+        settlement = await run.end()
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.CONTROLLER_LOST)
+    assert run.durable == []
+
+
+async def test_exception_responses_are_tried_again_and_then_withdrawn() -> None:
+    controller = ScriptedController([Answer.WITHDRAWN])
+    controller.faults["write_page"] = ["exception"] * 3
+    async with transferring(controller) as run:
+        settlement = await run.end()
+    assert settlement.reason is Reason.CONTROLLER_TIMEOUT
+    assert "exception 4" in (settlement.detail or "")
+
+
+async def test_without_handshake_a_job_ends_as_written_never_as_accepted() -> None:
+    controller = ScriptedController()
+    async with transferring(controller, TransferSettings(handshake=False)) as run:
+        assert await run.end() == Settlement(Outcome.WRITTEN)
+    assert [name for name, _ in controller.requests if name != "write_service"] == [
+        "clear",
+        "write_page",
+        "read_page",
+        "commit",
+    ]
+
+
+async def test_without_handshake_repeats_carry_the_same_transfer_value() -> None:
+    controller = ScriptedController()
+    controller.faults["commit"] = ["request", "reply"]
+    async with transferring(controller, TransferSettings(handshake=False)) as run:
+        assert (await run.end()).outcome is Outcome.WRITTEN
+    values = [value for name, value in controller.requests if name == "commit"]
+    assert len(values) == 3
+    assert len(set(values)) == 1

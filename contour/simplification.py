@@ -24,7 +24,7 @@ _FINER = (0.0, 0.35, 0.6, 0.8)
 """Shares of the tolerance at which Douglas-Peucker offers candidates; the first that offers few enough is used. At 0
 these are all vertices that bend, and the result has at most one vertex more than the fewest possible."""
 
-_MOST_CANDIDATES = 800
+_MOST_CANDIDATES = 1200
 _MOST_WORK = 1_000_000
 """Bounds on the search, about 0.3 s: candidates, and candidates times the vertices that a shortcut passes over."""
 

@@ -12,7 +12,15 @@ from typing import Any, ParamSpec, TypeVar
 
 from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable
 from drivers.controller import ControllerError
-from drivers.controller.mailbox import ContourMessage, MailboxError, Page, encode_pages, micrometres, withdrawal
+from drivers.controller.mailbox import (
+    ContourMessage,
+    ContourTooLarge,
+    MailboxError,
+    Page,
+    encode_pages,
+    micrometres,
+    withdrawal,
+)
 from service.config import Recipe
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError
@@ -143,7 +151,12 @@ class Cycle:
             raise _Stop(measurement.reasons[0], "; ".join(measurement.texts))
         if self._link is None:
             return Settlement(Outcome.WRITTEN, None, "no controller is configured")
-        pages = self._pages(job, recipe, stamp, frame, measurement)
+        try:
+            pages = self._pages(job, recipe, stamp, frame, measurement)
+        except ContourTooLarge as error:
+            raise _Stop(Reason.TOO_MANY_POINTS, str(error)) from error
+        except MailboxError as error:  # what passed the checks in float64 degenerates in whole micrometres
+            raise _Stop(Reason.SELF_INTERSECTING, str(error)) from error
         transfer = self._transfer(self._link, job, stamp.session, pages, stamped_at + self._lifetime_s)
         before = self._now()
         settlement = await transfer.run()
@@ -234,10 +247,7 @@ class Cycle:
             trigger=job.trigger.counter or 0 if self._settings.transfer.handshake else 0,
         )
         mailbox = self._settings.mailbox
-        try:
-            pages = encode_pages(message, mailbox.payload_capacity, mailbox.word_order)
-        except MailboxError as error:
-            raise _Stop(Reason.TOO_MANY_POINTS, str(error)) from error
+        pages = encode_pages(message, mailbox.payload_capacity, mailbox.word_order)
         if len(pages) > 1:
             raise _Stop(
                 Reason.TOO_MANY_POINTS,

@@ -210,7 +210,8 @@ class Link:
         if not self._dirty:
             return True
         try:
-            await asyncio.wait_for(self._written.wait(), timeout_s)
+            async with asyncio.timeout(timeout_s):
+                await self._written.wait()
         except TimeoutError:
             return False
         return True
@@ -284,7 +285,9 @@ class Link:
 
     async def _pause(self) -> None:
         try:
-            await asyncio.wait_for(self._wake.wait(), self.settings.poll_period_s)
+            # not wait_for: before Python 3.12 it loses a cancellation that comes together with the event
+            async with asyncio.timeout(self.settings.poll_period_s):
+                await self._wake.wait()
         except TimeoutError:
             return
         self._wake.clear()

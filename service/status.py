@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from service.health import Health
 
-LONGEST = 200
-
 
 def status_line(health: Health, settled: int, missed: int) -> str:
-    """`STATE <name> JOB <n> SETTLED <n> MISSED <n> REASON <text>`, ASCII, one line; JOB 0 = none is being executed."""
+    """`STAT <state> <job> <settled job> <missed> <code> <name>`, 80 characters at most.
+
+    job 0 = none is being executed; code and name are of the reason for not being ready, `0 ok` without one.
+    """
     fault = health.first()
-    line = f"STATE {health.state.label} JOB {health.job or 0} SETTLED {settled} MISSED {missed}"
-    if fault is not None:
-        line += f" REASON {int(fault.reason)} {fault.reason.label}: {fault.text}"
-    return " ".join(line.encode("ascii", "replace").decode("ascii").split())[:LONGEST]
+    reason = "0 ok" if fault is None else f"{int(fault.reason)} {fault.reason.label}"
+    return f"STAT {health.state.label} {health.job or 0} {settled} {missed} {reason}"

@@ -270,7 +270,8 @@ class Transfer:
             await self._link.wait_connected()
             return True
         try:
-            await asyncio.wait_for(self._link.wait_connected(), max(0.0, self._expires_at_s - self._now()))
+            async with asyncio.timeout(max(0.0, self._expires_at_s - self._now())):
+                await self._link.wait_connected()
         except TimeoutError:
             return False
         return True

@@ -6,9 +6,11 @@ cut, rolling shutter, colour filter mosaics.
 
 from contour.synthetic.camera import CameraModel, camera_above, densified
 from contour.synthetic.cells import CellGeometry
+from contour.synthetic.closed_border import closed_border
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import (
     blob,
+    broken_off,
     convex,
     crescent,
     disc_ring,
@@ -35,7 +37,9 @@ __all__ = [
     "Table",
     "area_coverage",
     "blob",
+    "broken_off",
     "camera_above",
+    "closed_border",
     "convex",
     "crescent",
     "densified",

@@ -141,6 +141,7 @@ def draw_lattice(
     seed: int,
     glints: float = 0.05,
     spread: float = 0.22,
+    sheen: float = 0.0,
 ) -> Lattice:
     """The tables for all cells between the extremes of lattice coordinates x, y (mm)."""
     step_x, step_y = _steps(geometry)
@@ -158,6 +159,9 @@ def draw_lattice(
         keep[hit] = np.where(part[hit] < -0.9, GONE, part[hit])
     tone = np.clip(1.0 + spread * rng.standard_normal((cells, 3)), 0.35, 1.7)
     tone[rng.random((cells, 3)) < glints] *= 1.9
+    if geometry.kind == "honeycomb":
+        normals = np.radians([90.0, 150.0, 210.0]) + math.radians(geometry.ribbon_deg)
+        tone *= 1.0 + sheen * np.cos(2.0 * (normals - 1.0))
     shift = (rng.random((cells, 2)) - 0.5) * 2.0 * geometry.jitter
     lattice = Lattice(
         (i0, j0), counts, keep, tone.astype(np.float32), shift.astype(np.float32), rng.random(cells).astype(np.float32)

@@ -18,6 +18,7 @@ from contour.synthetic.scene import Scene
 Floats = NDArray[np.float32]
 
 _NO_MAP = np.empty(0, dtype=np.float32)
+_BAND = 64
 
 
 @dataclass(frozen=True)
@@ -34,15 +35,34 @@ def relief(scene: Scene, cover: Floats, light: Floats) -> Relief:
     longest = float(np.abs(shift).max(initial=0.0))
     if longest < 0.25:
         return Relief(cover, light)
+    total, radiance = cover.copy(), light.copy()
     steps = int(np.clip(math.ceil(longest), 2, 18))
     height, width = cover.shape
-    fine = cv2.resize(shift / np.float32(steps), (width, height), interpolation=cv2.INTER_LINEAR)
-    at = np.stack(np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)), axis=-1)
+    steps_px = cv2.resize(shift / np.float32(steps), (width, height), interpolation=cv2.INTER_LINEAR)
+    fine = np.asarray(steps_px, dtype=np.float32)
     pair = np.stack((cover, light), axis=-1)
-    total, radiance = cover.copy(), light.copy()
+    margin = math.ceil(longest) + 2
+    rows, columns = np.flatnonzero(cover.any(axis=1)), np.flatnonzero(cover.any(axis=0))
+    if len(rows) == 0:
+        return Relief(cover, light)
+    left, right = max(0, int(columns[0]) - margin), min(width, int(columns[-1]) + margin)
+    first, last = max(0, int(rows[0]) - margin), min(height, int(rows[-1]) + margin)
+    for top in range(first, last, _BAND):  # bands stay in the processor's cache
+        part = (slice(top, min(last, top + _BAND)), slice(left, right))
+        _march(scene, pair, fine[part], (left, top), steps, total[part], radiance[part])
+    return Relief(total, radiance)
+
+
+def _march(
+    scene: Scene, pair: Floats, step: Floats, origin: tuple[int, int], steps: int, total: Floats, radiance: Floats
+) -> None:
+    """Follow each pixel's ray down to the table, adding what it meets first to `total` and `radiance`, in place."""
     reach = 1.1 * scene.cells.pitch_mm
+    x = np.arange(origin[0], origin[0] + step.shape[1], dtype=np.float32)
+    y = np.arange(origin[1], origin[1] + step.shape[0], dtype=np.float32)
+    at = np.stack(np.meshgrid(x, y), axis=-1)
     for k in range(1, steps + 1):
-        at += fine
+        at += step
         here = cv2.remap(pair, at, _NO_MAP, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
         below, tone = here[..., 0], here[..., 1]
         gain = np.maximum(below - total, 0.0)
@@ -50,7 +70,6 @@ def relief(scene: Scene, cover: Floats, light: Floats) -> Relief:
         level = scene.material.side / scene.material.top * (0.25 + 0.75 * math.exp(-depth / reach))
         radiance += gain * np.float32(level) * tone / np.maximum(below, np.float32(1e-3))
         total += gain
-    return Relief(total, radiance)
 
 
 def _parallax(scene: Scene) -> Floats:

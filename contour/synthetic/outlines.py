@@ -100,6 +100,31 @@ def moved(contour: Contour, shift: Point, angle_deg: float = 0.0) -> Contour:
     return Contour(exterior, tuple(holes))
 
 
+def broken_off(contour: Contour, start: float, end: float, depth: float, seed: int, pieces: int = 4) -> Contour:
+    """The contour without the part beside its exterior between two shares of its length: torn off along a crooked line.
+
+    The line runs from one place to the other in `pieces` straight runs, bulging inwards by `depth`.
+    """
+    ring = contour.exterior
+    edges = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    reached = np.concatenate(([0.0], np.cumsum(edges)))
+    closed = np.concatenate((ring, ring[:1]))
+    if not 0.0 <= start < end <= 1.0:
+        raise ParameterError(f"start {start}, end {end}: expected 0 <= start < end <= 1")
+    at = np.array([start, end]) * reached[-1]
+    (ax, bx), (ay, by) = np.interp(at, reached, closed[:, 0]), np.interp(at, reached, closed[:, 1])
+    a, b = np.array([ax, ay]), np.array([bx, by])
+    share = np.linspace(0.0, 1.0, pieces + 1)[1:-1]
+    rng = np.random.default_rng([seed, 23])
+    inward = np.array([-(b - a)[1], (b - a)[0]]) / max(float(np.linalg.norm(b - a)), 1e-9)
+    bulge = depth * np.sin(math.pi * share) * rng.uniform(0.7, 1.3, len(share))
+    share = share + rng.uniform(-0.25, 0.25, len(share)) / pieces
+    torn = a + (b - a) * share[:, None] + inward * bulge[:, None]
+    kept = ring[(reached[:-1] < at[0]) | (reached[:-1] > at[1])]
+    after = int((reached[:-1] < at[0]).sum())
+    return Contour(np.concatenate((kept[:after], [a], torn, [b], kept[after:])), contour.holes)
+
+
 def with_holes(contour: Contour, *holes: Ring) -> Contour:
     """The contour with more holes."""
     return Contour(contour.exterior, (*contour.holes, *(_oriented(hole, -1.0) for hole in holes)))

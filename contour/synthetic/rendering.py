@@ -13,7 +13,7 @@ from contour.synthetic.depth import Relief, relief
 from contour.synthetic.scene import Scene
 from contour.synthetic.sensor import dust, expose, illumination, patches
 from contour.synthetic.surface import surface
-from contour.synthetic.table import smooth_noise, table_light
+from contour.synthetic.table import smooth_noise, table_glare, table_light
 
 Floats = NDArray[np.float32]
 
@@ -80,8 +80,10 @@ def _texture(scene: Scene, light: Floats) -> None:
         return
     rng = np.random.default_rng([scene.seed, 51])
     scale = scene.camera.mm_per_px(_middle(scene), scene.thickness_mm)
-    grain = max(1.6, 0.9 * scene.cells.wall_mm / scale)
-    light *= np.clip(1.0 + np.float32(scene.material.texture) * smooth_noise(rng, light.shape, grain), 0.1, 2.5)
+    grain = min(max(1.6, 0.9 * scene.cells.wall_mm / scale), 4.0)
+    noise = smooth_noise(rng, light.shape, grain)
+    spots = np.float32(2.0 * scene.material.sparks) * np.maximum(noise - np.float32(1.6), 0.0)
+    light *= np.clip(1.0 + np.float32(scene.material.texture) * noise + spots, 0.1, 3.0)
 
 
 def _planes(scene: Scene, block: Relief) -> list[Floats]:
@@ -89,12 +91,14 @@ def _planes(scene: Scene, block: Relief) -> list[Floats]:
     falling = illumination(scene)
     shine = patches(scene)
     walls = block.light * falling if shine is None else block.light * falling * shine
-    table = table_light(scene) * (1.0 - block.cover) * falling
+    open_share = 1.0 - block.cover
+    table = table_light(scene) * open_share * falling
+    glare = table_glare(scene) * open_share if scene.light.glare > 0.0 else np.float32(0.0)
     if not scene.sensor.colour:
-        planes = [np.asarray(walls + table, dtype=np.float32)]
+        planes = [np.asarray(walls + table + glare, dtype=np.float32)]
     else:
         planes = [
-            np.asarray(walls * np.float32(a) + table * np.float32(b), dtype=np.float32)
+            np.asarray(walls * np.float32(a) + table * np.float32(b) + glare, dtype=np.float32)
             for a, b in zip(scene.material.colour, scene.table.colour, strict=True)
         ]
     dust(scene, planes)

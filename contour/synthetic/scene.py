@@ -30,6 +30,10 @@ class Material:
     """Spread of brightness along a wall (burrs, foil)."""
     glints: float = 0.05
     """Share of walls that flash."""
+    sheen: float = 0.15
+    """How much more light walls of one direction return than those across it."""
+    sparks: float = 0.3
+    """Strength of small bright spots along the walls."""
     skin: float = 0.5
     """Skin of closed cells."""
     colour: Colour = GREY
@@ -66,6 +70,10 @@ class Light:
     shadow: float = 0.15
     """Darkening of the table beside the block."""
     direction_deg: float = 120.0
+    glare: float = 0.0
+    """Light of a lamp mirrored broadly by the table."""
+    glare_at: tuple[float, float] = (0.3, 0.2)
+    """Place of the glare, shares of the picture's width and height."""
     patches: float = 0.0
     """Strength of broad bright patches (reflections of lamps) on wall tops."""
 
@@ -88,6 +96,8 @@ class Sensor:
 
     blur_px: float = 0.7
     """Sigma of the optics' blur."""
+    bloom: float = 0.04
+    """Share of the light above full scale that spreads around it."""
     shot_noise: float = 0.006
     """Sigma at full scale, share of full scale; falls with the root of the signal."""
     read_noise: float = 0.004

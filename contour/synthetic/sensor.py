@@ -61,6 +61,8 @@ def expose(sensor: Sensor, planes: list[Floats], seed: int) -> NDArray[np.uint8]
     seen = []
     for plane in planes:
         light = np.maximum(blurred(plane, sensor.blur_px), 0.0)
+        if sensor.bloom > 0.0:
+            light = light + np.float32(sensor.bloom) * blurred(np.maximum(light - 1.0, 0.0), 6.0)
         if sensor.shot_noise > 0.0 or sensor.read_noise > 0.0:
             spread = np.sqrt(np.float32(sensor.shot_noise**2) * light + np.float32(sensor.read_noise**2))
             light = light + spread * rng.standard_normal(light.shape, dtype=np.float32)

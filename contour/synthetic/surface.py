@@ -69,7 +69,7 @@ def _fill(scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], in
     grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
     work = camera.back_project((grid + 0.5) / ss - 0.5 + np.array(origin), scene.thickness_mm)
     x, y = lattice_coordinates(cells, work[:, 0], work[:, 1], seed)
-    lattice = draw_lattice(cells, x, y, seed, scene.material.glints, scene.material.spread)
+    lattice = draw_lattice(cells, x, y, seed, scene.material.glints, scene.material.spread, scene.material.sheen)
     _close_rim(scene, outline, lattice)
     nodes = np.stack((x, y), axis=-1).reshape(rows + 2, columns + 2, 2).astype(np.float32)
     band = max(1, 96 // step)

@@ -33,6 +33,16 @@ def table_light(scene: Scene) -> Floats:
     return np.maximum(picture, 0.0, out=picture)
 
 
+def table_glare(scene: Scene) -> Floats:
+    """Light of a lamp that the table mirrors broadly; cells hide it. Shape (H, W), float32."""
+    camera, light = scene.camera, scene.light
+    x = (np.arange(camera.width) / camera.width - light.glare_at[0]).astype(np.float32)
+    y = ((np.arange(camera.height) - light.glare_at[1] * camera.height) / camera.width).astype(np.float32)
+    spot = np.float32(light.glare) * np.exp(-(x[None, :] ** 2 + 1.8 * y[:, None] ** 2) / np.float32(0.03))
+    foot = camera.project_contour(scene.outline, 0.0)
+    return np.asarray(spot * (1.0 - area_coverage(foot.rings, camera.width, camera.height)), dtype=np.float32)
+
+
 def smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], size: float) -> Floats:
     """Noise of unit spread whose grains are about `size` pixels, shape (H, W), float32."""
     small = (max(3, math.ceil(shape[0] / size) + 2), max(3, math.ceil(shape[1] / size) + 2))

@@ -121,8 +121,9 @@ async def _controller(config: Config) -> Finding:
         return Finding("controller", True, "none: contours are traced and not sent")
     link = Link(controller, LinkSettings())
     try:
-        await asyncio.wait_for(controller.connect(), CONTROLLER_BOUND_S)
-        block = await asyncio.wait_for(link.look(), CONTROLLER_BOUND_S)
+        async with asyncio.timeout(CONTROLLER_BOUND_S):
+            await controller.connect()
+            block = await link.look()
     except (ControllerError, TimeoutError) as error:
         return Finding("controller", False, str(error) or f"no answer within {CONTROLLER_BOUND_S:g} s")
     finally:
@@ -135,9 +136,8 @@ async def _controller(config: Config) -> Finding:
 
 
 def _serial(config: Config) -> Iterator[Finding]:
-    from drivers.trigger.serial import SerialLineTrigger
-
     from drivers.trigger import TriggerUnavailable
+    from drivers.trigger.serial import SerialLineTrigger
     from service.config import SerialTrigger
 
     for trigger in config.triggers:

@@ -47,7 +47,7 @@ def solid(outline, **changes):
         camera(),
         CellGeometry(kind="solid"),
         thickness_mm=10.0,
-        material=Material(top=1.0, side=0.0, spread=0.0, texture=0.0, glints=0.0),
+        material=Material(top=1.0, side=0.0, spread=0.0, texture=0.0, glints=0.0, sheen=0.0, sparks=0.0),
         table=Table(level=0.0, texture=0.0),
         light=Light(shadow=0.0),
         sensor=CLEAN,
@@ -220,7 +220,11 @@ def test_the_same_scene_gives_the_same_bytes_and_another_seed_does_not():
 
 def test_a_block_beside_the_cameras_foot_shows_its_outer_side_below_the_outline():
     outline = rectangle((330.0, 150.0), 90.0, 200.0)
-    far = solid(outline, thickness_mm=60.0, material=Material(top=1.0, side=0.5, spread=0.0, texture=0.0, glints=0.0))
+    far = solid(
+        outline,
+        thickness_mm=60.0,
+        material=Material(top=1.0, side=0.5, spread=0.0, texture=0.0, glints=0.0, sheen=0.0, sparks=0.0),
+    )
     rendered = render(far)
     cover = area_coverage(rendered.truth_px.rings, 400, 300)
     beside = rendered.picture[150, : int(rendered.truth_px.exterior[:, 0].min())]

@@ -76,7 +76,7 @@ def test_opening_and_closing_twice_does_nothing_more(line):
 
 def test_a_line_can_be_opened_again_and_begins_afresh(line):
     line.trigger.open()
-    line.send(b"TRIG\rhalf a li")
+    line.send(b"TRIG\rSTAT\rhalf a li")
     assert line.trigger.read_line(5.0) == b"TRIG"
     line.trigger.close()
     line.trigger.open()

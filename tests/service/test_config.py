@@ -125,6 +125,10 @@ def test_the_embedded_defaults_need_no_file() -> None:
         (SMALL + "triggers: [{kind: interval, period_s: soon}]\n", "triggers[0].period_s: seen 'soon'"),
         (SMALL + "triggers: [{period_s: 3}]\n", "triggers[0].kind: is missing"),
         (SMALL + "triggers: [{kind: controller}, {kind: controller}]\n", "kind controller is there more than once"),
+        (
+            SMALL.replace("modbus-tcp", "modbus-tcp, handshake: none") + "triggers: [{kind: controller}]\n",
+            "kind controller needs a controller with handshake full",
+        ),
         (SMALL + "triggers: [{kind: serial}]\n", "triggers[0].port: is missing"),
         (SMALL + "recipes: []\n", "recipes is empty"),
         (

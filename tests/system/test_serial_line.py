@@ -84,7 +84,7 @@ def test_ping_stat_and_nonsense_are_answered(cell: Cell, terminal: Terminal) -> 
     terminal.type(b"PING\r")
     assert terminal.line() == "PONG"
     terminal.type(b"STAT\r\n")
-    assert terminal.line().startswith("STATE Ready JOB 0 SETTLED 0 MISSED 0")
+    assert terminal.line() == "STAT Ready 0 0 0 0 ok"
     terminal.type(b"\x00\xff\x80 hello\r\n")
     assert terminal.line().startswith("NAK ")
     terminal.type(b"PING\n")
@@ -97,6 +97,8 @@ def test_a_trigger_while_the_controller_is_away_is_refused_at_once_with_121(cell
     terminal.type(b"TRIG\n")
     assert terminal.line() == "NAK 121 not_ready"
     assert cell.settled() == []
+    terminal.type(b"STAT\n")
+    assert terminal.line() == "STAT Error 0 0 1 152 controller_lost"
     cell.controller = cell.start_controller()
 
 
@@ -107,7 +109,7 @@ def test_triggers_in_a_burst_give_one_job_and_refusals_that_are_counted(cell: Ce
     assert replies[0] == "ACK 1"
     assert replies[-1].startswith("DONE 1")
     terminal.type(b"STAT\n")
-    assert "SETTLED 1 MISSED 3" in terminal.line()
+    assert terminal.line() == "STAT Ready 0 1 3 0 ok"
 
 
 def test_the_trigger_command_waits_for_the_end(cell: Cell, terminal: Terminal, tmp_path: Path) -> None:

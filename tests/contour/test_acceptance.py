@@ -1,0 +1,141 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contour.acceptance import Limits, Refusal, judge
+from contour.geometry import Contour
+from contour.polygon import Polygon
+from tests.contour.rings import SQUARE
+
+FRAME = (640, 480)
+LIMITS = Limits(min_area_mm2=1000, max_area_mm2=20_000, max_vertices=10)
+
+
+def polygon(ring_px: np.ndarray, holes: tuple[np.ndarray, ...] = (), mm_per_px: float | None = 1.0) -> Polygon:
+    pixels = Contour(ring_px, holes)
+    if mm_per_px is None:
+        return Polygon(pixels, None, 10_000.0, None, None)
+    scaled = Contour(ring_px * [1, -1] * mm_per_px, tuple(hole * [1, -1] * mm_per_px for hole in holes))
+    return Polygon(pixels, scaled, 10_000.0, 10_000.0 * mm_per_px**2, mm_per_px)
+
+
+GOOD = polygon(SQUARE * 10 + 100)
+
+
+def test_a_good_polygon_is_accepted() -> None:
+    assert judge(GOOD, FRAME, LIMITS) == ()
+
+
+def test_codes_and_names_are_the_protocols() -> None:
+    table = {
+        110: "no_block_found",
+        111: "touches_border",
+        112: "area_out_of_limits",
+        113: "methods_disagree",
+        114: "uncertainty_too_large",
+        115: "outside_work_area",
+        116: "several_blocks",
+        130: "too_many_points",
+        131: "self_intersecting",
+    }
+    assert {int(refusal): refusal.reason for refusal in Refusal} == table
+
+
+@pytest.mark.parametrize(
+    ("shift", "side"),
+    [((-99, 0), "left"), ((0, -99), "top"), ((640 - 1 - 201, 0), "right"), ((0, 480 - 1 - 201), "bottom")],
+)
+def test_a_contour_within_two_pixels_of_the_frame_touches_it(shift: tuple[int, int], side: str) -> None:
+    # One pixel of margin on pixel centres is 1.5 px from the frame's edge.
+    near = polygon(SQUARE * 10 + 100 + np.array(shift))
+    (finding,) = judge(near, FRAME, LIMITS)
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+    assert "1.5 px" in finding.text
+    assert side in finding.text
+    inwards = -np.sign(shift)
+    assert judge(polygon(SQUARE * 10 + 100 + np.array(shift) + inwards), FRAME, LIMITS) == ()
+
+
+def test_a_contour_beyond_the_frame_touches_it() -> None:
+    (finding,) = judge(polygon(SQUARE * 10 - 50), FRAME, LIMITS)
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+
+
+@pytest.mark.parametrize(("mm_per_px", "area"), [(0.3, "900 mm²"), (1.5, "22500 mm²")])
+def test_an_area_beyond_the_recipes_limits_names_all_three_numbers(mm_per_px: float, area: str) -> None:
+    (finding,) = judge(polygon(SQUARE * 10 + 100, mm_per_px=mm_per_px), FRAME, LIMITS)
+    assert finding.refusal == Refusal.AREA_OUT_OF_LIMITS
+    assert area in finding.text
+    assert "1000 to 20000 mm²" in finding.text
+
+
+def test_limits_in_millimetres_do_not_apply_without_a_calibration() -> None:
+    far_away = SQUARE + 1e6
+    limits = replace(LIMITS, max_area_mm2=2.0, min_area_mm2=1.0, work_area_mm=far_away)
+    assert judge(polygon(SQUARE * 10 + 100, mm_per_px=None), FRAME, limits) == ()
+
+
+def test_too_many_vertices_of_all_rings_together_are_refused_without_a_calibration_too() -> None:
+    hole = SQUARE[::-1] * 2 + 110
+    many = polygon(SQUARE * 10 + 100, (hole, hole + 40), mm_per_px=None)
+    (finding,) = judge(many, FRAME, LIMITS)
+    assert finding.refusal == Refusal.TOO_MANY_POINTS
+    assert "12 vertices" in finding.text
+    assert "allows 10" in finding.text
+
+
+def test_a_ring_that_meets_itself_is_refused() -> None:
+    crossed = SQUARE[[0, 2, 1, 3]] * 10 + 100
+    for mm_per_px in (None, 1.0):
+        (finding,) = judge(polygon(crossed, mm_per_px=mm_per_px), FRAME, LIMITS)
+        assert finding.refusal == Refusal.SELF_INTERSECTING
+        assert "exterior meets itself" in finding.text
+
+
+def test_a_hole_that_leaves_the_exterior_is_refused() -> None:
+    (finding,) = judge(polygon(SQUARE * 10 + 100, (SQUARE[::-1] + 300,)), FRAME, LIMITS)
+    assert finding.refusal == Refusal.SELF_INTERSECTING
+    assert "hole 1 lies outside" in finding.text
+
+
+WORK_AREA = np.array([[0.0, -400.0], [400.0, -400.0], [400.0, 0.0], [0.0, 0.0]])
+NOTCHED = np.array(
+    [[0.0, -400.0], [149.0, -400.0], [150.0, -150.0], [151.0, -400.0], [400.0, -400.0], [400, 0], [0, 0]]
+)
+
+
+@pytest.mark.parametrize(
+    ("work_area", "words"),
+    [
+        (WORK_AREA, None),
+        (WORK_AREA[::-1], None),
+        (WORK_AREA + [150, 0], r"lie outside"),
+        (NOTCHED, "crosses or touches"),
+        (WORK_AREA + 5000, "lie outside"),
+    ],
+)
+def test_the_whole_contour_must_lie_in_the_work_area(work_area: np.ndarray, words: str | None) -> None:
+    findings = judge(GOOD, FRAME, replace(LIMITS, work_area_mm=work_area))
+    if words is None:
+        assert findings == ()
+    else:
+        assert [finding.refusal for finding in findings] == [Refusal.OUTSIDE_WORK_AREA]
+        assert words in findings[0].text
+
+
+def test_an_uncertainty_is_judged_only_where_it_is_known_and_limited() -> None:
+    limits = replace(LIMITS, max_uncertainty_mm=0.3)
+    assert judge(GOOD, FRAME, limits, uncertainty_mm=None) == ()
+    assert judge(GOOD, FRAME, limits, uncertainty_mm=0.3) == ()
+    assert judge(GOOD, FRAME, LIMITS, uncertainty_mm=99.0) == ()
+    (finding,) = judge(GOOD, FRAME, limits, uncertainty_mm=0.31)
+    assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
+    assert "0.31 mm" in finding.text
+
+
+def test_all_findings_are_told_lowest_code_first() -> None:
+    crossed = polygon(SQUARE[[0, 2, 1, 3]] * 60, mm_per_px=3.0)
+    limits = Limits(max_area_mm2=5, max_vertices=3, work_area_mm=WORK_AREA)
+    codes = [int(finding.refusal) for finding in judge(crossed, FRAME, limits)]
+    assert codes == [111, 112, 115, 130, 131]

@@ -15,7 +15,7 @@ from contour.calibration import Calibration
 from contour.errors import CalibrationError, NoBlockFound, PictureError
 from contour.geometry import Contour, Ring
 from contour.polygon import cutting_polygon
-from contour.tracing import Trace, TraceSettings, trace
+from contour.tracing import Trace, TraceSettings, check_picture, trace
 from service.config import Recipe
 from service.reasons import Reason
 
@@ -135,6 +135,7 @@ class Measurer:
         result: Measurement,
         watch: _Stopwatch,
     ) -> Measurement:
+        check_picture(picture)
         height, width = picture.shape[:2]
         calibration = self._calibration
         if calibration is not None:

@@ -1,0 +1,124 @@
+"""A picture becomes the polygon that would be sent: stages timed, findings by code, nothing thrown at the daemon."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.sample_scenes import THICKNESS_MM, sample_scenes
+from contour.errors import ParameterError, PictureError
+from contour.geometry import area, hausdorff
+from contour.synthetic import render
+from service.calibration_file import load_calibration
+from service.config import Recipe
+from service.measure import Measurer, trace_settings
+from service.reasons import Reason
+
+SAMPLES = Path(__file__).parents[2] / "service" / "samples"
+RECIPE = Recipe(number=1, name="default")
+
+
+@pytest.fixture(scope="module")
+def rendered():
+    return render(sample_scenes()[0])
+
+
+@pytest.fixture(scope="module")
+def measurer() -> Measurer:
+    return Measurer(load_calibration(SAMPLES / "calibration.yaml"))
+
+
+def test_the_shipped_calibration_is_that_of_the_camera_that_rendered_the_samples(rendered, measurer: Measurer) -> None:
+    """The rendered outline in pixels, taken through the calibration file, is the outline in millimetres."""
+    calibration = load_calibration(SAMPLES / "calibration.yaml")
+    back = calibration.to_machine(calibration.to_work(rendered.truth_px.exterior, THICKNESS_MM))
+    assert hausdorff(back, rendered.truth_mm.exterior, 1.0) < 0.001
+
+
+def test_the_contour_in_millimetres_lies_near_the_true_outline(rendered, measurer: Measurer) -> None:
+    """Within the default core, 0.85 of a cell or so: sliding-matrix sticks out by as much."""
+    seen = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM)
+    assert seen.findings == ()
+    assert seen.millimetres is not None
+    assert hausdorff(seen.millimetres.exterior, rendered.truth_mm.exterior, 0.5) < 9.0
+    assert seen.area_mm2 == pytest.approx(area(rendered.truth_mm), rel=0.06)
+
+
+def test_each_stage_is_timed_and_total_is_their_sum(rendered, measurer: Measurer) -> None:
+    times = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM).timings_ms
+    assert set(times) == {"mask", "trace", "convert", "simplify", "judge", "total"}
+    assert times["total"] == pytest.approx(sum(value for name, value in times.items() if name != "total"))
+
+
+def test_the_clock_is_the_callers(rendered) -> None:
+    ticks = iter(range(100))
+    times = Measurer(None, clock=lambda: next(ticks)).measure(rendered.picture, RECIPE, 20).timings_ms
+    assert times["mask"] == 1000.0
+
+
+def test_an_empty_table_is_a_finding_and_no_exception(measurer: Measurer) -> None:
+    seen = measurer.measure(np.full((1200, 1600), 30, np.uint8), RECIPE, 20)
+    assert seen.reasons == (Reason.NO_BLOCK_FOUND,)
+    assert seen.pixels is None
+    assert "total" in seen.timings_ms
+
+
+def test_a_picture_of_another_size_is_a_finding_by_name(measurer: Measurer) -> None:
+    seen = measurer.measure(np.full((1200, 1601), 30, np.uint8), RECIPE, 20)
+    assert seen.reasons == (Reason.CALIBRATION_MISMATCH,)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"max_area_mm2": 1000.0}, Reason.AREA_OUT_OF_LIMITS),
+        ({"min_area_mm2": 1e6}, Reason.AREA_OUT_OF_LIMITS),
+        ({"max_vertices": 5}, Reason.TOO_MANY_POINTS),
+    ],
+)
+def test_the_recipes_limits_refuse(rendered, measurer: Measurer, change: dict, reason: Reason) -> None:
+    seen = measurer.measure(rendered.picture, RECIPE.model_copy(update=change), THICKNESS_MM)
+    assert seen.reasons == (reason,)
+    assert seen.pixels is not None
+
+
+def test_the_work_area_refuses(rendered) -> None:
+    calibration = load_calibration(SAMPLES / "calibration.yaml")
+    area_mm = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
+    seen = Measurer(calibration, work_area_mm=area_mm).measure(rendered.picture, RECIPE, THICKNESS_MM)
+    assert seen.reasons == (Reason.OUTSIDE_WORK_AREA,)
+
+
+def test_limits_in_millimetres_do_not_apply_without_a_calibration(rendered) -> None:
+    seen = Measurer(None).measure(rendered.picture, RECIPE.model_copy(update={"max_area_mm2": 1.0}), 20)
+    assert seen.findings == ()
+
+
+@pytest.mark.parametrize("picture", [np.zeros((0, 5), np.uint8), np.zeros((5, 5), np.uint16), np.zeros(7, np.uint8)])
+def test_an_array_that_is_no_picture_is_an_error(picture: np.ndarray) -> None:
+    with pytest.raises(PictureError):
+        Measurer(None).measure(picture, RECIPE, 20)
+
+
+def test_what_the_recipe_says_reaches_the_method() -> None:
+    recipe = Recipe(number=1, name="a", polarity="dark", binarize=90, parameters={"core_px": 8, "threshold": 70.5})
+    settings = trace_settings(recipe)
+    assert (settings.polarity, settings.binarize, settings.core_px, settings.threshold) == ("dark", 90, 8, 70.5)
+    assert isinstance(settings.core_px, int)
+    assert settings.step_px is None
+
+
+def test_a_method_that_is_not_built_in_is_an_error(rendered) -> None:
+    recipe = RECIPE.model_copy(update={"method": "magic"})
+    with pytest.raises(ParameterError):
+        Measurer(None).measure(rendered.picture, recipe, 20)
+
+
+def test_the_summary_for_the_journal_is_plain_json(rendered, measurer: Measurer) -> None:
+    import json
+
+    summary = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM).summary()
+    assert json.loads(json.dumps(summary)) == summary
+    assert summary["vertices"] > 3

@@ -85,8 +85,14 @@ def shrunk(picture: Anything, factor: int) -> Anything:
     if factor == 1:
         return picture
     height, width = picture.shape
-    size = (max(width // factor, 1), max(height // factor, 1))
-    return cast(Anything, cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    return shrunk_to(picture, (max(height // factor, 1), max(width // factor, 1)))
+
+
+def shrunk_to(picture: Anything, shape: tuple[int, ...]) -> Anything:
+    """Means over the parts of the picture that the pixels of the smaller shape (H, W) cover, same type."""
+    if picture.shape == shape:
+        return picture
+    return cast(Anything, cv2.resize(picture, (shape[1], shape[0]), interpolation=cv2.INTER_AREA))
 
 
 def grown(picture: Anything, shape: tuple[int, ...]) -> Anything:
@@ -109,6 +115,11 @@ def subtracted(a: Picture, b: Picture) -> Picture:
 def inverted(picture: Picture) -> Picture:
     """255 less the picture."""
     return cast(Picture, cv2.bitwise_not(picture))
+
+
+def either(a: Picture, b: Picture) -> Picture:
+    """Bits that are set in a or in b."""
+    return cast(Picture, cv2.bitwise_or(a, b))
 
 
 def exceeding(picture: Picture, bound: Picture) -> Picture:

@@ -39,6 +39,9 @@ _WALLS = 3.0
 
 _CLIP_SHARE = 0.8
 
+_EASY_PX = 3_000_000
+"""Above this the first look is taken at a smaller size, and statistics are taken from parts."""
+
 _MOST_TILES = 10_000
 _WIDE_TILE_PX, _WIDE_PERCENTILE, _WIDE_FACTOR = 16, 10, 1.14
 _NARROW_TILE_PX, _NARROW_PERCENTILE, _NARROW_FACTOR = 6, 5, 2 * 1.61
@@ -62,7 +65,7 @@ def binarize(
     """The wall mask of a grey (H, W) or BGR (H, W, 3) picture, uint8. Raises ParameterError.
 
     A fixed `mode` is a grey level 0 … 255: bright walls are above it, dark ones at or below. With polarity `auto`
-    the one in whose mask regular cells enclose more is taken.
+    the one whose mask looks more like a honeycomb is taken.
     """
     if isinstance(mode, int) and not 0 <= mode <= 255:
         raise ParameterError(f"binarize is {mode}: expected flat, otsu, or a grey level of 0 to 255.")
@@ -82,26 +85,59 @@ def _measured(mask: Picture, polarity: Polarity) -> WallMask:
 
 
 def _plausibility(found: WallMask) -> tuple[float, float]:
-    """Area in regular cells; where neither polarity has any, walls are what the picture's border is not."""
+    """How many regular cells, and how much they enclose; where neither polarity has any, how little is at the border.
+
+    By area alone the squares between a table's grooves would outweigh a small block's cells, by number alone specks of
+    noise would. The square of the number times the area is right on all of 112 rendered scenes, by a factor of 5.
+    """
     border = np.concatenate([found.mask[0], found.mask[-1], found.mask[:, 0], found.mask[:, -1]])
-    return (found.cells.area_px2 if found.cells else 0.0, -float(np.mean(border)))
+    return (found.cells.count**2 * found.cells.area_px2 if found.cells else 0.0, -float(np.mean(border)))
 
 
 def _flat_masks(grey: Picture, polarities: tuple[Polarity, ...]) -> list[WallMask]:
     """The better polarity's mask, flattened twice: with a window from the picture's size, then from the cells seen."""
+    first, shrink = _first_look(grey, polarities)
+    if first.cells is None:
+        return [first]
+    cells = first.cells.enlarged(shrink)
+    window = round(max(_PITCHES * cells.pitch_px, _WALLS * cells.wall_px)) | 1
     smooth = _cv.gaussian(grey)
-    noise = _noise(smooth)
-    low, high = _FIRST_WINDOW_PX
-    first_window = int(np.clip(min(grey.shape) * _FIRST_SHARE, low, high)) | 1
-    found = max((_flattened(smooth, noise, first_window, name) for name in polarities), key=_plausibility)
-    if found.cells is None:
-        return [found]
-    window = round(max(_PITCHES * found.cells.pitch_px, _WALLS * found.cells.wall_px)) | 1
-    again = _flattened(smooth, noise, window, found.polarity)
-    return [again if again.cells else found]
+    mask = _flattened(smooth, _noise(smooth), window, first.polarity)
+    measured = _measured_near(mask, cells)
+    if measured is None and shrink == 1:
+        return [first]
+    return [WallMask(mask, first.polarity, measured or cells)]
 
 
-def _flattened(smooth: Picture, noise: float, window_px: int, polarity: Polarity) -> WallMask:
+def _first_look(grey: Picture, polarities: tuple[Polarity, ...]) -> tuple[WallMask, int]:
+    """The better polarity's mask with the first window, and how much smaller than the picture it is.
+
+    Large pictures are looked at small; only where that shows no cells (they may be too fine) as they are.
+    """
+    shrink = max(round(np.sqrt(grey.size / _EASY_PX)), 1)
+    for factor in (shrink, 1) if shrink > 1 else (1,):
+        smooth = _cv.gaussian(_cv.shrunk(grey, factor))
+        noise = _noise(smooth)
+        low, high = _FIRST_WINDOW_PX
+        window = int(np.clip(min(smooth.shape) * _FIRST_SHARE, low, high)) | 1
+        masks = [_measured(_flattened(smooth, noise, window, name), name) for name in polarities]
+        found = max(masks, key=_plausibility)
+        if found.cells:
+            break
+    return found, factor
+
+
+def _measured_near(mask: Picture, cells: Cells) -> Cells | None:
+    """The cells of the mask; in a large one those around the middle of where cells were seen: they are many enough."""
+    if mask.size <= _EASY_PX:
+        return measure_cells(mask)
+    half = round(np.sqrt(_EASY_PX)) // 2
+    left, top, right, bottom = cells.box
+    x, y = max((left + right) // 2 - half, 0), max((top + bottom) // 2 - half, 0)
+    return measure_cells(np.ascontiguousarray(mask[y : y + 2 * half, x : x + 2 * half]))
+
+
+def _flattened(smooth: Picture, noise: float, window_px: int, polarity: Polarity) -> Picture:
     if polarity == "dark":
         smooth = _cv.inverted(smooth)
     # Means over a window are smooth themselves: at about 8 px a window they are exact enough, and cost nothing.
@@ -109,14 +145,17 @@ def _flattened(smooth: Picture, noise: float, window_px: int, polarity: Polarity
     around = window_px // shrink | 1
     mean: Picture = _cv.box_mean(_cv.shrunk(smooth, shrink), around)
     rise = _cv.subtracted(smooth, _cv.grown(mean, smooth.shape))
+    if smooth.size > _EASY_PX:
+        # The contrast of walls is a mean over many: every second pixel tells as much.
+        rise = np.ascontiguousarray(rise[::2, ::2])
     floor = max(_NOISES * noise, _FEWEST_LEVELS)
-    least = np.maximum(_CONTRAST_SHARE * _wall_contrast(rise, floor, shrink, around), floor)
+    least = np.maximum(_CONTRAST_SHARE * _wall_contrast(rise, floor, mean.shape, around), floor)
     bound = np.clip(mean + least, 0, 255).astype(np.uint8)
-    return _measured(_cv.exceeding(smooth, _cv.grown(bound, smooth.shape)), polarity)
+    return _cv.exceeding(smooth, _cv.grown(bound, smooth.shape))
 
 
-def _wall_contrast(rise: Picture, floor: float, shrink: int, around: int) -> NDArray[np.float32]:
-    """How far walls rise above the mean around them, at the shrunk size: the rises' mean, weighted by themselves.
+def _wall_contrast(rise: Picture, floor: float, shape: tuple[int, ...], around: int) -> NDArray[np.float32]:
+    """How far walls rise above the mean around them, shrunk to a shape: the rises' mean, weighted by themselves.
 
     Rises up to the floor are noise and count nothing; those above the 80th percentile count as that, or a glint would
     set the bound for the faint walls around it.
@@ -129,7 +168,7 @@ def _wall_contrast(rise: Picture, floor: float, shrink: int, around: int) -> NDA
     level[: int(floor) + 1] = 0
     # 16 bits hold 255²; 64 keeps the mean of a few walls in a large square from being rounded away.
     sums = [
-        _cv.box_mean(_cv.as_float32(_cv.shrunk(_cv.looked_up(rise, table.astype(np.uint16)), shrink)), 2 * around + 1)
+        _cv.box_mean(_cv.as_float32(_cv.shrunk_to(_cv.looked_up(rise, table.astype(np.uint16)), shape)), 2 * around + 1)
         for table in (level * 64, level**2)
     ]
     return np.asarray(64 * sums[1] / np.maximum(sums[0], np.float32(1)), np.float32)

@@ -34,7 +34,7 @@ class Cells:
     """A honeycomb's measures. `pitch_px` is that of the regular honeycomb with the same area a cell.
 
     `wall_px` is the mean wall width, `wall_share` the share of a cell's area that is wall, `count` the whole cells
-    that were found, `area_px2` what they enclose together.
+    that were found, `area_px2` what they enclose together, `box` (left, top, right, bottom) where they lie.
     """
 
     pitch_px: float
@@ -42,6 +42,21 @@ class Cells:
     wall_share: float
     count: int
     area_px2: float
+    box: tuple[int, int, int, int]
+
+    def enlarged(self, factor: int) -> Cells:
+        """The measures in a picture `factor` times as large."""
+        if factor == 1:
+            return self
+        left, top, right, bottom = (factor * side for side in self.box)
+        return Cells(
+            self.pitch_px * factor,
+            self.wall_px * factor,
+            self.wall_share,
+            self.count,
+            self.area_px2 * factor**2,
+            (left, top, right, bottom),
+        )
 
     @property
     def cell_px2(self) -> float:
@@ -73,6 +88,7 @@ def measure_cells(mask: NDArray[np.uint8]) -> Cells | None:
         wall_share=1 - HEXAGON * inner / pitch**2,
         count=int(np.count_nonzero(regular)),
         area_px2=float(areas[regular].sum()),
+        box=(x0, y0, x1, y1),
     )
 
 

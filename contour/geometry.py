@@ -77,7 +77,7 @@ def signed_area(ring: Ring) -> float:
     """Area by the shoelace formula, in the ring's unit squared: positive for counter-clockwise (y up)."""
     # Taken about the first vertex: far from the origin the products would cancel and cost digits.
     x, y = (ring - ring[0]).T
-    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+    return float(0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
 
 
 def oriented(ring: Ring, counter_clockwise: bool) -> Ring:
@@ -105,6 +105,9 @@ def largest_loop(ring: Ring) -> Ring:
     OpenCV's contours run out and back along filaments of one pixel, and twice through pixels that join two regions by
     a corner; these are the only ways in which they meet themselves, so the loop is simple.
     """
+    ordered = ring[np.lexsort(ring.T)]
+    if (ordered[1:] != ordered[:-1]).any(axis=1).all():
+        return ring
     stack: list[tuple[float, float]] = []
     place: dict[tuple[float, float], int] = {}
     loops: list[list[tuple[float, float]]] = []
@@ -117,8 +120,6 @@ def largest_loop(ring: Ring) -> Ring:
             del stack[at:]
         place[(x, y)] = len(stack)
         stack.append((x, y))
-    if not loops:
-        return ring
     rings = [np.array(loop) for loop in (*loops, stack) if len(loop) > 2]
     return max(rings, key=lambda loop: abs(signed_area(loop)), default=ring)
 

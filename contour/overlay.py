@@ -35,12 +35,17 @@ _MOST_MARKS = 400
 
 
 def draw_overlay(
-    picture: Picture, contour_px: Contour | None, *, caption: Sequence[str] = (), refused: bool = False
+    picture: Picture,
+    contour_px: Contour | None,
+    *,
+    caption: Sequence[str] = (),
+    refused: bool = False,
+    marks: bool = True,
 ) -> Picture:
     """The picture as BGR, shape (H, W, 3), with the contour, its vertices and lines of text; the input stays as it is.
 
-    Exterior green, or red where `refused`, holes blue, vertices yellow. The first caption line is the largest.
-    Raises PictureError.
+    Exterior green, or red where `refused`, holes blue, vertices yellow (without `marks` none). The first caption line
+    is the largest. Raises PictureError.
     """
     check_picture(picture)
     canvas = _cv.bgr(picture)
@@ -51,7 +56,7 @@ def draw_overlay(
         for hole in contour_px.holes:
             _draw_ring(canvas, hole, HOLE, unit)
         _draw_ring(canvas, contour_px.exterior, REFUSED if refused else ACCEPTED, unit)
-        if contour_px.point_count <= _MOST_MARKS:
+        if marks and contour_px.point_count <= _MOST_MARKS:
             for ring in contour_px.rings:
                 _mark_vertices(canvas, ring, unit)
     text.write(canvas, REFUSED if refused else ACCEPTED, unit)

@@ -183,10 +183,9 @@ def self_meetings(tree: BoxTree) -> Iterator[NDArray[np.intp]]:
 
 
 def _folds_back(a: Floats, b: Floats, c: Floats) -> NDArray[np.bool_]:
-    """True where the path a → b → c returns on itself, or stands still."""
+    """True where the path a → b → c returns on itself; standing still counts as that."""
     onward = ((b - a) * (c - b)).sum(axis=1)
-    still = (a == b).all(axis=1) | (b == c).all(axis=1)
-    return np.asarray(still | ((onward <= 0) & (turns(a, b, c) == 0)))
+    return np.asarray((onward <= 0) & (turns(a, b, c) == 0))
 
 
 def contains(ring: Floats, points: Floats) -> NDArray[np.bool_]:

@@ -48,7 +48,11 @@ def simplify_indices(ring: Floats, tolerance: float) -> Indices:
     forced = np.zeros(count + 1, np.bool_)
     forced[[0, (opposite - anchor) % count, count]] = True
     plain = _at_least_three(path, _douglas_peucker(path, forced, tolerance), tolerance)
-    chosen = _untangled(path, _fewest(path, plain, tolerance), tolerance)
+    fewest = _fewest(path, plain, tolerance)
+    chosen = _untangled(path, fewest, tolerance)
+    if len(chosen) > len(fewest):
+        # Douglas-Peucker's choice lies closer to the ring and may need fewer vertices put back.
+        chosen = min(chosen, _untangled(path, np.flatnonzero(plain)[:-1], tolerance), key=len)
     return np.sort((chosen + anchor) % count)
 
 

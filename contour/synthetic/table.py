@@ -94,12 +94,16 @@ def _scratch(rng: np.random.Generator, picture: Floats, level: float) -> None:
     picture += mask.astype(np.float32) * np.float32(level * rng.uniform(-0.25, 0.7) / 255.0)
 
 
+def cell_floor(scene: Scene) -> float:
+    """Share of light that reaches the table at the bottom of a cell: less the deeper and narrower it is."""
+    return 0.3 + 0.7 * math.exp(-scene.thickness_mm / (1.3 * scene.cells.pitch_mm))
+
+
 def _shade(scene: Scene, picture: Floats) -> None:
     """Shadow beside the block, and the darkness at the bottom of its cells."""
     camera = scene.camera
     foot = camera.project_contour(scene.outline, 0.0)
     scale = camera.mm_per_px((float(scene.outline.exterior[0, 0]), float(scene.outline.exterior[0, 1])), 0.0)
-    bottom = 0.3 + 0.7 * math.exp(-scene.thickness_mm / (1.3 * scene.cells.pitch_mm))
     inside = area_coverage(foot.rings, camera.width, camera.height)
     if scene.light.shadow > 0.0 and scene.thickness_mm > 0.0:
         angle = math.radians(scene.light.direction_deg)
@@ -110,7 +114,7 @@ def _shade(scene: Scene, picture: Floats) -> None:
         dark = np.maximum(blurred(dark, soft), inside)
         picture *= 1.0 - np.float32(scene.light.shadow) * dark
     # open cells at the cut let light in, so the darkness sets in gradually
-    picture *= 1.0 - np.float32(1.0 - bottom) * blurred(inside, 0.45 * scene.cells.pitch_mm / scale)
+    picture *= 1.0 - np.float32(1.0 - cell_floor(scene)) * blurred(inside, 0.45 * scene.cells.pitch_mm / scale)
 
 
 def blurred(raster: Floats, sigma: float) -> Floats:

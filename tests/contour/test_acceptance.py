@@ -110,7 +110,7 @@ NOTCHED = np.array(
     [
         (WORK_AREA, None),
         (WORK_AREA[::-1], None),
-        (WORK_AREA + [150, 0], r"lie outside"),
+        (WORK_AREA + np.array([150, 0]), r"lie outside"),
         (NOTCHED, "crosses or touches"),
         (WORK_AREA + 5000, "lie outside"),
     ],

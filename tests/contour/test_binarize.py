@@ -163,3 +163,24 @@ def test_small_pictures_are_no_special_case(shape: tuple[int, int], mode: str | 
 def test_a_level_off_the_grey_scale_is_refused(level: int) -> None:
     with pytest.raises(ParameterError, match=f"binarize is {level}"):
         binarize(np.zeros((5, 5), np.uint8), level)
+
+
+@pytest.mark.parametrize("kind", ["easy", "shop", "dim", "dark"])
+def test_a_picture_taken_for_large_gives_the_same_pitch(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = block("l", kind)
+    plain = binarize(scene.picture)
+    monkeypatch.setattr("contour.binarize._EASY_PX", 60_000)
+    hasty = binarize(scene.picture)
+    assert plain.cells is not None
+    assert hasty.cells is not None
+    assert hasty.polarity == plain.polarity
+    assert hasty.cells.pitch_px == pytest.approx(plain.cells.pitch_px, rel=0.05)
+    assert np.mean(hasty.mask != plain.mask) < 0.02
+
+
+def test_cells_too_fine_for_the_first_look_are_found_in_the_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("contour.binarize._EASY_PX", 12_000)
+    picture = (honeycomb(7, 1.5) // 255 * 120 + 60).astype(np.uint8)
+    cells = binarize(picture).cells
+    assert cells is not None
+    assert cells.pitch_px == pytest.approx(7, rel=0.1)

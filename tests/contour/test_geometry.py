@@ -26,7 +26,7 @@ hole = SQUARE[::-1] * 0.2 + 4.0
 @given(simple_rings, st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
 def test_area_is_the_shoelace_area_wherever_the_ring_lies(ring: np.ndarray, x: float, y: float) -> None:
     expected = shapely.Polygon(ring).area
-    assert abs(signed_area(ring + [x, y])) == pytest.approx(expected, rel=1e-6, abs=1e-4)
+    assert abs(signed_area(ring + np.array([x, y]))) == pytest.approx(expected, rel=1e-6, abs=1e-4)
 
 
 def test_counter_clockwise_is_positive_for_y_up() -> None:
@@ -51,7 +51,7 @@ def test_holes_turn_against_the_exterior() -> None:
 
 
 def test_box_and_perimeter_of_a_square() -> None:
-    box = bounding_box(SQUARE + [1, 2])
+    box = bounding_box(SQUARE + np.array([1, 2]))
     assert (box.min_x, box.min_y, box.max_x, box.max_y) == (1, 2, 11, 12)
     assert (box.width, box.height) == (10, 10)
     assert perimeter(SQUARE) == 40
@@ -121,7 +121,7 @@ def test_a_dense_straight_sided_ring_is_simple() -> None:
         ((hole,), None),
         ((hole + 20,), "hole 1 lies outside the exterior"),
         ((hole + 5,), "the exterior and hole 1 meet"),
-        ((hole + [6, 0],), "the exterior and hole 1 meet"),
+        ((hole + np.array([6, 0]),), "the exterior and hole 1 meet"),
         ((hole, hole + 0.5), "the hole 1 and hole 2 meet"),
         ((hole, (hole - 5) * 0.5 + 5), "the hole 2 lies inside the hole 1"),
         (((hole - 5) * 0.5 + 5, hole), "the hole 1 lies inside the hole 2"),
@@ -135,7 +135,7 @@ def test_a_contour_says_what_makes_it_unfit(holes: tuple[np.ndarray, ...], words
 
 
 def test_hausdorff_of_a_shifted_square_is_the_shift() -> None:
-    assert hausdorff(SQUARE, SQUARE + [0.5, 0], 0.1) == pytest.approx(0.5)
+    assert hausdorff(SQUARE, SQUARE + np.array([0.5, 0]), 0.1) == pytest.approx(0.5)
     assert hausdorff(SQUARE, np.vstack([SQUARE, [[-3, 5]]]), 0.1) == pytest.approx(3.0)
 
 

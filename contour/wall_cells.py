@@ -13,15 +13,16 @@ from contour.wall_mask import wall_mask
 
 Gray = NDArray[np.uint8]
 
-_TILE_PX = 640
+_TILE_PX = 512
 _TILES = 4
 # First guesses of the pitch; the mask's windows forgive a factor of two either way.
-_GUESSES = (8.0, 22.0, 60.0, 150.0)
+_GUESSES = (24.0, 70.0, 8.0, 150.0)
 
 
 @dataclass(frozen=True)
 class Cells:
-    """Pitch and wall width in pixels, polarity, number of enclosed cells, and the area share of those of usual size."""
+    """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
+    the part of the tile they fill, and the wall contrast in grey levels."""
 
     pitch: float
     wall: float
@@ -29,6 +30,7 @@ class Cells:
     count: int
     regularity: float
     filled: float
+    contrast: float
 
     @property
     def score(self) -> float:
@@ -39,13 +41,11 @@ class Cells:
 def probe(light: Gray, polarity: str) -> Cells:
     """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound."""
     best: Cells | None = None
+    senses = [bright for bright in (True, False) if polarity != ("dark" if bright else "bright")]
     for tile in _busiest_tiles(light):
-        for bright in (True, False):
-            if polarity == ("dark" if bright else "bright"):
-                continue
-            cells = _tile_cells(tile, bright=bright)
-            if cells is not None and (best is None or cells.score > best.score):
-                best = cells
+        found = _tile_cells(tile, senses)
+        if found is not None and (best is None or found.score > best.score):
+            best = found
         if best is not None and best.score > 0.35:
             break
     if best is None or best.score < 0.05:
@@ -58,7 +58,7 @@ def probe(light: Gray, polarity: str) -> Cells:
 
 
 def _busiest_tiles(light: Gray) -> list[Gray]:
-    """Tiles of up to 640 px with the most local contrast, busiest first, apart from each other."""
+    """Tiles of up to 512 px with the most local contrast, busiest first, apart from each other."""
     block = 32
     sample = light[::4, ::4].astype(np.float32)
     shape = (max(1, light.shape[1] // block), max(1, light.shape[0] // block))
@@ -80,18 +80,24 @@ def _busiest_tiles(light: Gray) -> list[Gray]:
     return tiles
 
 
-def _tile_cells(tile: Gray, *, bright: bool) -> Cells | None:
-    """The best reading of a tile over all first guesses of the pitch, read once more with its own pitch."""
-    found = [cells for guess in _GUESSES if (cells := cells_of(tile, guess, bright=bright)) is not None]
-    if not found:
-        return None
-    best = max(found, key=lambda cells: cells.score)
-    return cells_of(tile, best.pitch, bright=bright) or best
+def _tile_cells(tile: Gray, senses: list[bool]) -> Cells | None:
+    """The best reading of a tile over first guesses of the pitch and senses of contrast, read once more with its own pitch."""
+    best: Cells | None = None
+    for guess in _GUESSES:
+        for bright in senses:
+            cells = cells_of(tile, guess, bright=bright)
+            if cells is not None and (best is None or cells.score > best.score):
+                best = cells
+        # Good enough in one sense and guess, while the other sense was heard too.
+        if best is not None and best.score > 0.5:
+            break
+    return None if best is None else cells_of(tile, best.pitch, bright=best.bright) or best
 
 
 def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are enclosed."""
-    mask = wall_mask(light, pitch, bright=bright).mask
+    seen = wall_mask(light, pitch, bright=bright)
+    mask = seen.mask
     floor = cv2.bitwise_not(mask)
     _, _, stats, _ = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
     height, width = mask.shape
@@ -112,7 +118,7 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     size = float(np.sqrt(2 / np.sqrt(3) * np.median(usual))) + wall
     # Area a regular comb of this pitch would fill with as many cells.
     filled = len(usual) * size * size * np.sqrt(3) / 2 / (height * width)
-    return Cells(size, wall, bright, len(usual), float(usual.sum() / areas.sum()), float(min(1.0, filled)))
+    return Cells(size, wall, bright, len(usual), float(usual.sum() / areas.sum()), float(min(1.0, filled)), seen.contrast)
 
 
 def wall_width(mask: Gray) -> float:

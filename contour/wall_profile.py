@@ -13,7 +13,7 @@ Points = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
 _STEP = 0.5
-_TURNS = 5
+_TURNS = 4
 
 
 @dataclass(frozen=True)

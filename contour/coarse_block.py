@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
 from contour.geometry import Ring
+from contour.pixel_sampling import sample_at
 
 Gray = NDArray[np.uint8]
 Points = NDArray[np.float64]
@@ -55,9 +56,8 @@ class CoarseBlock:
 
     def depth_at(self, points: Points) -> NDArray[np.float64]:
         """Distance inside the coarse edge, negative outside, shape (N,), mask pixels, for points (N, 2) in mask pixels."""
-        grid = self._grid(points).astype(np.float32)
-        sampled = cv2.remap(self.depth, grid[None, :, :], None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return np.asarray(sampled[0], np.float64)
+        grid = self._grid(points)
+        return sample_at(self.depth, grid[:, 0], grid[:, 1])
 
     def height_at(self, points: Points) -> NDArray[np.float64]:
         """How far points (N, 2) stand out of the ring smoothed over two pitches, along its normal, shape (N,), mask pixels."""

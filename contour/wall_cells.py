@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -16,7 +17,9 @@ Gray = NDArray[np.uint8]
 _TILE_PX = 512
 _TILES = 4
 # First guesses of the pitch; the mask's windows forgive a factor of two either way.
-_GUESSES = (24.0, 70.0, 8.0, 150.0)
+_GUESSES = (24.0, 70.0, 8.0)
+_GOOD_SCORE = 0.45
+_LEAST_SCORE = 0.05
 
 
 @dataclass(frozen=True)
@@ -39,22 +42,38 @@ class Cells:
 
 
 def probe(light: Gray, polarity: str) -> Cells:
-    """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound."""
-    best: Cells | None = None
+    """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound.
+
+    The busiest tile at full size is asked first, then the whole picture at a quarter of its size, where large cells are
+    many, then further tiles. The first good answer is taken, else the best.
+    """
     senses = [bright for bright in (True, False) if polarity != ("dark" if bright else "bright")]
-    for tile in _busiest_tiles(light):
-        found = _tile_cells(tile, senses)
-        if found is not None and (best is None or found.score > best.score):
+    best: Cells | None = None
+    for part, shrink in _parts(light):
+        found = _part_cells(part, senses, _GUESSES if shrink == 1 else _GUESSES[:2])
+        if found is None:
+            continue
+        found = replace(found, pitch=found.pitch * shrink, wall=found.wall * shrink)
+        if best is None or found.score > best.score:
             best = found
-        if best is not None and best.score > 0.35:
+        if best.score > _GOOD_SCORE:
             break
-    if best is None or best.score < 0.05:
-        seen = "no enclosed cells" if best is None else f"{best.count} enclosed cells of mixed size"
+    if best is None or best.score < _LEAST_SCORE:
+        seen = "no enclosed cells" if best is None else f"{best.count} enclosed cells, of mixed size or far apart"
         raise NoBlockFound(
             f"no block found: the most textured part of the picture shows {seen}, expected a dozen or more of one size. "
             "Check that a block lies in view, the light, and the polarity"
         )
     return best
+
+
+def _parts(light: Gray) -> Iterator[tuple[Gray, int]]:
+    tiles = _busiest_tiles(light)
+    yield from ((tile, 1) for tile in tiles[:1])
+    if min(light.shape) >= 4 * 64:
+        quarter = cv2.resize(light, (light.shape[1] // 4, light.shape[0] // 4), interpolation=cv2.INTER_AREA)
+        yield np.asarray(quarter, np.uint8), 4
+    yield from ((tile, 1) for tile in tiles[1:])
 
 
 def _busiest_tiles(light: Gray) -> list[Gray]:
@@ -80,18 +99,18 @@ def _busiest_tiles(light: Gray) -> list[Gray]:
     return tiles
 
 
-def _tile_cells(tile: Gray, senses: list[bool]) -> Cells | None:
-    """The best reading of a tile over first guesses of the pitch and senses of contrast, read once more with its own pitch."""
+def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> Cells | None:
+    """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own pitch."""
     best: Cells | None = None
-    for guess in _GUESSES:
+    for guess in guesses:
         for bright in senses:
-            cells = cells_of(tile, guess, bright=bright)
+            cells = cells_of(part, guess, bright=bright)
             if cells is not None and (best is None or cells.score > best.score):
                 best = cells
         # Good enough in one sense and guess, while the other sense was heard too.
-        if best is not None and best.score > 0.5:
+        if best is not None and best.score > _GOOD_SCORE:
             break
-    return None if best is None else cells_of(tile, best.pitch, bright=best.bright) or best
+    return None if best is None else cells_of(part, best.pitch, bright=best.bright) or best
 
 
 def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:

@@ -39,6 +39,12 @@ class Chains:
         first = self.first[at]
         return first + (at - first + steps) % self.length[at]
 
+    def free_side(self, at: NDArray[np.int64], arm: int) -> Points:
+        """Vector towards the side without wall, as long as the points `arm` steps ahead and back of `at` are apart."""
+        # findContours runs with the free side at (−dy, dx) of its direction, for outer boundaries and inner ones alike.
+        ahead, back = self.points[self.shifted(arm, at)], self.points[self.shifted(-arm, at)]
+        return np.stack([(back - ahead)[:, 1], (ahead - back)[:, 0]], axis=1)
+
 
 def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
     """Boundary chains of the walls within about a pitch of the coarse edge."""
@@ -59,8 +65,11 @@ def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
 def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) -> WallEnds:
     """Points where the two arms along the chain lie about a wall's width apart and the point sticks out of them."""
     arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch)))
-    gap, stick, _ = _arms(chains, np.arange(len(chains.points)), arm)
-    candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm)
+    everywhere = np.arange(len(chains.points))
+    gap, stick, out = _arms(chains, everywhere, arm)
+    # A sharp corner of a small cell has close arms too, but sticks out into the wall. A wall one pixel wide has none of both.
+    free = (chains.free_side(everywhere, arm) * out).sum(axis=1)
+    candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm) & (free > -0.5)
     peak = _peaks(chains, np.where(candidate, stick - 0.5 * gap, -np.inf), arm)
     depth = coarse.depth_at(chains.points[peak])
     peak = peak[np.abs(depth) < _DEPTH_PITCHES * pitch]
@@ -106,10 +115,7 @@ def outermost(chains: Chains, coarse: CoarseBlock, pitch: float) -> NDArray[np.i
     height = np.where(near, coarse.height_at(chains.points), -np.inf)
     peak = _peaks(chains, height, max(2, round(0.4 * pitch)))
     _, _, normal = coarse.feet(chains.points[peak])
-    ahead, back = chains.points[chains.shifted(3, peak)], chains.points[chains.shifted(-3, peak)]
-    # findContours runs with the free side at (−dy, dx) of its direction, for outer boundaries and inner ones alike.
-    free = np.stack([-(ahead - back)[:, 1], (ahead - back)[:, 0]], axis=1)
-    peak = peak[(free * normal).sum(axis=1) > 0]
+    peak = peak[(chains.free_side(peak, 3) * normal).sum(axis=1) > 0]
     points, level = chains.points[peak], height[peak]
     close = ((points[:, None, :] - points[None, :, :]) ** 2).sum(axis=2) < pitch * pitch
     envelope = np.where(close, level[None, :], -np.inf).max(axis=1) if len(peak) else level

@@ -16,6 +16,7 @@ NOISE_FLOOR = 2.5
 # The maps of local light need no more than this many samples a pitch.
 _MAP_SAMPLES = 8
 _BYTE_CONTRAST = 40.0
+_FINE_PITCH = 12.0
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,14 @@ def _noise_level(smooth: NDArray[np.uint8 | np.uint16], pitch: float, unit: int)
     tiles = rows[:, :, : columns * tile].reshape(rows.shape[0], tile, columns, tile)[:, :, ::hop]
     if tiles.size == 0:
         return 0.3 * unit
-    deviation = tiles.astype(np.float32).std(axis=(1, 3))
-    return max(float(np.quantile(deviation, 0.2)), 0.3 * unit)
+    quiet = float(np.quantile(tiles.astype(np.float32).std(axis=(1, 3)), 0.2))
+    if pitch < _FINE_PITCH:
+        # No tile of fine cells is quiet, but second differences see little of a blurred structure, and
+        # keep the noise that the light blur left as it is.
+        rows = smooth[::hop].astype(np.float32)
+        second = rows[:, :-2] - 2 * rows[:, 1:-1] + rows[:, 2:]
+        quiet = min(quiet, float(np.median(np.abs(second))) / 0.6745)
+    return max(quiet, 0.3 * unit)
 
 
 def _levels(local: Float, pitch: float) -> tuple[Float, Float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from contour.wall_ends import edge_chains, find_ends, outermost
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import wall_light
 from contour.wall_mask import WallMask, wall_mask
-from contour.wall_profile import centred_axes, fit_ends
+from contour.wall_profile import EndModel, centred_axes, fit_ends, true_width
 
 Gray = NDArray[np.uint8]
 Points = NDArray[np.float64]
@@ -21,6 +23,8 @@ Vector = NDArray[np.float64]
 _HALF_SIZE_ABOVE_PX = 6_000_000
 # Sharpest and softest blur that a lens in use leaves; outside of it the fit has seen something else.
 _BLUR_PX = (0.4, 3.0)
+# What the mask's own light blur (3 × 3) adds.
+_MASK_BLUR_PX = 0.8
 
 
 def see_block(picture: NDArray[np.uint8], polarity: str) -> BlockEvidence:
@@ -43,34 +47,48 @@ def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, sc
     straight = ends.straight * scale
     tip, axis = centred_axes(light, (ends.tip + 0.5) * scale - 0.5, ends.axis, cells.wall, straight, sign)
     clean = straight > 2 * cells.wall + 2
-    reach = float(np.clip(0.3 * cells.pitch, 2.5, 2 * cells.wall + 4))
-    out = float(np.clip(0.25 * cells.pitch, 3.0, 6.0))
-    blur = 0.9
-    if np.count_nonzero(clean) >= 5:
-        some = np.flatnonzero(clean)[:: max(1, np.count_nonzero(clean) // 64)]
-        free = fit_ends(light, tip[some], axis[some], wall=cells.wall, blur=None, reach=reach, out=out, sign=sign)
-        blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
-    fitted = fit_ends(light, tip, axis, wall=cells.wall, blur=blur, reach=reach, out=out, sign=sign)
-    usual = float(np.median(fitted.height[clean])) if clean.any() else seen.contrast
-    good = (fitted.sigma < 1.0) & (fitted.height > 0.3 * usual)
+    _, _, normal = coarse.feet(ends.tip)
+    model = EndModel(
+        width=true_width(cells.wall, np.hypot(0.9, _MASK_BLUR_PX)),
+        blur=None,
+        height=None,
+        reach=float(np.clip(0.3 * cells.pitch, 2.5, 2 * cells.wall + 4)),
+        out=float(np.clip(0.25 * cells.pitch, 3.0, 6.0)),
+        sign=sign,
+    )
+    model = _learn(light, tip, axis, normal, np.argsort(-straight), model, cells)
+    fitted = fit_ends(light, tip, axis, normal, model)
+    good = (fitted.sigma < 1.0) & (fitted.height > 0.4 * model.height)
     sigma = np.hypot(np.where(clean, 0.1, 0.2), fitted.sigma)
     kinds = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
     points, kinds, sigma = fitted.point[good], kinds[good], sigma[good]
 
-    lonely = _nearest(outer, (points + 0.5) / scale - 0.5) > 0.3 * pitch
-    outer = outer[lonely]
+    outer = outer[_nearest(outer, (points + 0.5) / scale - 0.5) > 0.3 * pitch]
     _, _, normal = coarse.feet(outer)
     place = (outer + 0.5) * scale - 0.5
-    side = fit_ends(light, place, normal, wall=1.0, blur=blur, reach=min(reach, cells.wall), out=out, sign=sign)
+    side = fit_ends(light, place, normal, normal, replace(model, width=1.0, reach=min(model.reach, cells.wall)))
     moved = ((side.point - place) * normal).sum(axis=1)
     use = np.abs(moved) < 1.5 * scale
-    place = np.where(use[:, None], side.point, place)
+    # Beside a thin wall half height lies outside of it, at its corners and ends inside: about a third of the way is left.
+    fat = 0.17 * (cells.wall - model.width)
+    place = np.where(use[:, None], side.point, place) - fat * normal
     points = np.concatenate([points, place])
     kinds = np.concatenate([kinds, np.full(len(place), WitnessKind.OUTERMOST, np.int8)])
     sigma = np.concatenate([sigma, np.where(use, 0.5, 1.0)])
     rings = _rings(coarse, points, kinds, sigma, scale)
     polarity = "bright" if cells.bright else "dark"
-    return BlockEvidence(rings, cells.pitch, cells.wall, polarity, blur, seen.noise, seen.contrast)
+    return BlockEvidence(rings, cells.pitch, cells.wall, polarity, model.blur, seen.noise, seen.contrast)
+
+
+def _learn(light: Gray, tip: Points, axis: Points, normal: Points, longest: NDArray[np.int64], model: EndModel, cells: Cells) -> EndModel:
+    """The model with blur and height as the straightest ends show them."""
+    some = longest[: max(5, min(64, len(longest) // 2))]
+    if not len(some):
+        return replace(model, blur=0.9)
+    free = fit_ends(light, tip[some], axis[some], normal[some], model)
+    blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
+    width = true_width(cells.wall, float(np.hypot(blur, _MASK_BLUR_PX)))
+    return replace(model, width=width, blur=blur, height=float(np.median(free.height)))
 
 
 def _nearest(points: Points, others: Points) -> Vector:

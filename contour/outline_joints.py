@@ -61,6 +61,7 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
     ahead = ((point - near) * tangent.conj()).real
     behind = ((far - point) * next_tangent.conj()).real
     corner = met & (ahead > -slack) & (ahead < reach) & (behind > -slack) & (behind < reach)
+    corner &= (np.abs(point - near) < 1.5 * reach) & (np.abs(point - far) < 1.5 * reach)
     middle = 0.5 * (near + far)
     one, one_tangent = feet(segments.models, middle)
     other, other_tangent = feet(following, middle)

@@ -15,7 +15,7 @@ PRICE_LINE = 9.0
 PRICE_ARC = 13.0
 _CORNER = 1.0
 # A missing cell only ever makes a dent: a reflex corner has to be earned.
-_REFLEX = 3.5
+_REFLEX_PER_RADIAN = 6.0
 _JUMP = 12.0
 _REACH = 1.6
 _STATES = 12
@@ -42,6 +42,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     signed = distance(models, points)
     unary = cost(witnesses, signed, np.arange(count)[:, None])
     unary = np.where(here >= 0, unary, _FAR)
+    unary = unary + _REFLEX_PER_RADIAN * np.maximum(-models.curvature, 0.0) * witnesses.gap[:, None]
     foot, tangent = feet(models, points)
     facing = (tangent * witnesses.normal.conj()[:, None]).imag
     unary = np.where(facing > -0.2, unary, unary + 20.0)
@@ -102,6 +103,7 @@ def joint_cost(
     way = next_foot - foot
     turn = tangent.conj() * next_tangent
     sine = turn.imag
+    reflex = _REFLEX_PER_RADIAN * np.maximum(-np.angle(turn), 0.0)
     safe = np.where(np.abs(sine) > 0.05, sine, 1.0)
     ahead = (way.conj() * next_tangent).imag / safe
     behind = (tangent.conj() * way).imag / safe
@@ -110,12 +112,12 @@ def joint_cost(
         np.maximum(np.maximum(-ahead - slack, ahead - reach), 0.0) ** 2
         + np.maximum(np.maximum(-behind - slack, behind - reach), 0.0) ** 2
     )
-    corner = _CORNER + _REFLEX * (sine < 0.0) + 8.0 * excess / pitch**2
+    corner = _CORNER + reflex + 8.0 * excess / pitch**2
     corner = np.where(np.abs(sine) > 0.05, corner, np.inf)
     middle = tangent + next_tangent
     aside = (middle.conj() * way).imag / np.maximum(np.abs(middle), 1e-6)
     smooth = 0.25 * (aside / sigma) ** 2 + 12.0 * np.where(turn.real > 0.0, sine**2, 1.0)
-    return np.minimum(np.minimum(corner, smooth), _JUMP)
+    return np.minimum(np.minimum(corner, smooth), _JUMP + reflex)
 
 
 def _cheapest_cycle(step: Real, first: Real) -> tuple[Index, float]:

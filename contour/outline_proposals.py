@@ -57,18 +57,16 @@ def samples(count: int, first: Index, length: Index, places: int = _SAMPLES) -> 
 def propose(witnesses: Witnesses) -> Proposals:
     """Lines and arcs on windows of 4, 8, 16, ... witnesses and on the whole ring, without those a longer window explains."""
     count = len(witnesses)
-    sizes = [size for size in (4 * 2**k for k in range(12)) if size < count] + [count]
+    sizes = [size for size in (4, 6, *(8 * 2**k for k in range(11))) if size < count] + [count]
     kept: list[Proposals] = []
     longer: list[Proposals] = []
     for size in reversed(sizes):
-        level = [_window_fits(witnesses, size, bend) for bend in ((False, True) if size >= 8 else (False,))]
+        level = [_window_fits(witnesses, size, bend) for bend in ((False, True) if size >= 6 else (False,))]
         for fits in level:
             worth = fits.gain > 0.0
             for other in longer:
                 worth &= ~_explained(witnesses, fits, other)
             kept.append(fits.take(worth))
-        if len(level) == 2:
-            level[1] = level[1]
         longer = level
     return gather(kept)
 
@@ -76,7 +74,12 @@ def propose(witnesses: Witnesses) -> Proposals:
 def _window_fits(witnesses: Witnesses, size: int, bend: bool) -> Proposals:
     count = len(witnesses)
     stride = max(1, size // 4) if size < count else count
-    first = np.arange(0, count, stride, dtype=np.intp)
+    return window_fits(witnesses, np.arange(0, count, stride, dtype=np.intp), size, bend)
+
+
+def window_fits(witnesses: Witnesses, first: Index, size: int, bend: bool) -> Proposals:
+    """A robust line or arc for each window of `size` witnesses that begins at `first`: the best of a few, refined twice."""
+    count = len(witnesses)
     length = np.full(len(first), size, dtype=np.intp)
     places = min(size, _SAMPLES)
     index = samples(count, first, length, places)
@@ -114,7 +117,7 @@ def _explained(witnesses: Witnesses, fits: Proposals, longer: Proposals) -> np.n
     middle = fits.first + fits.length // 2 - longer.length[0] // 2
     near = np.rint(middle / stride).astype(np.intp)[:, None] + np.array([-1, 0, 1])
     near = near % len(longer)
-    signed = distance(longer.models.take((near, None)) if False else longer.models.take(near).take((..., None)), points[:, None, :])
+    signed = distance(longer.models.take(near).take((..., None)), points[:, None, :])
     theirs = cost(witnesses, signed, index[:, None, :]).sum(axis=2)
     theirs = np.where(longer.gain[near] > 0.0, theirs, np.inf).min(axis=1)
     explained: np.ndarray[tuple[int], np.dtype[np.bool_]] = (theirs - own) * scale < _REDUNDANT

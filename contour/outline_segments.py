@@ -8,7 +8,7 @@ import numpy as np
 
 from contour.outline_labelling import PRICE_ARC, PRICE_LINE, Labelling
 from contour.outline_models import Index, Models, Real, distance, feet, refine, through_pairs, through_triples
-from contour.outline_proposals import Proposals, gather
+from contour.outline_proposals import Proposals, gather, window_fits
 from contour.outline_witnesses import Witnesses, cost, weights
 
 _MOST_PLACES = 160
@@ -83,6 +83,12 @@ def around(witnesses: Witnesses, segments: Segments) -> Proposals:
             if span == 1:
                 gain = np.where(segments.bend == bend, np.maximum(gain, 0.0) + 1e4, gain)
             parts.append(Proposals(models, free, segments.first, length, gain))
+    if total > 1:
+        # What hides between two segments: a short edge or a rounding that no window of the first round fell upon.
+        for size in (5, 9):
+            if size < count:
+                begins = np.unique((segments.first - size // 2) % count)
+                parts += [window_fits(witnesses, begins, size, bend) for bend in (False, True)]
     merged = gather(parts)
     return merged.take(merged.gain > 0.0)
 

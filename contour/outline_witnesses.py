@@ -14,6 +14,7 @@ from contour.wall_evidence import RingEvidence, WitnessKind
 _SHARE_INSIDE = 0.20
 _SHARE_OUTSIDE = 0.006
 _LEAST_SIGMA_PX = 0.04
+_DEEPEST = 1.3
 # How much cheaper an outermost point's depth is: the wall behind a zigzag edge lies anywhere within half a pitch.
 _SERRATION = 0.12
 
@@ -83,18 +84,25 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
 
 
 def cost(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
-    """Nats of signed distances (last axis: the witnesses at `index`, or index's own shape): half squares, capped either side."""
+    """Nats of signed distances (last axis: the witnesses at `index`, or index's own shape): half squares, capped either side.
+
+    Beyond a cell's depth the cap rises again: one missing cell or broken wall reaches no deeper.
+    """
     outside = signed > 0.0
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
     cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
-    return np.minimum(0.5 * (signed / sigma) ** 2, cap)
+    beyond = np.clip(np.abs(signed) / witnesses.pitch - _DEEPEST, 0.0, 3.0)
+    return np.minimum(0.5 * (signed / sigma) ** 2, cap) + 4.0 * beyond**2
 
 
 def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
-    """Weights of a robust fit, 1/pixel^2: inverse variance, falling smoothly to 0 where the cost reaches its cap."""
+    """Weights of a robust fit, 1/pixel^2: inverse variance, falling smoothly to 0 where the cost reaches its inner cap.
+
+    The same cap on both sides, or clean noise alone would pull the outline outwards.
+    """
     outside = signed > 0.0
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
-    cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
+    cap = witnesses.cap_inside[index]
     inverse = 1.0 / sigma**2
     within = np.maximum(1.0 - 0.5 * signed**2 * inverse / cap, 0.0)
     return within**2 * inverse

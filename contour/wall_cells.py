@@ -18,14 +18,15 @@ _TILE_PX = 512
 _TILES = 4
 # First guesses of the pitch; the mask's windows forgive a factor of two either way.
 _GUESSES = (24.0, 70.0, 8.0)
-_GOOD_SCORE = 0.45
-_LEAST_SCORE = 0.05
+_GOOD_SCORE = 0.2
+_LEAST_SCORE = 0.04
 
 
 @dataclass(frozen=True)
 class Cells:
     """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
-    the part of the tile they fill, and the wall contrast in grey levels."""
+    the part of the tile they fill, the wall contrast in grey levels, and the share of
+    the walls that hang together."""
 
     pitch: float
     wall: float
@@ -34,11 +35,12 @@ class Cells:
     regularity: float
     filled: float
     contrast: float
+    connected: float
 
     @property
     def score(self) -> float:
         """Larger for a better comb: many cells, of one size, over most of the tile."""
-        return self.regularity * self.filled * min(1.0, self.count / 12)
+        return self.regularity * self.filled * self.connected * min(1.0, self.count / 12)
 
 
 def probe(light: Gray, polarity: str) -> Cells:
@@ -137,7 +139,9 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     size = float(np.sqrt(2 / np.sqrt(3) * np.median(usual))) + wall
     # Area a regular comb of this pitch would fill with as many cells.
     filled = len(usual) * size * size * np.sqrt(3) / 2 / (height * width)
-    return Cells(size, wall, bright, len(usual), float(usual.sum() / areas.sum()), float(min(1.0, filled)), seen.contrast)
+    _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
+    connected = float(pieces[1:, cv2.CC_STAT_AREA].max() / max(1, pieces[1:, cv2.CC_STAT_AREA].sum()))
+    return Cells(size, wall, bright, len(usual), float(usual.sum() / areas.sum()), float(min(1.0, filled)), seen.contrast, connected)
 
 
 def wall_width(mask: Gray) -> float:

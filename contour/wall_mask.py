@@ -11,10 +11,14 @@ from numpy.typing import NDArray
 Gray = NDArray[np.uint8]
 Float = NDArray[np.float32]
 
-# Below 2.5 standard deviations of the noise a threshold fills the table with specks.
-NOISE_FLOOR = 2.5
+# Standard deviations above the level of cells, itself 1.25 below the mean where there is nothing but noise: lower, and
+# the table fills with specks.
+NOISE_FLOOR = 4.0
 # The maps of local light need no more than this many samples a pitch.
 _MAP_SAMPLES = 8
+# Foils side by side differ in brightness by a factor of three: a threshold halfway up loses the dimmer ones.
+_RISE = 0.35
+_REGION_RISE = 0.25
 _BYTE_CONTRAST = 40.0
 _FINE_PITCH = 12.0
 
@@ -31,9 +35,9 @@ class WallMask:
 def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0) -> WallMask:
     """Walls of `light` (H, W) where cells are about `pitch` pixels apart and walls are brighter (or darker) than cells.
 
-    The local mean over 1.5 pitches flattens the light without a model of it. The threshold lies midway between the
-    local levels of wall and cell, each a mean weighted with its own difference, so thin and thick walls both keep
-    their width; it is never below NOISE_FLOOR times the noise. `contrast`, where it is known, allows a faster way above 40 levels.
+    The local mean over 1.5 pitches flattens the light without a model of it. The threshold lies a third of the
+    way from the local level of cells to that of walls, each a mean weighted with its own difference, whatever share of
+    the area is wall; it is never below NOISE_FLOOR times the noise. `contrast`, where it is known, allows a faster way above 40 levels.
     """
     # Grey levels are kept in 1/32 where steps of one would show in the threshold; bytes are faster for the rest.
     unit = 1 if contrast > _BYTE_CONTRAST else 32
@@ -48,8 +52,10 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     if not bright:
         local = -local
     noise = _noise_level(smooth, pitch, unit)
-    upper, lower = _levels(local, pitch / step)
-    offset = np.maximum(0.5 * (upper - lower), NOISE_FLOOR * noise)
+    upper, lower, region = _levels(local, pitch / step)
+    # All three count from the level of cells, which on a bare table is the noise below its mean.
+    rise = np.maximum(_RISE * (upper + lower), np.maximum(_REGION_RISE * region, NOISE_FLOOR * noise))
+    offset = rise - lower
     offset = cv2.copyMakeBorder(
         offset, 0, grid[1] - offset.shape[0], 0, grid[0] - offset.shape[1], cv2.BORDER_REPLICATE
     )
@@ -83,30 +89,40 @@ def _noise_level(smooth: NDArray[np.uint8 | np.uint16], pitch: float, unit: int)
     return max(quiet, 0.3 * unit)
 
 
-def _levels(local: Float, pitch: float) -> tuple[Float, Float]:
-    """Local level of walls above, and of cells below, the local mean; `pitch` in samples of `local`."""
+def _levels(local: Float, pitch: float) -> tuple[Float, Float, Float]:
+    """Local level of walls above, and of cells below, the local mean, and the level of walls of the wider region.
+
+    `pitch` in samples of `local`. The region spans a dozen pitches: on the table beside a block it still holds the
+    level of the block's walls, so that the table's own texture stays below the threshold.
+    """
     # Glints and dust would raise the threshold around them and wipe out faint walls nearby.
     above = np.minimum(np.maximum(local, 0), _typical_peak(local, pitch))
-    below = np.maximum(-local, 0)
+    square = above * above
     window = _odd(1.3 * pitch)
-    return _weighted_mean(above, window), _weighted_mean(below, window)
+    upper = _ratio(cv2.blur(square, (window, window)), cv2.blur(above, (window, window)))
+    below = np.maximum(-local, 0)
+    lower = _ratio(cv2.blur(below * below, (window, window)), cv2.blur(below, (window, window)))
+    coarse = max(1, round(pitch / 2))
+    grid = (max(1, local.shape[1] // coarse), max(1, local.shape[0] // coarse))
+    wide = (_odd(12 * pitch / coarse),) * 2
+    sums = [cv2.blur(cv2.resize(part, grid, interpolation=cv2.INTER_AREA), wide) for part in (square, above)]
+    region = cv2.resize(_ratio(*sums), (local.shape[1], local.shape[0]), interpolation=cv2.INTER_LINEAR)
+    return upper, lower, np.asarray(region, np.float32)
 
 
 def _typical_peak(local: Float, pitch: float) -> float:
-    """What four fifths of the walls' peaks over tiles of a pitch stay below."""
+    """What half of the walls' peaks over tiles of a pitch stay below."""
     size = max(2, round(pitch))
     rows, columns = local.shape[0] // size, local.shape[1] // size
     if rows < 2 or columns < 2:
         return float(local.max())
     tiles = local[: rows * size, : columns * size].reshape(rows, size, columns, size).max(axis=(1, 3))
     walls = tiles[tiles > 0.25 * tiles.max()]
-    return float(np.quantile(walls, 0.8))
+    return float(np.quantile(walls, 0.5))
 
 
-def _weighted_mean(values: Float, window: int) -> Float:
-    """Mean over a window weighted by the values themselves; 0 where they vanish."""
-    weight = cv2.blur(values, (window, window), borderType=cv2.BORDER_REFLECT)
-    square = cv2.blur(values * values, (window, window), borderType=cv2.BORDER_REFLECT)
+def _ratio(square: Float, weight: Float) -> Float:
+    """Mean of values weighted by themselves from the sums of their squares and of themselves; 0 where they vanish."""
     return np.asarray(square / np.maximum(weight, 1e-3), np.float32)
 
 

@@ -44,12 +44,13 @@ class CoarseRing:
 class CoarseBlock:
     """Rings (exterior first) and the maps that place any point: signed distance and nearest ring vertex.
 
-    depth: coarse grid, float32, mask pixels, positive inside. nearest: coarse grid, int32, index into all vertices of
+    filled, walls: coarse grid, uint8, 1 in the block, and where it has walls. depth: coarse grid, float32, mask pixels, positive inside. nearest: coarse grid, int32, index into all vertices of
     all rings one after the other. step: mask pixels a coarse sample.
     """
 
     rings: tuple[CoarseRing, ...]
     filled: Gray
+    walls: Gray
     depth: NDArray[np.float32]
     nearest: NDArray[np.int32]
     step: int
@@ -81,6 +82,10 @@ class CoarseBlock:
         arc = (arcs[index] + np.clip(along, -self.step, self.step)) % lengths
         return ring, arc, normals[index]
 
+    def unpadded(self, grid: Gray) -> Gray:
+        """A map on the coarse grid without its margin: sample (i, j) covers mask pixels from step · i and step · j on."""
+        return grid[_PAD:-_PAD, _PAD:-_PAD]
+
     def _nearest_at(self, points: Points) -> NDArray[np.int32]:
         grid = np.rint(self._grid(points)).astype(np.int64)
         height, width = self.nearest.shape
@@ -100,20 +105,30 @@ def coarse_block(mask: Gray, pitch: float) -> CoarseBlock:
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = cv2.copyMakeBorder(walls, _PAD, _PAD, _PAD, _PAD, cv2.BORDER_CONSTANT, value=0)
     samples = pitch / step
-    kept = _without_debris(walls, samples)
+    kept = _main_piece(walls, samples)
     filled = _largest(_close(kept, _CLOSING_PITCHES * samples))
-    if filled is None:
-        raise NoBlockFound("no block found: no group of walls reaches across a cell. Check the light and that a block lies in view")
     filled = _fill_missing_cells(filled, _HOLE_RADIUS_PITCHES * samples)
-    return _with_rings(filled, step, samples)
+    return _with_rings(filled, kept, step, samples)
 
 
-def _without_debris(walls: Gray, samples: float) -> Gray:
-    """Wall samples in components more than a cell across; `samples` is the pitch on the coarse grid."""
+def _main_piece(walls: Gray, samples: float) -> Gray:
+    """The walls of the largest piece of comb; `samples` is the pitch on the coarse grid. Raises NoBlockFound.
+
+    Chips and neighbouring pieces may lie nearer than the closing reaches, but do not hang together with the block. Only
+    where no piece holds most of the walls (a faint block seen in fragments) all fragments of several cells are taken.
+    """
     _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
-    large = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > 1.3 * samples
-    large[0] = False
-    return large.astype(np.uint8)[labels]
+    area = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
+    area[0] = 0
+    size = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
+    size[0] = 0
+    large = size > 3 * samples
+    if not large.any():
+        raise NoBlockFound(
+            "no block found: the walls seen form no piece more than three cells wide. Check the light and that a block lies in view"
+        )
+    kept = large & (area >= area.max()) if area.max() > 0.5 * area[large].sum() else large
+    return kept.astype(np.uint8)[labels]
 
 
 def _close(walls: Gray, radius: float) -> Gray:
@@ -125,10 +140,8 @@ def _close(walls: Gray, radius: float) -> Gray:
     return np.asarray(shrunk[pad:-pad, pad:-pad] | walls, np.uint8)
 
 
-def _largest(filled: Gray) -> Gray | None:
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=4)
-    if count < 2:
-        return None
+def _largest(filled: Gray) -> Gray:
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
     return np.asarray(labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])), np.uint8)
 
 
@@ -143,7 +156,7 @@ def _fill_missing_cells(filled: Gray, radius: float) -> Gray:
     return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
 
 
-def _with_rings(filled: Gray, step: int, samples: float) -> CoarseBlock:
+def _with_rings(filled: Gray, walls: Gray, step: int, samples: float) -> CoarseBlock:
     chains, hierarchy = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     order = sorted(range(len(chains)), key=lambda i: (hierarchy[0][i][3] >= 0, -len(chains[i])))
     pixels = [_turned(chains[i][:, 0, :], hierarchy[0][i][3] >= 0) for i in order if len(chains[i]) >= 8]
@@ -159,7 +172,7 @@ def _with_rings(filled: Gray, step: int, samples: float) -> CoarseBlock:
     inside = cv2.distanceTransform(filled, cv2.DIST_L2, 5)
     outside = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
     depth = np.where(filled > 0, inside - 0.5, 0.5 - outside).astype(np.float32) * step
-    return CoarseBlock(tuple(rings), filled, depth.astype(np.float32), index_of_label[labels], step)
+    return CoarseBlock(tuple(rings), filled, walls, depth.astype(np.float32), index_of_label[labels], step)
 
 
 def _ring(chain: NDArray[np.int32], is_hole: bool, step: int, samples: float) -> CoarseRing:

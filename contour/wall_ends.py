@@ -48,10 +48,11 @@ class Chains:
 
 def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
     """Boundary chains of the walls within about a pitch of the coarse edge."""
-    band = (np.abs(coarse.depth) < _BAND_PITCHES * pitch).astype(np.uint8) * 255
+    # A sample's margin around the block's own walls keeps chips that lie beside it out, and their thin ends in.
+    own = cv2.dilate(coarse.walls, np.ones((3, 3), np.uint8))
+    band = ((np.abs(coarse.depth) < _BAND_PITCHES * pitch) & (own > 0)).astype(np.uint8) * 255
     height, width = mask.shape
-    matrix = np.array([[1 / coarse.step, 0, 0.5 / coarse.step - 0.5 + 8], [0, 1 / coarse.step, 0.5 / coarse.step - 0.5 + 8]])
-    near = cv2.warpAffine(band, matrix, (width, height), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
+    near = np.repeat(np.repeat(coarse.unpadded(band), coarse.step, axis=0), coarse.step, axis=1)[:height, :width]
     chains, _ = cv2.findContours(cv2.bitwise_and(mask, near), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     kept = [chain for chain in chains if len(chain) >= 12]
     if not kept:

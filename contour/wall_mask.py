@@ -19,6 +19,8 @@ _MAP_SAMPLES = 8
 # Foils side by side differ in brightness by a factor of three: a threshold halfway up loses the dimmer ones.
 _RISE = 0.35
 _REGION_RISE = 0.25
+# Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
+_PICTURE_RISE = 0.2
 _BYTE_CONTRAST = 40.0
 _FINE_PITCH = 12.0
 
@@ -37,7 +39,8 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
 
     The local mean over 1.5 pitches flattens the light without a model of it. The threshold lies a third of the
     way from the local level of cells to that of walls, each a mean weighted with its own difference, whatever share of
-    the area is wall; it is never below NOISE_FLOOR times the noise. `contrast`, where it is known, allows a faster way above 40 levels.
+    the area is wall; it is never below NOISE_FLOOR times the noise. `contrast`, where it is known, sets one
+    more floor, and above 40 levels allows a faster way.
     """
     # Grey levels are kept in 1/32 where steps of one would show in the threshold; bytes are faster for the rest.
     unit = 1 if contrast > _BYTE_CONTRAST else 32
@@ -55,6 +58,7 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     upper, lower, region = _levels(local, pitch / step)
     # All three count from the level of cells, which on a bare table is the noise below its mean.
     rise = np.maximum(_RISE * (upper + lower), np.maximum(_REGION_RISE * region, NOISE_FLOOR * noise))
+    rise = np.maximum(rise, _PICTURE_RISE * contrast * unit)
     offset = rise - lower
     offset = cv2.copyMakeBorder(
         offset, 0, grid[1] - offset.shape[0], 0, grid[0] - offset.shape[1], cv2.BORDER_REPLICATE
@@ -64,7 +68,7 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
         threshold = cv2.resize(threshold, (light.shape[1], light.shape[0]), interpolation=cv2.INTER_LINEAR)
     mask = cv2.compare(smooth, threshold, cv2.CMP_GT if bright else cv2.CMP_LT)
     span = upper + lower
-    strong = span[span > 6 * noise]
+    strong = span[span > 0.5 * np.quantile(span[::4, ::4], 0.98)]
     typical = float(np.median(strong[:: max(1, strong.size // 4096)])) if strong.size else 0.0
     return WallMask(np.asarray(mask, np.uint8), noise / unit, typical / unit)
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.geometry import Ring
+from contour.outline_chains import Chain, free_curves
+from contour.outline_curves import curve_points
 from contour.outline_joints import Flags, Joints, arc_points, thinned, without_reversed
 from contour.outline_labelling import label
 from contour.outline_models import Complex, Real, distance
@@ -47,7 +49,12 @@ def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifi
     residual = residuals(witnesses, segments)
     inlier = _inlying(witnesses, residual)
     segments, found = without_reversed(witnesses, segments, inlier)
-    ring = polygon(witnesses, segments, found)
+    residual = residuals(witnesses, segments)
+    chains = free_curves(witnesses, segments, found, residual)
+    for chain in chains:
+        residual[chain.witnesses] = chain.curve.signed
+    inlier = _inlying(witnesses, residual)
+    ring = polygon(witnesses, segments, found, chains)
     vertices = np.column_stack([ring.real, ring.imag])
     if rectifier is not None:
         vertices = rectifier.unrectify(vertices)
@@ -90,22 +97,38 @@ def _inlying(witnesses: Witnesses, residual: Real) -> Flags:
     return inlying
 
 
-def polygon(witnesses: Witnesses, segments: Segments, found: Joints) -> Complex:
-    """Vertices of the ring, complex: joints, and between them the chords of arcs."""
+def polygon(witnesses: Witnesses, segments: Segments, found: Joints, chains: list[Chain]) -> Complex:
+    """Vertices of the ring, complex: joints, and between them the chords of arcs and curves."""
     if len(segments) == 1:
         return _alone(witnesses, segments)
+    curve_of = {chain.segments[0]: chain for chain in chains}
+    inside = {k for chain in chains for k in chain.segments[1:]}
     parts: list[Complex] = []
     begin = np.roll(found.begin, 1)
     for k in range(len(segments)):
+        if k in inside:
+            continue
+        chain = curve_of.get(k)
+        if chain is not None and chain.curve.closed:
+            return curve_points(chain.curve, _CHORD_PX, 0.0, chain.curve.length)
         parts.append(begin[k : k + 1])
-        if segments.bend[k]:
-            parts.append(arc_points(segments.models.take((k,)), complex(begin[k]), complex(found.end[k]), _CHORD_PX, False))
-        parts.append(found.end[k : k + 1])
+        if chain is not None:
+            parts.append(curve_points(chain.curve, _CHORD_PX, 0.0, chain.curve.length))
+        elif segments.bend[k]:
+            parts.append(arc_points(segments.models.take((k,)), complex(begin[k]), complex(found.end[k]), _run(witnesses, segments, k), _CHORD_PX, False))
+        last = k if chain is None else chain.segments[-1]
+        parts.append(found.end[last : last + 1])
     ring = np.concatenate(parts)
     return ring[thinned(ring, _FLAT_PX)]
+
+
+def _run(witnesses: Witnesses, segments: Segments, k: int) -> float:
+    """Length of segment k along the coarse ring."""
+    inner = (segments.first[k] + np.arange(segments.length[k])) % len(witnesses)
+    return float(witnesses.gap[inner].sum())
 
 
 def _alone(witnesses: Witnesses, segments: Segments) -> Complex:
     model = segments.models.take((0,))
     start = complex(witnesses.points[0])
-    return arc_points(model, start, start, _CHORD_PX, True)
+    return arc_points(model, start, start, 0.0, _CHORD_PX, True)

@@ -15,18 +15,19 @@ Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 _REACH = 1.7
 _SLACK = 0.8
 _SMOOTH_SINE = 0.26
+_ASIDE = 0.3
 
 
 @dataclass(frozen=True)
 class Joints:
     """Joint after each segment, shape (S,): where the segment ends and where the next begins (the same point but for a bevel).
 
-    smooth: the outline has no corner there.
+    kink: how far the two are from flowing into one another, the turn in radians; infinite where they step aside.
     """
 
     end: Complex
     begin: Complex
-    smooth: Flags
+    kink: Real
 
 
 def ends(witnesses: Witnesses, segments: Segments, inlier: Flags) -> tuple[Complex, Complex]:
@@ -73,7 +74,8 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
     blend = 0.5 * (one + other)
     end = np.where(corner, point, np.where(touching, blend, near))
     begin = np.where(corner, point, np.where(touching, blend, far))
-    return Joints(end, begin, touching & smooth_turn)
+    kink = np.abs(np.angle(one_tangent.conj() * other_tangent))
+    return Joints(end, begin, np.where(aside < _ASIDE * witnesses.pitch, kink, np.inf))
 
 
 def _intersections(models: Models, following: Models, near: Complex, far: Complex) -> tuple[Complex, Flags]:
@@ -120,29 +122,35 @@ def _dropped(segments: Segments, which: int) -> Segments:
     )
 
 
-def arc_points(model: Models, start: complex, stop: complex, tolerance: float, whole: bool) -> Complex:
-    """Inner vertices of an arc from `start` to `stop` (both on it, not included), chords within `tolerance` pixels.
+def sweep(model: Models, start: complex, stop: complex, run: float) -> tuple[float, float]:
+    """Angle at which an arc starts, about its origin, and the angle it turns through until `stop` (radians, left positive).
 
-    Vertices stand out by two thirds of the sagitta, so that the area under the chords is the arc's. A whole circle takes
-    `start` as its first vertex direction and includes it.
+    run: about how long the arc is, pixels; it tells a long way round from a short one back.
     """
     curvature = float(model.curvature)
     origin, tangent = complex(model.origin), complex(model.tangent)
     from_, to = (float(np.angle(1.0 + 1j * curvature * ((p - origin) * tangent.conjugate()))) for p in (start, stop))
-    sweep = to - from_
-    if whole:
-        sweep = float(np.copysign(2.0 * np.pi, curvature))
-    elif sweep * curvature < 0.0 and abs(sweep) > 0.5:
-        sweep += float(np.copysign(2.0 * np.pi, curvature))
-    most = 2.0 * float(np.sqrt(2.0 * tolerance * abs(curvature)))
-    chords = max(1, int(np.ceil(abs(sweep) / max(most, 1e-12) - 1e-9)))
-    if whole:
-        chords = max(chords, 8)
-    angle = from_ + sweep * np.arange(0 if whole else 1, chords) / chords
-    sagitta = (1.0 - np.cos(0.5 * sweep / chords)) / curvature if abs(curvature) > 1e-12 else 0.0
-    turned = np.exp(1j * angle)
+    turn = to - from_
+    return from_, turn + 2.0 * np.pi * round((curvature * run - turn) / (2.0 * np.pi))
+
+
+def arc_points(model: Models, start: complex, stop: complex, run: float, tolerance: float, whole: bool) -> Complex:
+    """Inner vertices of an arc from `start` to `stop` (both on it, not included), chords within `tolerance` pixels.
+
+    `run` is about the arc's length. Vertices stand out by two thirds of the sagitta, so that the area under the chords is the arc's. A whole circle takes
+    `start` as its first vertex direction and includes it.
+    """
+    curvature = float(model.curvature)
     if abs(curvature) < 1e-12:
         return np.zeros(0, dtype=np.complex128)
+    from_, turn = sweep(model, start, stop, run)
+    if whole:
+        turn = float(np.copysign(2.0 * np.pi, curvature))
+    most = 2.0 * float(np.sqrt(2.0 * tolerance * abs(curvature)))
+    chords = max(8 if whole else 1, int(np.ceil(abs(turn) / most - 1e-9)))
+    turned = np.exp(1j * (from_ + turn * np.arange(0 if whole else 1, chords) / chords))
+    sagitta = (1.0 - np.cos(0.5 * turn / chords)) / curvature
+    origin, tangent = complex(model.origin), complex(model.tangent)
     return origin + 1j * tangent * (1.0 - turned) / curvature - 1j * tangent * turned * (2.0 / 3.0) * sagitta
 
 
@@ -162,8 +170,3 @@ def thinned(ring: Complex, tolerance: float) -> Index:
             break
         keep = np.delete(keep, worst)
     return keep
-
-
-def thickness(values: Real) -> float:
-    """Largest absolute value, 0 for none."""
-    return float(np.abs(values).max(initial=0.0))

@@ -1,0 +1,154 @@
+"""Free smooth curves: a robust smoothing spline through the witnesses of segments that flow into one another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.outline_models import Complex, Real
+from contour.outline_witnesses import Witnesses, cost, weights
+
+_KNOT_PITCHES = 1.3
+_MOST_KNOTS = 64
+_ROUNDS = 3
+_SMOOTHNESS = 10.0 ** np.arange(-3.0, 5.0)
+# Each effective parameter counts a little more than once in the cross-validation: errors of neighbours are alike.
+_CAUTION = 1.4
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A uniform cubic B-spline in the plane over arc length 0..length, closed or open.
+
+    knots: control points, complex. freedom: effective number of its parameters. nats: what its witnesses cost.
+    """
+
+    knots: Complex
+    length: float
+    closed: bool
+    freedom: float
+    nats: float
+    signed: Real
+
+    def at(self, place: Real) -> tuple[Complex, Complex]:
+        """Points and derivatives (pixels per pixel of arc length) at `place`."""
+        basis, slope = _basis(place, len(self.knots), self.length, self.closed)
+        return basis @ self.knots, slope @ self.knots
+
+
+def smooth_curve(
+    witnesses: Witnesses,
+    index: np.ndarray[tuple[int], np.dtype[np.intp]],
+    guide: Complex,
+    place: Real,
+    length: float,
+    sound: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    closed: bool,
+) -> Curve:
+    """The spline through the witnesses at `index`, starting from `guide`: a first guess of each one's foot.
+
+    place: arc length of each foot, of `length` pixels. sound: the feet to start from. Each round moves the feet along the
+    curve and solves the robust penalised least squares of the distances across it, penalising the third derivative (a circle
+    costs little); smoothness by generalised cross-validation.
+    """
+    length = max(length, 1e-6)
+    count = int(np.clip(np.ceil(length / (_KNOT_PITCHES * witnesses.pitch)), 4, _MOST_KNOTS))
+    knots = count if closed else count + 3
+    basis, _ = _basis(place, knots, length, closed)
+    rough = _roughness(knots, closed)
+    penalty = rough.T @ rough
+    held = basis * (sound + 1e-3)[:, None]
+    control = np.linalg.solve(held.T @ basis + 1e-2 * penalty + 1e-9 * np.eye(knots), held.T @ guide)
+    points = witnesses.points[index]
+    place = np.clip(place, 0.0, length) if not closed else np.mod(place, length)
+    freedom, signed = float(knots), np.zeros(len(index))
+    for _ in range(_ROUNDS):
+        basis, slope = _basis(place, knots, length, closed)
+        foot, along = basis @ control, slope @ control
+        tangent = along / np.maximum(np.abs(along), 1e-9)
+        signed = -((points - foot) * tangent.conj()).imag
+        weight = weights(witnesses, signed, index)
+        control, freedom = _solved(basis, points, tangent, weight, penalty, control)
+        foot = basis @ control
+        place = place + ((points - foot) * tangent.conj()).real / np.maximum(np.abs(along), 0.3)
+        place = np.clip(place, 0.0, length) if not closed else np.mod(place, length)
+    basis, slope = _basis(place, knots, length, closed)
+    along = slope @ control
+    signed = -((points - basis @ control) * along.conj()).imag / np.maximum(np.abs(along), 1e-9)
+    return Curve(control, length, closed, freedom, float(cost(witnesses, signed, index).sum()), signed)
+
+
+def _solved(basis: Real, points: Complex, tangent: Complex, weight: Real, penalty: Real, control: Complex) -> tuple[Complex, float]:
+    """Control points and effective parameters of the penalised fit across the tangents, at the best of a few smoothnesses."""
+    knots = basis.shape[1]
+    normal = -1j * tangent
+    across = np.concatenate([basis * normal.real[:, None], basis * normal.imag[:, None]], axis=1)
+    along = np.concatenate([basis * tangent.real[:, None], basis * tangent.imag[:, None]], axis=1)
+    target = (points * normal.conj()).real
+    matrix = across.T @ (across * weight[:, None])
+    # A weak hold along the curve keeps control points from sliding; it does not move the curve.
+    hold = 1e-3 * (along.T @ (along * weight[:, None]))
+    slide = (basis @ control * tangent.conj()).real
+    right = across.T @ (weight * target) + 1e-3 * (along.T @ (weight * slide))
+    twice = np.zeros((2 * knots, 2 * knots))
+    twice[:knots, :knots] = penalty
+    twice[knots:, knots:] = penalty
+    scale = float(np.trace(matrix)) / max(float(np.trace(twice)), 1e-12)
+    held = matrix + hold + 1e-9 * scale * np.eye(2 * knots)
+    systems = held + (_SMOOTHNESS * scale)[:, None, None] * twice
+    solved = np.linalg.solve(systems, np.concatenate([right[:, None], matrix], axis=1)[None])
+    coefficients = solved[:, :, 0]
+    freedom = np.trace(solved[:, :, 1:], axis1=1, axis2=2)
+    misfit = ((target - coefficients @ across.T) ** 2 * weight).sum(axis=1)
+    active = float((weight > 0.0).sum())
+    score = misfit / np.maximum(active - _CAUTION * freedom, 0.05 * active) ** 2
+    best = int(score.argmin())
+    return coefficients[best, :knots] + 1j * coefficients[best, knots:], float(freedom[best])
+
+
+def _basis(place: Real, knots: int, length: float, closed: bool) -> tuple[Real, Real]:
+    """Values and derivatives of the uniform cubic B-splines at arc lengths `place`, shape (N, knots) each."""
+    spans = knots if closed else knots - 3
+    scaled = place * (spans / length)
+    span = np.clip(np.floor(scaled), 0, spans - 1).astype(np.intp)
+    t = (scaled - span)[:, None]
+    value = np.concatenate([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3], axis=1) / 6.0
+    slope = np.concatenate([-((1 - t) ** 2), 3 * t**2 - 4 * t, -3 * t**2 + 2 * t + 1, t**2], axis=1) * (0.5 * spans / length)
+    column = (span[:, None] + np.arange(4)) % knots
+    row = np.arange(len(place))[:, None]
+    basis, derivative = np.zeros((len(place), knots)), np.zeros((len(place), knots))
+    np.add.at(basis, (row, column), value)
+    np.add.at(derivative, (row, column), slope)
+    return basis, derivative
+
+
+def _roughness(knots: int, closed: bool) -> Real:
+    """Third differences of the control points, shape (knots or knots - 3, knots)."""
+    if closed:
+        unit = np.eye(knots)
+        return np.roll(unit, 2, axis=1) - 3.0 * np.roll(unit, 1, axis=1) + 3.0 * unit - np.roll(unit, -1, axis=1)
+    return np.diff(np.eye(knots), n=3, axis=0)
+
+
+def curve_points(curve: Curve, tolerance: float, start: float, stop: float) -> Complex:
+    """Few vertices along the curve between arc lengths `start` and `stop` (neither included unless closed), area kept.
+
+    Spacing goes with the root of the curvature, so that each chord's sagitta is about `tolerance` pixels; each vertex stands
+    out by two thirds of it.
+    """
+    count = max(int((stop - start) / 1.5), 16)
+    place = np.linspace(start, stop, count + 1)
+    point, along = curve.at(place)
+    heading = np.unwrap(np.angle(along))
+    step = np.abs(np.diff(point))
+    bend = np.gradient(heading, np.concatenate([[0.0], np.cumsum(np.maximum(step, 1e-9))]))
+    density = np.sqrt(np.abs(bend) / (8.0 * tolerance))
+    density = np.maximum(density, 1e-4)
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * step)])
+    chords = max(int(np.ceil(total[-1])), 8 if curve.closed else 1)
+    mark = total[-1] * np.arange(0 if curve.closed else 1, chords) / chords
+    chosen = np.interp(mark, total, place)
+    point, along = curve.at(chosen)
+    sagitta = np.interp(chosen, place, bend) / 8.0 * (total[-1] / chords / np.interp(chosen, place, density)) ** 2
+    return point - 1j * along / np.maximum(np.abs(along), 1e-9) * (2.0 / 3.0) * sagitta

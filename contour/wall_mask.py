@@ -18,6 +18,8 @@ NOISE_FLOOR = 4.0
 _MAP_SAMPLES = 8
 # Foils side by side differ in brightness by a factor of three: a threshold halfway up loses the dimmer ones.
 _RISE = 0.35
+# Walls of fine cells run into each other at that height.
+_FINE_RISE = 0.15
 _REGION_RISE = 0.25
 # Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
 _PICTURE_RISE = 0.2
@@ -57,7 +59,8 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     noise = _noise_level(smooth, pitch, unit)
     upper, lower, region = _levels(local, pitch / step)
     # All three count from the level of cells, which on a bare table is the noise below its mean.
-    rise = np.maximum(_RISE * (upper + lower), np.maximum(_REGION_RISE * region, NOISE_FLOOR * noise))
+    share = _RISE + _FINE_RISE * float(np.clip((16 - pitch) / 8, 0, 1))
+    rise = np.maximum(share * (upper + lower), np.maximum(_REGION_RISE * region, NOISE_FLOOR * noise))
     rise = np.maximum(rise, _PICTURE_RISE * contrast * unit)
     offset = rise - lower
     offset = cv2.copyMakeBorder(

@@ -17,7 +17,9 @@ _STEP = 0.5
 _TURNS = 4
 # A wall that meets the cut at less than 20° has no end worth the name; it is fitted as if it met it so.
 _STEEPEST = 0.34
-_HEIGHT_SAMPLES = 2.0
+# Of the usual height: how walls differ in it, and what a blurred step leaves unexplained of a profile.
+_HEIGHT_SPREAD = 0.4
+_MISFIT = 0.1
 
 
 @dataclass(frozen=True)
@@ -66,11 +68,12 @@ def centred_axes(light: Gray, tip: Points, axis: Points, wall: float, straight: 
 @dataclass(frozen=True)
 class EndModel:
     """What is known of all ends beforehand: true wall width and blur in pixels (blur None: to be fitted), the wall's usual height
-    above the background (None: free), how far profiles run behind and beyond the tip, +1 for bright walls or −1."""
+    above the background (None: free), noise in grey levels, how far profiles run behind and beyond the tip, +1 for bright walls or −1."""
 
     width: float
     blur: float | None
     height: float | None
+    noise: float
     reach: float
     out: float
     sign: float
@@ -124,9 +127,10 @@ def _fit(
         normal = weighted @ jacobian.transpose(0, 2, 1)
         right = (weighted @ residual[:, :, None])[:, :, 0]
         if model.height is not None:
-            # As if the height had been seen twice more; a stub too short for a plateau is held by its neighbours' height.
-            normal[:, 1, 1] += _HEIGHT_SAMPLES
-            right[:, 1] += _HEIGHT_SAMPLES * (model.height - height)
+            # A stub too short for a plateau is held by the usual height, loosely: walls differ in brightness.
+            weight_of_usual = ((model.noise / model.height) ** 2 + _MISFIT**2) / _HEIGHT_SPREAD**2
+            normal[:, 1, 1] += weight_of_usual
+            right[:, 1] += weight_of_usual * (model.height - height)
         normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(jacobian.shape[1])
         change = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
         bottom = bottom + change[:, 0]

@@ -69,7 +69,7 @@ def smooth_curve(
         tangent = along / np.maximum(np.abs(along), 1e-9)
         signed = -((points - foot) * tangent.conj()).imag
         weight = weights(witnesses, signed, index)
-        control, freedom = _solved(basis, points, tangent, weight, penalty, control)
+        control, freedom = _solved(basis, points, tangent, weight, rough, control)
         foot = basis @ control
         place = place + ((points - foot) * tangent.conj()).real / np.maximum(np.abs(along), 0.3)
         place = np.clip(place, 0.0, length) if not closed else np.mod(place, length)
@@ -79,32 +79,37 @@ def smooth_curve(
     return Curve(control, length, closed, freedom, float(cost(witnesses, signed, index).sum()), signed)
 
 
-def _solved(basis: Real, points: Complex, tangent: Complex, weight: Real, penalty: Real, control: Complex) -> tuple[Complex, float]:
-    """Control points and effective parameters of the penalised fit across the tangents, at the best of a few smoothnesses."""
-    knots = basis.shape[1]
+def _solved(basis: Real, points: Complex, tangent: Complex, weight: Real, rough: Real, control: Complex) -> tuple[Complex, float]:
+    """Control points and effective parameters of the penalised fit across the tangents, at the best of a few smoothnesses.
+
+    Each control point moves along one normal only, so that it cannot slide along the curve.
+    """
     normal = -1j * tangent
-    across = np.concatenate([basis * normal.real[:, None], basis * normal.imag[:, None]], axis=1)
-    along = np.concatenate([basis * tangent.real[:, None], basis * tangent.imag[:, None]], axis=1)
-    target = (points * normal.conj()).real
-    matrix = across.T @ (across * weight[:, None])
-    # A weak hold along the curve keeps control points from sliding; it does not move the curve.
-    hold = 1e-3 * (along.T @ (along * weight[:, None]))
-    slide = (basis @ control * tangent.conj()).real
-    right = across.T @ (weight * target) + 1e-3 * (along.T @ (weight * slide))
-    twice = np.zeros((2 * knots, 2 * knots))
-    twice[:knots, :knots] = penalty
-    twice[knots:, knots:] = penalty
-    scale = float(np.trace(matrix)) / max(float(np.trace(twice)), 1e-12)
-    held = matrix + hold + 1e-9 * scale * np.eye(2 * knots)
-    systems = held + (_SMOOTHNESS * scale)[:, None, None] * twice
-    solved = np.linalg.solve(systems, np.concatenate([right[:, None], matrix], axis=1)[None])
-    coefficients = solved[:, :, 0]
+    lean = basis.T @ normal
+    ahead = np.roll(control, -1) - np.roll(control, 1)
+    lean = np.where(np.abs(lean) > 1e-6, lean, -1j * ahead)
+    lean = lean / np.maximum(np.abs(lean), 1e-12)
+    design = basis * (normal.conj()[:, None] * lean[None, :]).real
+    target = ((points - basis @ control) * normal.conj()).real
+    matrix = design.T @ (design * weight[:, None])
+    right = design.T @ (weight * target)
+    wiggle = rough * lean[None, :]
+    penalty = (wiggle.conj().T @ wiggle).real
+    pull = -(wiggle.conj().T @ (rough @ control)).real
+    scale = float(np.trace(matrix)) / max(float(np.trace(penalty)), 1e-12)
+    smoothness = _SMOOTHNESS * scale
+    systems = matrix + 1e-7 * scale * np.eye(len(control)) + smoothness[:, None, None] * penalty
+    sides = np.empty((len(smoothness), len(control), len(control) + 1))
+    sides[:, :, 0] = right + smoothness[:, None] * pull
+    sides[:, :, 1:] = matrix
+    solved = np.linalg.solve(systems, sides)
+    moves = solved[:, :, 0]
     freedom = np.trace(solved[:, :, 1:], axis1=1, axis2=2)
-    misfit = ((target - coefficients @ across.T) ** 2 * weight).sum(axis=1)
+    misfit = ((target - moves @ design.T) ** 2 * weight).sum(axis=1)
     active = float((weight > 0.0).sum())
     score = misfit / np.maximum(active - _CAUTION * freedom, 0.05 * active) ** 2
     best = int(score.argmin())
-    return coefficients[best, :knots] + 1j * coefficients[best, knots:], float(freedom[best])
+    return control + lean * moves[best], float(freedom[best])
 
 
 def _basis(place: Real, knots: int, length: float, closed: bool) -> tuple[Real, Real]:

@@ -16,7 +16,7 @@ _SHARE_OUTSIDE = 0.006
 _LEAST_SIGMA_PX = 0.04
 _DEEPEST = 1.3
 # How much cheaper an outermost point's depth is: the wall behind a zigzag edge lies anywhere within half a pitch.
-_SERRATION = 0.12
+_SERRATION = 0.03
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
         witnesses,
         inner=inner,
         outer=outer,
-        cap_inside=np.where(witnesses.inner > witnesses.outer * 1.01, 2.0, np.clip(inside, 3.0, 4.5)),
+        cap_inside=np.where(witnesses.inner > witnesses.outer * 1.01, 3.5, np.clip(inside, 3.0, 4.5)),
         cap_outside=np.clip(outside, 6.0, 11.0),
     )
 

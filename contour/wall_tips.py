@@ -7,9 +7,12 @@ from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
 from contour.geometry import Contour
+from contour.material_edge import material_edge
 from contour.outline_fit import FittedRing, fit_ring
 from contour.tracing import OnStage, Polarity, Rectifier, Trace, TraceSettings
+from contour.wall_cells import probe
 from contour.wall_evidence import BlockEvidence, RingEvidence
+from contour.wall_light import wall_light
 from contour.wall_witnesses import see_block
 
 __all__ = ["see_block", "wall_tips"]
@@ -33,6 +36,8 @@ def wall_tips(
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `on_stage` hears
     "mask" and "trace". Raises PictureError, NoBlockFound.
     """
+    if settings.edge == "cells":
+        return _closed_cells(picture, settings, on_stage)
     seen = see_block(picture, settings.polarity, lambda: on_stage("mask"))
     rings = [_fitted(ring, seen, rectifier) for ring in seen.rings]
     exterior = rings[0]
@@ -46,6 +51,15 @@ def wall_tips(
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
     on_stage("trace")
     return Trace("wall-tips", polarity, seen.pitch_px, contour, max(_uncertainty(ring, seen) for ring in rings))
+
+
+def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
+    """The serrated boundary of a block whose border cells are closed; that it is a block at all, its cells must show."""
+    cells = probe(wall_light(picture), settings.polarity)
+    on_stage("mask")
+    contour = material_edge(picture, cells.pitch)
+    on_stage("trace")
+    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch, contour)
 
 
 def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:

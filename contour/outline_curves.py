@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from contour.outline_models import Complex, Real
+from contour.outline_models import Complex, Index, Real
 from contour.outline_witnesses import Witnesses, cost, weights
 
 _KNOT_PITCHES = 1.3
-_MOST_KNOTS = 64
+_MOST_KNOTS = 60
 _ROUNDS = 3
 _SMOOTHNESS = 10.0 ** np.arange(-3.0, 5.0)
 # Each effective parameter counts a little more than once in the cross-validation: errors of neighbours are alike.
@@ -33,8 +35,9 @@ class Curve:
 
     def at(self, place: Real) -> tuple[Complex, Complex]:
         """Points and derivatives (pixels per pixel of arc length) at `place`."""
-        basis, slope = _basis(place, len(self.knots), self.length, self.closed)
-        return basis @ self.knots, slope @ self.knots
+        column, value, slope = _basis(place, len(self.knots), self.length, self.closed)
+        near = self.knots[column]
+        return (value * near).sum(axis=1), (slope * near).sum(axis=1)
 
 
 def smooth_curve(
@@ -55,77 +58,88 @@ def smooth_curve(
     length = max(length, 1e-6)
     count = int(np.clip(np.ceil(length / (_KNOT_PITCHES * witnesses.pitch)), 4, _MOST_KNOTS))
     knots = count if closed else count + 3
-    basis, _ = _basis(place, knots, length, closed)
     rough = _roughness(knots, closed)
-    penalty = rough.T @ rough
-    held = basis * (sound + 1e-3)[:, None]
-    control = np.linalg.solve(held.T @ basis + 1e-2 * penalty + 1e-9 * np.eye(knots), held.T @ guide)
+    column, value, _ = _basis(place, knots, length, closed)
+    bent = rough.T @ rough
+    hold = np.where(sound, 1.0, 1e-3)
+    control = np.linalg.solve(
+        _gathered(column, value, value * hold[:, None], knots) + 1e-2 * bent + 1e-9 * np.eye(knots),
+        _summed(column, value * (hold * guide)[:, None], knots),
+    )
     points = witnesses.points[index]
-    place = np.clip(place, 0.0, length) if not closed else np.mod(place, length)
-    freedom, signed = float(knots), np.zeros(len(index))
+    freedom = float(knots)
     for _ in range(_ROUNDS):
-        basis, slope = _basis(place, knots, length, closed)
-        foot, along = basis @ control, slope @ control
+        place = np.mod(place, length) if closed else np.clip(place, 0.0, length)
+        column, value, slope = _basis(place, knots, length, closed)
+        foot, along = (value * control[column]).sum(axis=1), (slope * control[column]).sum(axis=1)
         tangent = along / np.maximum(np.abs(along), 1e-9)
         signed = -((points - foot) * tangent.conj()).imag
         weight = weights(witnesses, signed, index)
-        control, freedom = _solved(basis, points, tangent, weight, rough, control)
-        foot = basis @ control
+        control, freedom = _solved(column, value, signed, tangent, weight, bent, control)
+        foot = (value * control[column]).sum(axis=1)
         place = place + ((points - foot) * tangent.conj()).real / np.maximum(np.abs(along), 0.3)
-        place = np.clip(place, 0.0, length) if not closed else np.mod(place, length)
-    basis, slope = _basis(place, knots, length, closed)
-    along = slope @ control
-    signed = -((points - basis @ control) * along.conj()).imag / np.maximum(np.abs(along), 1e-9)
-    return Curve(control, length, closed, freedom, float(cost(witnesses, signed, index).sum()), signed)
+    curve = Curve(control, length, closed, freedom, 0.0, np.zeros(len(index)))
+    foot, along = curve.at(np.mod(place, length) if closed else np.clip(place, 0.0, length))
+    signed = -((points - foot) * along.conj()).imag / np.maximum(np.abs(along), 1e-9)
+    return replace(curve, signed=signed, nats=float(cost(witnesses, signed, index).sum()))
 
 
-def _solved(basis: Real, points: Complex, tangent: Complex, weight: Real, rough: Real, control: Complex) -> tuple[Complex, float]:
+def _solved(
+    column: Index, value: Real, signed: Real, tangent: Complex, weight: Real, bent: Real, control: Complex
+) -> tuple[Complex, float]:
     """Control points and effective parameters of the penalised fit across the tangents, at the best of a few smoothnesses.
 
     Each control point moves along one normal only, so that it cannot slide along the curve.
     """
+    knots = len(control)
     normal = -1j * tangent
-    lean = basis.T @ normal
-    ahead = np.roll(control, -1) - np.roll(control, 1)
-    lean = np.where(np.abs(lean) > 1e-6, lean, -1j * ahead)
+    lean = _summed(column, value * normal[:, None], knots)
+    lean = np.where(np.abs(lean) > 1e-6, lean, -1j * (np.roll(control, -1) - np.roll(control, 1)))
     lean = lean / np.maximum(np.abs(lean), 1e-12)
-    design = basis * (normal.conj()[:, None] * lean[None, :]).real
-    target = ((points - basis @ control) * normal.conj()).real
-    matrix = design.T @ (design * weight[:, None])
-    right = design.T @ (weight * target)
-    wiggle = rough * lean[None, :]
-    penalty = (wiggle.conj().T @ wiggle).real
-    pull = -(wiggle.conj().T @ (rough @ control)).real
+    design = value * (normal.conj()[:, None] * lean[column]).real
+    matrix = _gathered(column, design, design * weight[:, None], knots)
+    right = _summed(column, design * (weight * signed)[:, None], knots)
+    penalty = bent * (lean.conj()[:, None] * lean[None, :]).real
+    pull = -(lean.conj() * (bent * control[None, :]).sum(axis=1)).real
     scale = float(np.trace(matrix)) / max(float(np.trace(penalty)), 1e-12)
     smoothness = _SMOOTHNESS * scale
-    systems = matrix + 1e-7 * scale * np.eye(len(control)) + smoothness[:, None, None] * penalty
-    sides = np.empty((len(smoothness), len(control), len(control) + 1))
+    sides = np.empty((len(smoothness), knots, knots + 1))
     sides[:, :, 0] = right + smoothness[:, None] * pull
     sides[:, :, 1:] = matrix
-    solved = np.linalg.solve(systems, sides)
+    solved = np.linalg.solve(matrix + 1e-7 * scale * np.eye(knots) + smoothness[:, None, None] * penalty, sides)
     moves = solved[:, :, 0]
     freedom = np.trace(solved[:, :, 1:], axis1=1, axis2=2)
-    misfit = ((target - moves @ design.T) ** 2 * weight).sum(axis=1)
+    misfit = ((signed - (moves[:, column] * design).sum(axis=2)) ** 2 * weight).sum(axis=1)
     active = float((weight > 0.0).sum())
     score = misfit / np.maximum(active - _CAUTION * freedom, 0.05 * active) ** 2
     best = int(score.argmin())
     return control + lean * moves[best], float(freedom[best])
 
 
-def _basis(place: Real, knots: int, length: float, closed: bool) -> tuple[Real, Real]:
-    """Values and derivatives of the uniform cubic B-splines at arc lengths `place`, shape (N, knots) each."""
+def _gathered(column: Index, one: Real, other: Real, knots: int) -> Real:
+    """one.T @ other for rows of four entries at `column`, shape (knots, knots), without the dense product."""
+    place = column[:, :, None] * knots + column[:, None, :]
+    product = one[:, :, None] * other[:, None, :]
+    return np.bincount(place.ravel(), product.ravel(), knots * knots).reshape(knots, knots)
+
+
+def _summed(column: Index, entries: NDArray[Any], knots: int) -> NDArray[Any]:
+    """Sums of the entries of each column, shape (knots,), real or complex as they are."""
+    flat = column.ravel()
+    if np.iscomplexobj(entries):
+        return np.bincount(flat, entries.real.ravel(), knots) + 1j * np.bincount(flat, entries.imag.ravel(), knots)
+    return np.bincount(flat, entries.ravel(), knots)
+
+
+def _basis(place: Real, knots: int, length: float, closed: bool) -> tuple[Index, Real, Real]:
+    """The four uniform cubic B-splines that live at each arc length: their columns, values and derivatives, shape (N, 4)."""
     spans = knots if closed else knots - 3
     scaled = place * (spans / length)
     span = np.clip(np.floor(scaled), 0, spans - 1).astype(np.intp)
     t = (scaled - span)[:, None]
     value = np.concatenate([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3], axis=1) / 6.0
     slope = np.concatenate([-((1 - t) ** 2), 3 * t**2 - 4 * t, -3 * t**2 + 2 * t + 1, t**2], axis=1) * (0.5 * spans / length)
-    column = (span[:, None] + np.arange(4)) % knots
-    row = np.arange(len(place))[:, None]
-    basis, derivative = np.zeros((len(place), knots)), np.zeros((len(place), knots))
-    np.add.at(basis, (row, column), value)
-    np.add.at(derivative, (row, column), slope)
-    return basis, derivative
+    return (span[:, None] + np.arange(4)) % knots, value, slope
 
 
 def _roughness(knots: int, closed: bool) -> Real:

@@ -6,15 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.outline_models import Index, Models, distance, join, refine, through_pairs, through_triples
+from contour.outline_models import Complex, Index, Models, distance, join, refine, through_pairs, through_triples
 from contour.outline_witnesses import Witnesses, cost, weights, window_cost
 
-_SAMPLES = 16
-# Pairs and triples of sample places (fractions of the window) that a fit starts from; far ones fix direction best.
-_PAIRS = np.array([(0, 1), (0.07, 0.93), (0.13, 0.8), (0.2, 1), (0, 0.47), (0.53, 1), (0.27, 0.73), (0.33, 0.93), (0.07, 0.6), (0.4, 0.87)])
-_TRIPLES = np.array(
-    [(0, 0.47, 1), (0.07, 0.53, 0.93), (0.13, 0.6, 1), (0, 0.4, 0.8), (0.2, 0.6, 0.93), (0.07, 0.4, 0.73), (0.13, 0.47, 0.87), (0.27, 0.67, 1)]
+# Pairs and triples of sample places (shares of the window) that a fit starts from; far ones fix direction best.
+_PAIRS = np.array(
+    [(0.0, 1.0), (0.13, 0.87), (0.27, 1.0), (0.0, 0.6), (0.4, 1.0), (0.07, 0.8), (0.2, 0.67), (0.33, 0.93), (0.0, 0.47), (0.53, 1.0)]
 )
+_TRIPLES = np.array(
+    [(0.0, 0.47, 1.0), (0.13, 0.6, 1.0), (0.0, 0.4, 0.87), (0.13, 0.53, 0.87), (0.27, 0.67, 1.0), (0.0, 0.33, 0.73)]
+    + [(0.07, 0.53, 0.93), (0.2, 0.6, 0.93), (0.07, 0.4, 0.8), (0.2, 0.47, 0.8)]
+)
+# Sharper bends than these (radius in pitches) show in no more than two or three witnesses: corners, dents and debris.
+_LEAST_RADIUS_CONVEX = 1.25
+_LEAST_RADIUS_CONCAVE = 1.05
 _REDUNDANT = 2.0
 
 
@@ -47,8 +52,8 @@ def gather(parts: list[Proposals]) -> Proposals:
     )
 
 
-def samples(count: int, first: Index, length: Index, places: int = _SAMPLES) -> Index:
-    """Up to `places` witness indices spread over each stretch, shape (K, places), cyclic."""
+def samples(count: int, first: Index, length: Index, places: int) -> Index:
+    """`places` witness indices spread over each stretch, shape (K, places), cyclic; short stretches repeat some."""
     share = np.linspace(0.0, 1.0, places)
     offset = np.rint(share[None, :] * np.maximum(length[:, None] - 1, 0)).astype(np.intp)
     return (first[:, None] + offset) % count
@@ -58,10 +63,10 @@ def propose(witnesses: Witnesses) -> Proposals:
     """Lines and arcs on windows of 4, 8, 16, ... witnesses and on the whole ring, without those a longer window explains."""
     count = len(witnesses)
     sizes = [size for size in (4, 6, *(8 * 2**k for k in range(11))) if size < count] + [count]
+    levels = [level for group in ([z for z in sizes if z <= 8], [z for z in sizes if z > 8]) for level in _levels(witnesses, group)]
     kept: list[Proposals] = []
     longer: list[Proposals] = []
-    for size in reversed(sizes):
-        level = [_window_fits(witnesses, size, bend) for bend in ((False, True) if size >= 6 else (False,))]
+    for level in reversed(levels):
         for fits in level:
             worth = fits.gain > 0.0
             for other in longer:
@@ -71,37 +76,69 @@ def propose(witnesses: Witnesses) -> Proposals:
     return gather(kept)
 
 
-def _window_fits(witnesses: Witnesses, size: int, bend: bool) -> Proposals:
+def _levels(witnesses: Witnesses, sizes: list[int]) -> list[list[Proposals]]:
+    """Window fits of each size, lines and (from six witnesses on) arcs, all fitted in one batch."""
+    if not sizes:
+        return []
     count = len(witnesses)
-    stride = max(1, size // 4) if size < count else count
-    return window_fits(witnesses, np.arange(0, count, stride, dtype=np.intp), size, bend)
+    plan = [
+        (np.arange(0, count, _stride(size, count), dtype=np.intp), size, bend)
+        for size in sizes
+        for bend in ((False, True) if size >= 6 else (False,))
+    ]
+    first = np.concatenate([begins for begins, _, _ in plan])
+    length = np.concatenate([np.full(len(begins), size) for begins, size, _ in plan])
+    bends = np.concatenate([np.full(len(begins), bend) for begins, _, bend in plan])
+    fits = window_fits(witnesses, first, length, bends, 8 if sizes[-1] <= 8 else 16)
+    levels: dict[int, list[Proposals]] = {}
+    begin = 0
+    for begins, size, _ in plan:
+        levels.setdefault(size, []).append(fits.take(np.arange(begin, begin + len(begins))))
+        begin += len(begins)
+    return list(levels.values())
 
 
-def window_fits(witnesses: Witnesses, first: Index, size: int, bend: bool) -> Proposals:
-    """A robust line or arc for each window of `size` witnesses that begins at `first`: the best of a few, refined twice."""
-    count = len(witnesses)
-    length = np.full(len(first), size, dtype=np.intp)
-    places = min(size, _SAMPLES)
-    index = samples(count, first, length, places)
+def _stride(size: int, count: int) -> int:
+    return max(1, size // 4 if size != 6 else 2) if size < count else count
+
+
+def window_fits(
+    witnesses: Witnesses, first: Index, length: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]], places: int
+) -> Proposals:
+    """A robust line or arc for each window that begins at `first`: the best of a few through its points, refined twice."""
+    index = samples(len(witnesses), first, length, places)
     points = witnesses.points[index]
-    spots = np.rint((_TRIPLES if bend else _PAIRS) * (places - 1)).astype(np.intp)
-    picked = points[:, spots]
-    if bend:
-        starts = through_triples(picked[..., 0], picked[..., 1], picked[..., 2])
-    else:
-        starts = through_pairs(picked[..., 0], picked[..., 1])
-    signed = distance(starts.take((..., None)), points[:, None, :])
-    best = cost(witnesses, signed, index[:, None, :]).sum(axis=2).argmin(axis=1)
-    models = starts.take((np.arange(len(first)), best))
-    free = np.full(len(first), bend)
+    starts = _best_starts(witnesses, points, index, bend)
     for _ in range(2):
-        row_weights = weights(witnesses, distance(models.take((slice(None), None)), points), index)
-        models = refine(models, points, row_weights, free)
-    signed = distance(models.take((slice(None), None)), points)
+        starts = refine(starts, points, weights(witnesses, distance(starts.take((slice(None), None)), points), index), bend)
+    signed = distance(starts.take((slice(None), None)), points)
     saved = witnesses.cap_inside[index] - cost(witnesses, signed, index)
-    along = (models.tangent[:, None] * witnesses.normal[index].conj()).imag.mean(axis=1)
-    gain = np.where(along > 0.5 if not bend else along > 0.2, saved.sum(axis=1) * (size / places) - 8.0, -1.0)
-    return Proposals(models, free, first, length, gain)
+    along = (starts.tangent[:, None] * witnesses.normal[index].conj()).imag.mean(axis=1)
+    sound = (along > np.where(bend, 0.2, 0.5)) & gentle(witnesses, starts)
+    return Proposals(starts, bend, first, length, np.where(sound, saved.sum(axis=1) * (length / places) - 8.0, -1.0))
+
+
+def gentle(witnesses: Witnesses, models: Models) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """True where a model bends no more sharply than witnesses a pitch apart can show."""
+    turn = models.curvature * witnesses.pitch
+    mild: np.ndarray[tuple[int], np.dtype[np.bool_]] = (turn < 1.0 / _LEAST_RADIUS_CONVEX) & (turn > -1.0 / _LEAST_RADIUS_CONCAVE)
+    return mild
+
+
+def _best_starts(witnesses: Witnesses, points: Complex, index: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Models:
+    """Of the lines through pairs (circles through triples where `bend`) of each row's points, the cheapest."""
+    found = []
+    rows = [np.flatnonzero(~bend), np.flatnonzero(bend)]
+    for row, shares in zip(rows, (_PAIRS, _TRIPLES), strict=True):
+        own = points[row]
+        spots = np.rint(shares * (points.shape[1] - 1)).astype(np.intp)
+        picked = own[:, spots]
+        starts = through_triples(*np.moveaxis(picked, 2, 0)) if shares is _TRIPLES else through_pairs(*np.moveaxis(picked, 2, 0))
+        signed = distance(starts.take((..., None)), own[:, None, :])
+        best = cost(witnesses, signed, index[row][:, None, :]).sum(axis=2).argmin(axis=1)
+        found.append(starts.take((np.arange(len(row)), best)))
+    order = np.argsort(np.concatenate(rows), kind="stable")
+    return join(found).take(order)
 
 
 def _explained(witnesses: Witnesses, fits: Proposals, longer: Proposals) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contour.outline_labelling import PRICE_ARC, PRICE_LINE, Labelling
-from contour.outline_models import Index, Models, Real, distance, feet, refine, through_pairs, through_triples
-from contour.outline_proposals import Proposals, gather, window_fits
+from contour.outline_models import Index, Models, Real, distance, feet, join, refine, through_pairs, through_triples
+from contour.outline_proposals import Proposals, gather, gentle, window_fits
 from contour.outline_witnesses import Witnesses, cost, weights
 
 _MOST_PLACES = 160
@@ -69,26 +69,27 @@ def fitted(witnesses: Witnesses, models: Models, bend: np.ndarray[tuple[int], np
 def around(witnesses: Witnesses, segments: Segments) -> Proposals:
     """Proposals near the present segments: each alone, with its next, with its next two; each as a line and as an arc."""
     count, total = len(witnesses), len(segments)
-    parts: list[Proposals] = []
-    for span in range(1, min(3, total) + 1):
-        begin = np.arange(total)
+    starts: list[Models] = []
+    lengths: list[Index] = []
+    begin = np.arange(total)
+    spans = range(1, min(3, total) + 1)
+    for span in spans:
         last = (begin + span - 1) % total
         length = (segments.first[last] - segments.first) % count + segments.length[last]
-        length = np.minimum(np.where(span == 1, segments.length, length), count)
-        for bend in (False, True):
-            starts = _starts(witnesses, segments, begin, last, bend)
-            free = np.full(total, bend)
-            models, saved = fitted(witnesses, starts, free, segments.first, length)
-            gain = saved - (PRICE_ARC if bend else PRICE_LINE)
-            if span == 1:
-                gain = np.where(segments.bend == bend, np.maximum(gain, 0.0) + 1e4, gain)
-            parts.append(Proposals(models, free, segments.first, length, gain))
-    if total > 1:
+        lengths += 2 * [np.minimum(np.where(span == 1, segments.length, length), count)]
+        starts += [_starts(witnesses, segments, begin, last, bend) for bend in (False, True)]
+    first = np.tile(segments.first, len(lengths))
+    free = np.tile(np.repeat([False, True], total), len(spans))
+    models, saved = fitted(witnesses, join(starts), free, first, np.concatenate(lengths))
+    gain = np.where(gentle(witnesses, models), saved - np.where(free, PRICE_ARC, PRICE_LINE), -1.0)
+    present = (np.arange(len(free)) < 2 * total) & (free == np.tile(segments.bend, len(lengths)))
+    gain = np.where(present, np.maximum(gain, 0.0) + 1e4, gain)
+    parts = [Proposals(models, free, first, np.concatenate(lengths), gain)]
+    if total > 1 and count > 9:
         # What hides between two segments: a short edge or a rounding that no window of the first round fell upon.
-        for size in (5, 9):
-            if size < count:
-                begins = np.unique((segments.first - size // 2) % count)
-                parts += [window_fits(witnesses, begins, size, bend) for bend in (False, True)]
+        size = np.repeat([5, 9, 5, 9], total)
+        begins = (np.tile(segments.first, 4) - size // 2) % count
+        parts.append(window_fits(witnesses, begins, size, np.repeat([False, True], 2 * total), 9))
     merged = gather(parts)
     return merged.take(merged.gain > 0.0)
 

@@ -24,7 +24,7 @@ class Witnesses:
     """Witnesses of one ring in travel order, shape (N,) each, in pixels of the fitting plane.
 
     points and normal (outwards) are complex. inner, outer: standard deviations for points inside and outside of the outline.
-    cap_inside, cap_outside: the most a point costs there (nats). clean: seen well enough to measure the noise by.
+    cap_inside, cap_outside: the most a point costs there (nats). clean: a wall end, fit to measure the noise by.
     gap: distance to the next witness along the coarse ring (cyclic).
     """
 
@@ -59,7 +59,7 @@ def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None
     gap = np.diff(evidence.position, append=evidence.position[:1] + length)
     inner = np.where(outermost, np.maximum(sigma, _SERRATION * pitch_px), sigma)
     witnesses = Witnesses(
-        z, outwards, inner, sigma, inner, inner, evidence.kind == WitnessKind.CLEAN, np.maximum(gap, 0.0), pitch_px
+        z, outwards, inner, sigma, inner, inner, ~outermost, np.maximum(gap, 0.0), pitch_px
     )
     return scaled(witnesses, 1.0)
 
@@ -111,7 +111,8 @@ def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(Non
 def noise_from_neighbours(witnesses: Witnesses) -> float:
     """Noise over the stated one, from how far each witness lies off the chord of its neighbours; between 0.5 and 3.
 
-    Reads the lower quarter of the deviations: a fifth of deep witnesses spoils about half of the triples.
+    The lesser of that and of its excess over the neighbours' own (which a bend does not raise). Reads the lower quarter of
+    the deviations: a fifth of deep witnesses spoils about half of the triples.
     """
     if len(witnesses) < 8:
         return 1.0
@@ -119,12 +120,15 @@ def noise_from_neighbours(witnesses: Witnesses) -> float:
     back, ahead = np.roll(points, 1), np.roll(points, -1)
     chord = ahead - back
     share = np.clip(((points - back) * chord.conj()).real / np.maximum(np.abs(chord) ** 2, 1e-12), 0.0, 1.0)
-    off = np.abs(points - back - share * chord)
-    spread = np.sqrt(witnesses.outer**2 + ((1 - share) * np.roll(witnesses.outer, 1)) ** 2 + (share * np.roll(witnesses.outer, -1)) ** 2)
+    off = ((points - back - share * chord) * witnesses.normal.conj()).real
     sound = witnesses.clean & np.roll(witnesses.clean, 1) & np.roll(witnesses.clean, -1)
     if sound.sum() < 8:
         return 1.0
-    return float(np.clip(np.quantile(off[sound] / spread[sound], 0.25) / 0.40, 0.5, 3.0))
+    simple = off / (witnesses.outer * np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
+    # 1.5, -1, -1, 1/4, 1/4 are the weights of five even neighbours in the excess: 2.09 is the root of their squares' sum.
+    excess = (off - 0.5 * (np.roll(off, 1) + np.roll(off, -1))) / (2.09 * witnesses.outer)
+    level = min(float(np.quantile(np.abs(simple[sound]), 0.25)), float(np.quantile(np.abs(excess[sound]), 0.25)))
+    return float(np.clip(level / 0.36, 0.5, 3.0))
 
 
 def noise_from_residuals(witnesses: Witnesses, signed: Real) -> float:

@@ -23,6 +23,8 @@ _CLOSING_PITCHES = 0.72
 _HOLE_RADIUS_PITCHES = 1.1
 _WALL_COVERAGE = 0.12
 _PAD = 8
+_SHEET_WALLS = 2.5
+_SHEET_CELLS = 2.5
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class CoarseBlock:
     """Rings (exterior first) and the maps that place any point: signed distance and nearest ring vertex.
 
     filled, walls: coarse grid, uint8, 1 in the block, and where it has walls. depth: coarse grid, float32, mask pixels, positive inside. nearest: coarse grid, int32, index into all vertices of
-    all rings one after the other. step: mask pixels a coarse sample.
+    all rings one after the other. step: mask pixels a coarse sample. leaves: whether the block runs out of the picture.
     """
 
     rings: tuple[CoarseRing, ...]
@@ -54,6 +56,7 @@ class CoarseBlock:
     depth: NDArray[np.float32]
     nearest: NDArray[np.int32]
     step: int
+    leaves: bool
 
     def depth_at(self, points: Points) -> NDArray[np.float64]:
         """Distance inside the coarse edge, negative outside, shape (N,), mask pixels, for points (N, 2) in mask pixels."""
@@ -95,20 +98,38 @@ class CoarseBlock:
         return (points + 0.5) / self.step - 0.5 + _PAD
 
 
-def coarse_block(mask: Gray, pitch: float) -> CoarseBlock:
-    """The largest comb in a wall mask (H, W), uint8, whose cells are `pitch` mask pixels apart. Raises NoBlockFound."""
+def coarse_block(mask: Gray, pitch: float, wall: float) -> CoarseBlock:
+    """The largest comb in a wall mask (H, W), uint8, with cells `pitch` and walls `wall` mask pixels wide. Raises NoBlockFound."""
     # A whole number of pixels a sample: averaging is several times faster so.
     step = max(1, round(pitch / _SAMPLES_PER_PITCH))
     wide, high = -mask.shape[1] % step, -mask.shape[0] % step
     even = cv2.copyMakeBorder(mask, 0, high, 0, wide, cv2.BORDER_CONSTANT, value=0)
     small = cv2.resize(even, (even.shape[1] // step, even.shape[0] // step), interpolation=cv2.INTER_AREA)
-    walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
+    walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8) & (1 - _sheets(small, pitch / step, wall / step))
     walls = cv2.copyMakeBorder(walls, _PAD, _PAD, _PAD, _PAD, cv2.BORDER_CONSTANT, value=0)
     samples = pitch / step
     kept = _main_piece(walls, samples)
     filled = _largest(_close(kept, _CLOSING_PITCHES * samples))
     filled = _fill_missing_cells(filled, _HOLE_RADIUS_PITCHES * samples)
+    if len(_sides(filled, samples)) == 4:
+        raise NoBlockFound(
+            "no block found: a pattern of cells runs out of the picture on all four sides, as a table's does. "
+            "Check that a block lies in view with table around it"
+        )
     return _with_rings(filled, kept, step, samples)
+
+
+def _sheets(small: Gray, samples: float, wall: float) -> Gray:
+    """Areas too wide for walls and too large for skins of single cells: a table as bright as the walls. 0 or 1."""
+    size = max(2, int(np.ceil(_SHEET_WALLS * wall)))
+    full = (small > 250).astype(np.uint8)
+    kernel, back = np.ones((size, size), np.uint8), (size - 1 - size // 2,) * 2
+    wide = cv2.dilate(cv2.erode(full, kernel), kernel, anchor=back)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(wide, connectivity=4)
+    large = stats[:, cv2.CC_STAT_AREA] > _SHEET_CELLS * samples * samples
+    large[0] = False
+    # Their rims, partly covered samples, go with them.
+    return np.asarray(cv2.dilate(large.astype(np.uint8)[labels], np.ones((5, 5), np.uint8)), np.uint8)
 
 
 def _main_piece(walls: Gray, samples: float) -> Gray:
@@ -138,6 +159,13 @@ def _close(walls: Gray, radius: float) -> Gray:
     grown = (cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5) <= radius).astype(np.uint8)
     shrunk = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > radius).astype(np.uint8)
     return np.asarray(shrunk[pad:-pad, pad:-pad] | walls, np.uint8)
+
+
+def _sides(filled: Gray, samples: float) -> list[int]:
+    """Sides of the picture (top, bottom, left, right as 0…3) that the block meets over more than half a pitch."""
+    inner = filled[_PAD:-_PAD, _PAD:-_PAD]
+    sides = (inner[:2].max(axis=0), inner[-2:].max(axis=0), inner[:, :2].max(axis=1), inner[:, -2:].max(axis=1))
+    return [number for number, side in enumerate(sides) if np.count_nonzero(side) > 0.5 * samples]
 
 
 def _largest(filled: Gray) -> Gray:
@@ -172,7 +200,8 @@ def _with_rings(filled: Gray, walls: Gray, step: int, samples: float) -> CoarseB
     inside = cv2.distanceTransform(filled, cv2.DIST_L2, 5)
     outside = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
     depth = np.where(filled > 0, inside - 0.5, 0.5 - outside).astype(np.float32) * step
-    return CoarseBlock(tuple(rings), filled, walls, depth.astype(np.float32), index_of_label[labels], step)
+    leaves = bool(_sides(filled, samples))
+    return CoarseBlock(tuple(rings), filled, walls, depth.astype(np.float32), index_of_label[labels], step, leaves)
 
 
 def _ring(chain: NDArray[np.int32], is_hole: bool, step: int, samples: float) -> CoarseRing:

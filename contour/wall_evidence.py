@@ -41,7 +41,10 @@ class RingEvidence:
 
 @dataclass(frozen=True)
 class BlockEvidence:
-    """All that was seen of one block: its rings (exterior first), cell pitch and wall width in pixels, polarity."""
+    """All that was seen of one block: its rings (exterior first), cell pitch and wall width in pixels, polarity.
+
+    leaves_picture: whether the block runs out of the picture, so that its rings follow the picture's border there.
+    """
 
     rings: tuple[RingEvidence, ...]
     pitch_px: float
@@ -50,3 +53,4 @@ class BlockEvidence:
     blur_px: float
     noise: float
     contrast: float
+    leaves_picture: bool = False

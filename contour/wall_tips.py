@@ -39,6 +39,8 @@ def wall_tips(
     if settings.edge == "cells":
         return _closed_cells(picture, settings, on_stage)
     seen = see_block(picture, settings.polarity, lambda: on_stage("mask"))
+    if seen.leaves_picture:
+        return _cut_off(picture, seen, on_stage)
     rings = [_fitted(ring, seen, rectifier) for ring in seen.rings]
     exterior = rings[0]
     if exterior.unseen_share > _MOST_UNSEEN:
@@ -51,6 +53,15 @@ def wall_tips(
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
     on_stage("trace")
     return Trace("wall-tips", polarity, seen.pitch_px, contour, max(_uncertainty(ring, seen) for ring in rings))
+
+
+def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
+    """The coarse outline of a block that leaves the picture, along the picture's border there: for a refusal to show."""
+    last = np.array([picture.shape[1] - 1.0, picture.shape[0] - 1.0])
+    rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
+    on_stage("trace")
+    polarity: Polarity = "dark" if seen.polarity == "dark" else "bright"
+    return Trace("wall-tips", polarity, seen.pitch_px, Contour(rings[0], tuple(rings[1:])), 0.5 * seen.pitch_px)
 
 
 def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:

@@ -41,7 +41,7 @@ def see_block(
     small = light if scale == 1 else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
     on_mask()
-    coarse = coarse_block(seen.mask, cells.pitch / scale)
+    coarse = coarse_block(seen.mask, cells.pitch / scale, cells.wall / scale)
     return _evidence(light, seen, coarse, cells, scale)
 
 
@@ -64,7 +64,7 @@ def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, sc
         out=float(np.clip(0.25 * cells.pitch, 3.0, 6.0)),
         sign=sign,
     )
-    model = _learn(light, tip, axis, normal, np.argsort(-straight), model, cells)
+    model = _learn(light, tip, axis, normal, np.argsort(-straight), model, cells, seen.contrast)
     fitted = fit_ends(light, tip, axis, normal, model)
     good = (fitted.sigma < 1.0) & (fitted.height > 0.4 * model.height)
     sigma = np.hypot(np.where(clean, 0.2, 0.3), fitted.sigma)
@@ -85,14 +85,16 @@ def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, sc
     sigma = np.concatenate([sigma, np.where(use, 0.5, 1.0)])
     rings = _rings(coarse, points, kinds, sigma, scale)
     polarity = "bright" if cells.bright else "dark"
-    return BlockEvidence(rings, cells.pitch, cells.wall, polarity, model.blur, seen.noise, seen.contrast)
+    return BlockEvidence(
+        rings, cells.pitch, cells.wall, polarity, model.blur, seen.noise, seen.contrast, coarse.leaves
+    )
 
 
-def _learn(light: Gray, tip: Points, axis: Points, normal: Points, longest: NDArray[np.int64], model: EndModel, cells: Cells) -> EndModel:
+def _learn(light: Gray, tip: Points, axis: Points, normal: Points, longest: NDArray[np.int64], model: EndModel, cells: Cells, contrast: float) -> EndModel:
     """The model with blur and height as the straightest ends show them."""
     some = longest[: max(5, min(64, len(longest) // 2))]
     if not len(some):
-        return replace(model, blur=0.9)
+        return replace(model, blur=0.9, height=contrast)
     free = fit_ends(light, tip[some], axis[some], normal[some], model)
     blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
     width = true_width(cells.wall, float(np.hypot(blur, _MASK_BLUR_PX)))

@@ -11,8 +11,8 @@ from contour.outline_proposals import Proposals
 from contour.outline_witnesses import Witnesses, cost
 
 # Nats for one more line or arc: its parameters at the precision the witnesses give, and where it begins.
-PRICE_LINE = 9.0
-PRICE_ARC = 13.0
+PRICE_LINE = 10.0
+PRICE_ARC = 15.0
 _CORNER = 1.0
 # A missing cell only ever makes a dent: a reflex corner has to be earned.
 _REFLEX_PER_RADIAN = 6.0

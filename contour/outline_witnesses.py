@@ -12,7 +12,7 @@ from contour.wall_evidence import RingEvidence, WitnessKind
 
 # Shares of witnesses that are no clean wall end, for the price of calling one an outlier.
 _SHARE_INSIDE = 0.20
-_SHARE_OUTSIDE = 0.006
+_SHARE_OUTSIDE = 0.02
 _LEAST_SIGMA_PX = 0.04
 _DEEPEST = 1.3
 # How much cheaper an outermost point's depth is: the wall behind a zigzag edge lies anywhere within half a pitch.
@@ -78,8 +78,8 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
         witnesses,
         inner=inner,
         outer=outer,
-        cap_inside=np.where(witnesses.inner > witnesses.outer * 1.01, 3.5, np.clip(inside, 3.0, 4.5)),
-        cap_outside=np.clip(outside, 6.0, 11.0),
+        cap_inside=np.where(witnesses.inner > witnesses.outer * 1.01, 3.0, np.clip(inside, 3.0, 4.5)),
+        cap_outside=np.clip(outside, 5.0, 6.5),
     )
 
 

@@ -30,7 +30,8 @@ class Chain:
 
 
 def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed: Real) -> list[Chain]:
-    """Chains whose spline is the shorter description: its misfit and parameters cost less than those of its lines and arcs.
+    """Chains whose spline is the shorter description: its misfit and parameters cost less than those of its lines and
+    arcs.
 
     A run that is not is cut at its sharpest joint, and its parts are tried.
     """
@@ -53,16 +54,14 @@ def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed:
     return chains
 
 
-def _as_curve(
-    witnesses: Witnesses, segments: Segments, members: list[int], closed: bool, signed: Real
-) -> Chain | None:
+def _as_curve(witnesses: Witnesses, segments: Segments, members: list[int], closed: bool, signed: Real) -> Chain | None:
     """The members as one curve, or None where lines and arcs are the shorter description."""
     index = np.concatenate([(segments.first[k] + np.arange(segments.length[k])) % len(witnesses) for k in members])
     if len(index) < 8:
         return None
     guide, place, length = _guide(witnesses, segments, members, index, closed)
     sound = np.abs(signed[index]) < 4.0 * witnesses.outer[index]
-    curve = smooth_curve(witnesses, index, guide, place, length, sound, closed)
+    curve = smooth_curve(witnesses, index, guide, place, length=length, sound=sound, closed=closed)
     price = sum(PRICE_ARC if segments.bend[k] else PRICE_LINE for k in members)
     present = float(cost(witnesses, signed[index], index).sum()) + price
     if curve.nats + _PRICE_OF_FREEDOM * curve.freedom < present:
@@ -74,7 +73,9 @@ def _links(witnesses: Witnesses, segments: Segments, found: Joints) -> Flags:
     """True where a segment may flow into the next: no sharp turn, an arc on either side, no long straight edge."""
     length = np.abs(found.end - np.roll(found.begin, 1))
     supple = segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch)
-    links: Flags = (found.kink < _SHARPEST) & supple & np.roll(supple, -1) & (segments.bend | np.roll(segments.bend, -1))
+    links: Flags = (
+        (found.kink < _SHARPEST) & supple & np.roll(supple, -1) & (segments.bend | np.roll(segments.bend, -1))
+    )
     return links
 
 
@@ -93,8 +94,11 @@ def _runs(segments: Segments, linked: Flags) -> list[tuple[list[int], bool]]:
     return found
 
 
-def _guide(witnesses: Witnesses, segments: Segments, members: list[int], index: Index, closed: bool) -> tuple[Complex, Real, float]:
-    """Feet of the witnesses at `index` on their own members, their arc length along them (rising), and the whole length."""
+def _guide(
+    witnesses: Witnesses, segments: Segments, members: list[int], index: Index, closed: bool
+) -> tuple[Complex, Real, float]:
+    """Feet of the witnesses at `index` on their own members, their arc length along them (rising), and the whole
+    length."""
     owner = np.repeat(members, segments.length[members])
     foot, tangent = feet(segments.models.take(owner), witnesses.points[index])
     way = np.roll(foot, -1) - foot

@@ -45,15 +45,16 @@ def smooth_curve(
     index: np.ndarray[tuple[int], np.dtype[np.intp]],
     guide: Complex,
     place: Real,
+    *,
     length: float,
     sound: np.ndarray[tuple[int], np.dtype[np.bool_]],
     closed: bool,
 ) -> Curve:
     """The spline through the witnesses at `index`, starting from `guide`: a first guess of each one's foot.
 
-    place: arc length of each foot, of `length` pixels. sound: the feet to start from. Each round moves the feet along the
-    curve and solves the robust penalised least squares of the distances across it, penalising the third derivative (a circle
-    costs little); smoothness by generalised cross-validation.
+    place: arc length of each foot, of `length` pixels. sound: the feet to start from. Each round moves the feet along
+    the curve and solves the robust penalised least squares of the distances across it, penalising the third
+    derivative (a circle costs little); smoothness by generalised cross-validation.
     """
     length = max(length, 1e-6)
     count = int(np.clip(np.ceil(length / (_KNOT_PITCHES * witnesses.pitch)), 4, _MOST_KNOTS))
@@ -75,7 +76,7 @@ def smooth_curve(
         tangent = along / np.maximum(np.abs(along), 1e-9)
         signed = -((points - foot) * tangent.conj()).imag
         weight = weights(witnesses, signed, index)
-        control, freedom = _solved(column, value, signed, tangent, weight, bent, control)
+        control, freedom = _solved((column, value), signed, tangent, weight=weight, bent=bent, control=control)
         foot = (value * control[column]).sum(axis=1)
         place = place + ((points - foot) * tangent.conj()).real / np.maximum(np.abs(along), 0.3)
     curve = Curve(control, length, closed, freedom, 0.0, np.zeros(len(index)))
@@ -85,12 +86,14 @@ def smooth_curve(
 
 
 def _solved(
-    column: Index, value: Real, signed: Real, tangent: Complex, weight: Real, bent: Real, control: Complex
+    basis: tuple[Index, Real], signed: Real, tangent: Complex, *, weight: Real, bent: Real, control: Complex
 ) -> tuple[Complex, float]:
-    """Control points and effective parameters of the penalised fit across the tangents, at the best of a few smoothnesses.
+    """Control points and effective parameters of the penalised fit across the tangents, at the best of a few
+    smoothnesses.
 
     Each control point moves along one normal only, so that it cannot slide along the curve.
     """
+    column, value = basis
     knots = len(control)
     normal = -1j * tangent
     lean = _summed(column, value * normal[:, None], knots)
@@ -120,7 +123,8 @@ def _gathered(column: Index, one: Real, other: Real, knots: int) -> Real:
     """one.T @ other for rows of four entries at `column`, shape (knots, knots), without the dense product."""
     place = column[:, :, None] * knots + column[:, None, :]
     product = one[:, :, None] * other[:, None, :]
-    return np.bincount(place.ravel(), product.ravel(), knots * knots).reshape(knots, knots)
+    sums: Real = np.bincount(place.ravel(), weights=product.ravel(), minlength=knots * knots).astype(np.float64)
+    return sums.reshape(knots, knots)
 
 
 def _summed(column: Index, entries: NDArray[Any], knots: int) -> NDArray[Any]:
@@ -132,13 +136,18 @@ def _summed(column: Index, entries: NDArray[Any], knots: int) -> NDArray[Any]:
 
 
 def _basis(place: Real, knots: int, length: float, closed: bool) -> tuple[Index, Real, Real]:
-    """The four uniform cubic B-splines that live at each arc length: their columns, values and derivatives, shape (N, 4)."""
+    """The four uniform cubic B-splines that live at each arc length: their columns, values and derivatives, shape (N,
+    4)."""
     spans = knots if closed else knots - 3
     scaled = place * (spans / length)
     span = np.clip(np.floor(scaled), 0, spans - 1).astype(np.intp)
     t = (scaled - span)[:, None]
-    value = np.concatenate([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3], axis=1) / 6.0
-    slope = np.concatenate([-((1 - t) ** 2), 3 * t**2 - 4 * t, -3 * t**2 + 2 * t + 1, t**2], axis=1) * (0.5 * spans / length)
+    value = (
+        np.concatenate([(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3], axis=1) / 6.0
+    )
+    slope = np.concatenate([-((1 - t) ** 2), 3 * t**2 - 4 * t, -3 * t**2 + 2 * t + 1, t**2], axis=1) * (
+        0.5 * spans / length
+    )
     return (span[:, None] + np.arange(4)) % knots, value, slope
 
 
@@ -153,8 +162,8 @@ def _roughness(knots: int, closed: bool) -> Real:
 def curve_points(curve: Curve, tolerance: float, start: float, stop: float) -> Complex:
     """Few vertices along the curve between arc lengths `start` and `stop` (neither included unless closed), area kept.
 
-    Spacing goes with the root of the curvature, so that each chord's sagitta is about `tolerance` pixels; each vertex stands
-    out by two thirds of it.
+    Spacing goes with the root of the curvature, so that each chord's sagitta is about `tolerance` pixels; each vertex
+    stands out by two thirds of it.
     """
     count = max(int((stop - start) / 1.5), 16)
     place = np.linspace(start, stop, count + 1)
@@ -170,4 +179,5 @@ def curve_points(curve: Curve, tolerance: float, start: float, stop: float) -> C
     chosen = np.interp(mark, total, place)
     point, along = curve.at(chosen)
     sagitta = np.interp(chosen, place, bend) / 8.0 * (total[-1] / chords / np.interp(chosen, place, density)) ** 2
-    return point - 1j * along / np.maximum(np.abs(along), 1e-9) * (2.0 / 3.0) * sagitta
+    few: Complex = point - 1j * along / np.maximum(np.abs(along), 1e-9) * (2.0 / 3.0) * sagitta
+    return few

@@ -1,4 +1,5 @@
-"""Where neighbouring segments meet, and the ring of few vertices that follows: corners, smooth joins, arcs as chords."""
+"""Where neighbouring segments meet, and the ring of few vertices that follows: corners, smooth joins, arcs as
+chords."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ _ASIDE = 0.3
 
 @dataclass(frozen=True)
 class Joints:
-    """Joint after each segment, shape (S,): where the segment ends and where the next begins (the same point but for a bevel).
+    """Joint after each segment, shape (S,): where the segment ends and where the next begins (the same point but for
+    a bevel).
 
     kink: how far the two are from flowing into one another, the turn in radians; infinite where they step aside.
     """
@@ -45,8 +47,8 @@ def ends(witnesses: Witnesses, segments: Segments, inlier: Flags) -> tuple[Compl
 
 
 def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
-    """The joint after each segment: a corner at the intersection where it lies within reach of the evidence, a smooth join
-    where the two all but touch, else a bevel from the last witness of one to the first of the next."""
+    """The joint after each segment: a corner at the intersection where it lies within reach of the evidence, a smooth
+    join where the two all but touch, else a bevel from the last witness of one to the first of the next."""
     first, last = ends(witnesses, segments, inlier)
     after = np.roll(np.arange(len(segments)), -1)
     following = segments.models.take(after)
@@ -118,12 +120,17 @@ def _dropped(segments: Segments, which: int) -> Segments:
     length[which - 1] += length[which]
     keep = np.arange(len(segments)) != which
     return replace(
-        segments, models=segments.models.take(keep), bend=segments.bend[keep], first=segments.first[keep], length=length[keep]
+        segments,
+        models=segments.models.take(keep),
+        bend=segments.bend[keep],
+        first=segments.first[keep],
+        length=length[keep],
     )
 
 
 def sweep(model: Models, start: complex, stop: complex, run: float) -> tuple[float, float]:
-    """Angle at which an arc starts, about its origin, and the angle it turns through until `stop` (radians, left positive).
+    """Angle at which an arc starts, about its origin, and the angle it turns through until `stop` (radians, left
+    positive).
 
     run: about how long the arc is, pixels; it tells a long way round from a short one back.
     """
@@ -134,11 +141,13 @@ def sweep(model: Models, start: complex, stop: complex, run: float) -> tuple[flo
     return from_, turn + 2.0 * np.pi * round((curvature * run - turn) / (2.0 * np.pi))
 
 
-def arc_points(model: Models, start: complex, stop: complex, run: float, tolerance: float, whole: bool) -> Complex:
+def arc_points(
+    model: Models, start: complex, stop: complex, *, run: float, tolerance: float, whole: bool = False
+) -> Complex:
     """Inner vertices of an arc from `start` to `stop` (both on it, not included), chords within `tolerance` pixels.
 
-    `run` is about the arc's length. Vertices stand out by two thirds of the sagitta, so that the area under the chords is the arc's. A whole circle takes
-    `start` as its first vertex direction and includes it.
+    `run` is about the arc's length. Vertices stand out by two thirds of the sagitta, so that the area under the
+    chords is the arc's. A whole circle takes `start` as its first vertex direction and includes it.
     """
     curvature = float(model.curvature)
     if abs(curvature) < 1e-12:
@@ -151,7 +160,8 @@ def arc_points(model: Models, start: complex, stop: complex, run: float, toleran
     turned = np.exp(1j * (from_ + turn * np.arange(0 if whole else 1, chords) / chords))
     sagitta = (1.0 - np.cos(0.5 * turn / chords)) / curvature
     origin, tangent = complex(model.origin), complex(model.tangent)
-    return origin + 1j * tangent * (1.0 - turned) / curvature - 1j * tangent * turned * (2.0 / 3.0) * sagitta
+    inner: Complex = origin + 1j * tangent * (1.0 - turned) / curvature - 1j * tangent * turned * (2.0 / 3.0) * sagitta
+    return inner
 
 
 def thinned(ring: Complex, tolerance: float) -> Index:

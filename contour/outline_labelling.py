@@ -1,4 +1,5 @@
-"""Which line or arc each witness belongs to: the cheapest cyclic labelling under description-length prices (Viterbi)."""
+"""Which line or arc each witness belongs to: the cheapest cyclic labelling under description-length prices
+(Viterbi)."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.outline_models import Complex, Index, Models, Real, distance, feet
+from contour.outline_models import Complex, Index, Real, distance, feet
 from contour.outline_proposals import Proposals
 from contour.outline_witnesses import Witnesses, cost
 
@@ -59,7 +60,9 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> Index:
     which = np.repeat(np.arange(len(proposals)), reach)
     begin = np.cumsum(reach) - reach
     place = ((proposals.first - margin)[which] + np.arange(len(which)) - begin[which]) % count
-    saved = witnesses.cap_inside[place] - cost(witnesses, distance(proposals.models.take(which), witnesses.points[place]), place)
+    saved = witnesses.cap_inside[place] - cost(
+        witnesses, distance(proposals.models.take(which), witnesses.points[place]), place
+    )
     running = np.concatenate([[0.0], np.cumsum(saved)])
     here = np.arange(len(which))
     low = np.maximum(here - _NEARBY, begin[which])
@@ -83,9 +86,9 @@ def _steps(witnesses: Witnesses, proposals: Proposals, here: Index, foot: Comple
         tangent[:, :, None],
         np.roll(foot, -1, axis=0)[:, None, :],
         np.roll(tangent, -1, axis=0)[:, None, :],
-        witnesses.gap[:, None, None],
-        np.maximum(witnesses.outer, np.roll(witnesses.outer, -1))[:, None, None],
-        witnesses.pitch,
+        gap=witnesses.gap[:, None, None],
+        sigma=np.maximum(witnesses.outer, np.roll(witnesses.outer, -1))[:, None, None],
+        pitch=witnesses.pitch,
     )
     price = np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
     same = here[:, :, None] == following[:, None, :]
@@ -93,12 +96,13 @@ def _steps(witnesses: Witnesses, proposals: Proposals, here: Index, foot: Comple
 
 
 def joint_cost(
-    foot: Complex, tangent: Complex, next_foot: Complex, next_tangent: Complex, gap: Real, sigma: Real, pitch: float
+    foot: Complex, tangent: Complex, next_foot: Complex, next_tangent: Complex, *, gap: Real, sigma: Real, pitch: float
 ) -> Real:
-    """Nats of a joint between two models, given their feet and tangents at the last and the next witness (shapes broadcast).
+    """Nats of a joint between two models, given their feet and tangents at the last and the next witness (shapes
+    broadcast).
 
-    A corner: the tangents meet ahead of the one and behind the other, within reach of the evidence. A smooth join: small turn,
-    small step aside. Else a jump at a fixed price.
+    A corner: the tangents meet ahead of the one and behind the other, within reach of the evidence. A smooth join:
+    small turn, small step aside. Else a jump at a fixed price.
     """
     way = next_foot - foot
     turn = tangent.conj() * next_tangent
@@ -121,7 +125,8 @@ def joint_cost(
 
 
 def _cheapest_cycle(step: Real, first: Real) -> tuple[Index, float]:
-    """Cheapest closed path: step[i] holds prices from i to i + 1 (cyclic), with the price of being there; and its price.
+    """Cheapest closed path: step[i] holds prices from i to i + 1 (cyclic), with the price of being there; and its
+    price.
 
     An open pass finds the path's longest run; a second pass starts and ends in the middle of it, in its state.
     """

@@ -1,13 +1,14 @@
 """Lines and circular arcs as one family, fitted many at a time.
 
-The plane is complex here: a point is x + iy. A model is an origin on it, the unit tangent there (direction of travel, with the
-material on the left) and the curvature (positive where the outline is convex, 0 for a line). One formula then serves lines,
-arcs and whole circles, without the loss of digits that a far centre brings.
+The plane is complex here: a point is x + iy. A model is an origin on it, the unit tangent there (direction of travel,
+with the material on the left) and the curvature (positive where the outline is convex, 0 for a line). One formula
+then serves lines, arcs and whole circles, without the loss of digits that a far centre brings.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,8 @@ _LEAST_ROOT = 1e-6
 
 @dataclass(frozen=True)
 class Models:
-    """Lines and arcs, any shape of batch: origin and unit tangent (complex, pixels), curvature (1/pixel, convex positive)."""
+    """Lines and arcs, any shape of batch: origin and unit tangent (complex, pixels), curvature (1/pixel, convex
+    positive)."""
 
     origin: Complex
     tangent: Complex
@@ -30,7 +32,7 @@ class Models:
     def __len__(self) -> int:
         return len(self.origin)
 
-    def take(self, index: NDArray[np.intp] | NDArray[np.bool_] | tuple[object, ...]) -> Models:
+    def take(self, index: Any) -> Models:
         """The models at `index` of the batch (any numpy index)."""
         return Models(self.origin[index], self.tangent[index], self.curvature[index])
 
@@ -90,8 +92,9 @@ def through_triples(first: Complex, middle: Complex, last: Complex) -> Models:
 def refine(models: Models, points: Complex, weights: Real, bend: NDArray[np.bool_]) -> Models:
     """One Gauss-Newton step of weighted least squares on the exact distance, each model on its own row of points.
 
-    points, weights: shape (K, m). bend: shape (K,), True where the curvature is free; a line stays a line. Rows whose points
-    do not determine a model come back unchanged. The origin moves to the points' weighted middle, so that steps stay small.
+    points, weights: shape (K, m). bend: shape (K,), True where the curvature is free; a line stays a line. Rows whose
+    points do not determine a model come back unchanged. The origin moves to the points' weighted middle, so that
+    steps stay small.
     """
     total = weights.sum(axis=1)
     sound = total > 0.0
@@ -107,7 +110,7 @@ def refine(models: Models, points: Complex, weights: Real, bend: NDArray[np.bool
     cosine = (1.0 - curvature * local.imag) / root
     along = local.real / root / spread[:, None]
     bulge = along**2 / np.maximum(1.0 + cosine, 0.05)
-    step = _normal_step(weights, residual, cosine, along, bulge, bend)
+    step = _normal_step(weights, residual, cosine=cosine, along=along, bulge=bulge, bend=bend)
     offset, turn, bow = step[:, 0], step[:, 1] / spread, step[:, 2] / spread**2
     limit = np.minimum(1.0, 0.5 / np.maximum(np.abs(turn), 1e-12))
     offset, turn, bow = offset * limit, turn * limit, bow * limit
@@ -121,11 +124,12 @@ def refine(models: Models, points: Complex, weights: Real, bend: NDArray[np.bool
 
 
 def _normal_step(
-    weights: Real, residual: Real, cosine: Real, along: Real, bulge: Real, bend: NDArray[np.bool_]
+    weights: Real, residual: Real, *, cosine: Real, along: Real, bulge: Real, bend: NDArray[np.bool_]
 ) -> Real:
     """Steps of offset (outwards), turn (times the spread) and curvature (times the spread squared), shape (K, 3).
 
-    Derivatives of the distance: -cosine by offset; by turn (a left turn lifts the line's far end inwards) +along; +bulge by curvature.
+    The distance changes by -cosine with the offset, by +along with the turn (to the left) and by +bulge with the
+    curvature.
     """
     design = np.stack([-cosine, along, bulge * bend[:, None]], axis=1)
     weighted = design * weights[:, None, :]
@@ -134,5 +138,4 @@ def _normal_step(
     trace = normal[:, 0, 0] + normal[:, 1, 1] + 1e-30
     normal[:, [0, 1, 2], [0, 1, 2]] += (1e-9 * trace)[:, None]
     normal[:, 2, 2] += np.where(bend, 0.0, trace)
-    solved: Real = np.linalg.solve(normal, right)[:, :, 0]
-    return solved
+    return np.linalg.solve(normal, right)[:, :, 0].astype(np.float64)

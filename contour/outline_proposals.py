@@ -11,11 +11,32 @@ from contour.outline_witnesses import Witnesses, cost, weights, window_cost
 
 # Pairs and triples of sample places (shares of the window) that a fit starts from; far ones fix direction best.
 _PAIRS = np.array(
-    [(0.0, 1.0), (0.13, 0.87), (0.27, 1.0), (0.0, 0.6), (0.4, 1.0), (0.07, 0.8), (0.2, 0.67), (0.33, 0.93), (0.0, 0.47), (0.53, 1.0)]
+    [
+        (0.0, 1.0),
+        (0.13, 0.87),
+        (0.27, 1.0),
+        (0.0, 0.6),
+        (0.4, 1.0),
+        (0.07, 0.8),
+        (0.2, 0.67),
+        (0.33, 0.93),
+        (0.0, 0.47),
+        (0.53, 1.0),
+    ]
 )
 _TRIPLES = np.array(
-    [(0.0, 0.47, 1.0), (0.13, 0.6, 1.0), (0.0, 0.4, 0.87), (0.13, 0.53, 0.87), (0.27, 0.67, 1.0), (0.0, 0.33, 0.73)]
-    + [(0.07, 0.53, 0.93), (0.2, 0.6, 0.93), (0.07, 0.4, 0.8), (0.2, 0.47, 0.8)]
+    [
+        (0.0, 0.47, 1.0),
+        (0.13, 0.6, 1.0),
+        (0.0, 0.4, 0.87),
+        (0.13, 0.53, 0.87),
+        (0.27, 0.67, 1.0),
+        (0.0, 0.33, 0.73),
+        (0.07, 0.53, 0.93),
+        (0.2, 0.6, 0.93),
+        (0.07, 0.4, 0.8),
+        (0.2, 0.47, 0.8),
+    ]
 )
 # Sharper bends than these (radius in pitches) show in no more than two or three witnesses: corners, dents and debris.
 _LEAST_RADIUS_CONVEX = 1.25
@@ -25,7 +46,8 @@ _REDUNDANT = 2.0
 
 @dataclass(frozen=True)
 class Proposals:
-    """Models with the stretch of witnesses they may explain: first index and length (cyclic), and their gain in nats."""
+    """Models with the stretch of witnesses they may explain: first index and length (cyclic), and their gain in
+    nats."""
 
     models: Models
     bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
@@ -60,10 +82,15 @@ def samples(count: int, first: Index, length: Index, places: int) -> Index:
 
 
 def propose(witnesses: Witnesses) -> Proposals:
-    """Lines and arcs on windows of 4, 8, 16, ... witnesses and on the whole ring, without those a longer window explains."""
+    """Lines and arcs on windows of 4, 8, 16, ... witnesses and on the whole ring, without those a longer window
+    explains."""
     count = len(witnesses)
     sizes = [size for size in (4, 6, *(8 * 2**k for k in range(11))) if size < count] + [count]
-    levels = [level for group in ([z for z in sizes if z <= 8], [z for z in sizes if z > 8]) for level in _levels(witnesses, group)]
+    levels = [
+        level
+        for group in ([z for z in sizes if z <= 8], [z for z in sizes if z > 8])
+        for level in _levels(witnesses, group)
+    ]
     kept: list[Proposals] = []
     longer: list[Proposals] = []
     for level in reversed(levels):
@@ -105,12 +132,15 @@ def _stride(size: int, count: int) -> int:
 def window_fits(
     witnesses: Witnesses, first: Index, length: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]], places: int
 ) -> Proposals:
-    """A robust line or arc for each window that begins at `first`: the best of a few through its points, refined twice."""
+    """A robust line or arc for each window that begins at `first`: the best of a few through its points, refined
+    twice."""
     index = samples(len(witnesses), first, length, places)
     points = witnesses.points[index]
     starts = _best_starts(witnesses, points, index, bend)
     for _ in range(2):
-        starts = refine(starts, points, weights(witnesses, distance(starts.take((slice(None), None)), points), index), bend)
+        starts = refine(
+            starts, points, weights(witnesses, distance(starts.take((slice(None), None)), points), index), bend
+        )
     signed = distance(starts.take((slice(None), None)), points)
     saved = witnesses.cap_inside[index] - cost(witnesses, signed, index)
     along = (starts.tangent[:, None] * witnesses.normal[index].conj()).imag.mean(axis=1)
@@ -121,11 +151,15 @@ def window_fits(
 def gentle(witnesses: Witnesses, models: Models) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """True where a model bends no more sharply than witnesses a pitch apart can show."""
     turn = models.curvature * witnesses.pitch
-    mild: np.ndarray[tuple[int], np.dtype[np.bool_]] = (turn < 1.0 / _LEAST_RADIUS_CONVEX) & (turn > -1.0 / _LEAST_RADIUS_CONCAVE)
+    mild: np.ndarray[tuple[int], np.dtype[np.bool_]] = (turn < 1.0 / _LEAST_RADIUS_CONVEX) & (
+        turn > -1.0 / _LEAST_RADIUS_CONCAVE
+    )
     return mild
 
 
-def _best_starts(witnesses: Witnesses, points: Complex, index: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Models:
+def _best_starts(
+    witnesses: Witnesses, points: Complex, index: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
+) -> Models:
     """Of the lines through pairs (circles through triples where `bend`) of each row's points, the cheapest."""
     found = []
     rows = [np.flatnonzero(~bend), np.flatnonzero(bend)]
@@ -133,7 +167,11 @@ def _best_starts(witnesses: Witnesses, points: Complex, index: Index, bend: np.n
         own = points[row]
         spots = np.rint(shares * (points.shape[1] - 1)).astype(np.intp)
         picked = own[:, spots]
-        starts = through_triples(*np.moveaxis(picked, 2, 0)) if shares is _TRIPLES else through_pairs(*np.moveaxis(picked, 2, 0))
+        starts = (
+            through_triples(*np.moveaxis(picked, 2, 0))
+            if shares is _TRIPLES
+            else through_pairs(*np.moveaxis(picked, 2, 0))
+        )
         signed = distance(starts.take((..., None)), own[:, None, :])
         best = cost(witnesses, signed, index[row][:, None, :]).sum(axis=2).argmin(axis=1)
         found.append(starts.take((np.arange(len(row)), best)))

@@ -17,7 +17,8 @@ _STEPS = 4
 
 @dataclass(frozen=True)
 class Segments:
-    """Pieces of the outline in travel order, one model each: first witness and number of witnesses (cyclic), shape (S,)."""
+    """Pieces of the outline in travel order, one model each: first witness and number of witnesses (cyclic), shape
+    (S,)."""
 
     models: Models
     bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
@@ -54,7 +55,9 @@ def stretch(count: int, first: Index, length: Index) -> tuple[Index, Real]:
     return (first[:, None] + np.minimum(offset, length[:, None] - 1)) % count, multiplicity
 
 
-def fitted(witnesses: Witnesses, models: Models, bend: np.ndarray[tuple[int], np.dtype[np.bool_]], first: Index, length: Index) -> tuple[Models, Real]:
+def fitted(
+    witnesses: Witnesses, models: Models, bend: np.ndarray[tuple[int], np.dtype[np.bool_]], first: Index, length: Index
+) -> tuple[Models, Real]:
     """Models refitted robustly to their own stretches, and the nats each saves there over calling all outliers."""
     index, multiplicity = stretch(len(witnesses), first, length)
     points = witnesses.points[index]
@@ -67,7 +70,8 @@ def fitted(witnesses: Witnesses, models: Models, bend: np.ndarray[tuple[int], np
 
 
 def around(witnesses: Witnesses, segments: Segments) -> Proposals:
-    """Proposals near the present segments: each alone, with its next, with its next two; each as a line and as an arc."""
+    """Proposals near the present segments: each alone, with its next, with its next two; each as a line and as an
+    arc."""
     count, total = len(witnesses), len(segments)
     starts: list[Models] = []
     lengths: list[Index] = []
@@ -107,7 +111,11 @@ def _starts(witnesses: Witnesses, segments: Segments, begin: Index, last: Index,
     if not bend:
         pair = through_pairs(foot(begin, 0.1), foot(last, 0.9))
         return _choose(alone & ~segments.bend[begin], segments.models.take(begin), pair)
-    inner = np.where(alone, foot(begin, 0.5), np.where((last - begin) % len(segments) == 1, foot(begin, 0.95), foot((begin + 1) % len(segments), 0.5)))
+    inner = np.where(
+        alone,
+        foot(begin, 0.5),
+        np.where((last - begin) % len(segments) == 1, foot(begin, 0.95), foot((begin + 1) % len(segments), 0.5)),
+    )
     triple = through_triples(foot(begin, 0.08), inner, foot(last, 0.92))
     return _choose(alone & segments.bend[begin], segments.models.take(begin), triple)
 

@@ -23,9 +23,9 @@ _SERRATION = 0.03
 class Witnesses:
     """Witnesses of one ring in travel order, shape (N,) each, in pixels of the fitting plane.
 
-    points and normal (outwards) are complex. inner, outer: standard deviations for points inside and outside of the outline.
-    cap_inside, cap_outside: the most a point costs there (nats). clean: a wall end, fit to measure the noise by.
-    gap: distance to the next witness along the coarse ring (cyclic).
+    points and normal (outwards) are complex. inner, outer: standard deviations for points inside and outside of the
+    outline. cap_inside, cap_outside: the most a point costs there (nats). clean: a wall end, fit to measure the noise
+    by. gap: distance to the next witness along the coarse ring (cyclic).
     """
 
     points: Complex
@@ -43,7 +43,8 @@ class Witnesses:
 
 
 def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None) -> Witnesses:
-    """The ring's witnesses in the fitting plane (rectified where `rectifier` is given), with noise as the evidence states it."""
+    """The ring's witnesses in the fitting plane (rectified where `rectifier` is given), with noise as the evidence
+    states it."""
     points, normal = evidence.points, evidence.normal
     if rectifier is not None:
         ahead = rectifier.rectify(points + normal)
@@ -51,24 +52,22 @@ def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None
         normal = ahead - points
     z = points[:, 0] + 1j * points[:, 1]
     outwards = normal[:, 0] + 1j * normal[:, 1]
-    outwards = outwards / np.maximum(np.abs(outwards), 1e-12)
+    outwards = (outwards / np.maximum(np.abs(outwards), 1e-12)).astype(np.complex128)
     outermost = evidence.kind == WitnessKind.OUTERMOST
     sigma = np.maximum(evidence.sigma, _LEAST_SIGMA_PX)
     coarse = evidence.coarse
     length = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
     gap = np.diff(evidence.position, append=evidence.position[:1] + length)
     inner = np.where(outermost, np.maximum(sigma, _SERRATION * pitch_px), sigma)
-    witnesses = Witnesses(
-        z, outwards, inner, sigma, inner, inner, ~outermost, np.maximum(gap, 0.0), pitch_px
-    )
+    witnesses = Witnesses(z, outwards, inner, sigma, inner, inner, ~outermost, np.maximum(gap, 0.0), pitch_px)
     return scaled(witnesses, 1.0)
 
 
 def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
     """The same witnesses with all standard deviations times `factor`, and outlier prices that follow from them.
 
-    A point is an outlier when a uniform law over a pitch explains it better than its normal law: the price is the log of
-    their odds at the outline itself.
+    A point is an outlier when a uniform law over a pitch explains it better than its normal law: the price is the log
+    of their odds at the outline itself.
     """
     inner, outer = witnesses.inner * factor, witnesses.outer * factor
     odds = witnesses.pitch / (np.sqrt(2.0 * np.pi) * np.minimum(inner, outer))
@@ -84,7 +83,8 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
 
 
 def cost(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
-    """Nats of signed distances (last axis: the witnesses at `index`, or index's own shape): half squares, capped either side.
+    """Nats of signed distances (last axis: the witnesses at `index`, or index's own shape): half squares, capped
+    either side.
 
     Beyond a cell's depth the cap rises again: one missing cell or broken wall reaches no deeper.
     """
@@ -111,8 +111,8 @@ def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(Non
 def noise_from_neighbours(witnesses: Witnesses) -> float:
     """Noise over the stated one, from how far each witness lies off the chord of its neighbours; between 0.5 and 3.
 
-    The lesser of that and of its excess over the neighbours' own (which a bend does not raise). Reads the lower quarter of
-    the deviations: a fifth of deep witnesses spoils about half of the triples.
+    The lesser of that and of its excess over the neighbours' own (which a bend does not raise). Reads the lower
+    quarter of the deviations: a fifth of deep witnesses spoils about half of the triples.
     """
     if len(witnesses) < 8:
         return 1.0
@@ -125,14 +125,16 @@ def noise_from_neighbours(witnesses: Witnesses) -> float:
     if sound.sum() < 8:
         return 1.0
     simple = off / (witnesses.outer * np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
-    # 1.5, -1, -1, 1/4, 1/4 are the weights of five even neighbours in the excess: 2.09 is the root of their squares' sum.
+    # 1.5, -1, -1, 1/4, 1/4 are the weights of five even neighbours in the excess: 2.09 is the root of their squares'
+    # sum.
     excess = (off - 0.5 * (np.roll(off, 1) + np.roll(off, -1))) / (2.09 * witnesses.outer)
     level = min(float(np.quantile(np.abs(simple[sound]), 0.25)), float(np.quantile(np.abs(excess[sound]), 0.25)))
     return float(np.clip(level / 0.36, 0.5, 3.0))
 
 
 def noise_from_residuals(witnesses: Witnesses, signed: Real) -> float:
-    """Noise over the present one, from the clean witnesses' distances to their own models; 1 where there are too few."""
+    """Noise over the present one, from the clean witnesses' distances to their own models; 1 where there are too
+    few."""
     ratio = np.abs(signed[witnesses.clean] / witnesses.outer[witnesses.clean])
     ratio = ratio[ratio < 4.0]
     if len(ratio) < 8:

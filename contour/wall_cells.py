@@ -20,6 +20,8 @@ _TILES = 4
 _GUESSES = (24.0, 70.0, 8.0)
 _GOOD_SCORE = 0.2
 _LEAST_SCORE = 0.04
+# A sheet with holes far apart is a table, not a plate of cells.
+_WIDEST_WALL = 0.65
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,8 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
         return None
     wall = wall_width(mask)
     size = float(np.sqrt(2 / np.sqrt(3) * np.median(usual))) + wall
+    if wall > _WIDEST_WALL * size:
+        return None
     # Area a regular comb of this pitch would fill with as many cells.
     filled = len(usual) * size * size * np.sqrt(3) / 2 / (height * width)
     _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)

@@ -19,12 +19,14 @@ _MAP_SAMPLES = 8
 # Foils side by side differ in brightness by a factor of three: a threshold halfway up loses the dimmer ones.
 _RISE = 0.35
 # Walls of fine cells run into each other at that height.
-_FINE_RISE = 0.15
+_FINE_RISE = 0.08
 _REGION_RISE = 0.25
 # Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
 _PICTURE_RISE = 0.2
 _BYTE_CONTRAST = 40.0
 _FINE_PITCH = 12.0
+# What a fifth of normal deviates stay below in size, in standard deviations.
+_FIFTH_OF_NORMAL = 0.2533
 
 
 @dataclass(frozen=True)
@@ -88,11 +90,14 @@ def _noise_level(smooth: NDArray[np.uint8 | np.uint16], pitch: float, unit: int)
         return 0.3 * unit
     quiet = float(np.quantile(tiles.astype(np.float32).std(axis=(1, 3)), 0.2))
     if pitch < _FINE_PITCH:
-        # No tile of fine cells is quiet, but second differences see little of a blurred structure, and
-        # keep the noise that the light blur left as it is.
-        rows = smooth[::hop].astype(np.float32)
-        second = rows[:, :-2] - 2 * rows[:, 1:-1] + rows[:, 2:]
-        quiet = min(quiet, float(np.median(np.abs(second))) / 0.6745)
+        # No tile of fine cells is quiet, but second differences both ways see little of a blurred structure, and keep
+        # the noise that the light blur left as it is.
+        part = smooth[: 1 << 9, : 1 << 9].astype(np.float32)
+        rows = part[:, :-2] - 2 * part[:, 1:-1] + part[:, 2:]
+        second = np.abs(rows[:-2] - 2 * rows[1:-1] + rows[2:])
+        quiet = min(quiet, float(np.quantile(second, 0.2)) / _FIFTH_OF_NORMAL)
+        # Walls of no more than twelve times their noise would not show as cells at all.
+        quiet = min(quiet, float(smooth[::hop].std()) / 6)
     return max(quiet, 0.3 * unit)
 
 

@@ -159,6 +159,18 @@ def _roughness(knots: int, closed: bool) -> Real:
     return np.diff(np.eye(knots), n=3, axis=0)
 
 
+def within(curve: Curve, start: complex, stop: complex) -> tuple[float, float]:
+    """Arc lengths between which the curve lies inside its joints at `start` and `stop`; the whole of a closed one."""
+    if curve.closed:
+        return 0.0, curve.length
+    place = np.linspace(0.0, curve.length, 256)
+    point, _ = curve.at(place)
+    half = len(place) // 2
+    low = int(np.abs(point[:half] - start).argmin())
+    high = half + int(np.abs(point[half:] - stop).argmin())
+    return float(place[low]), float(place[high])
+
+
 def curve_points(curve: Curve, tolerance: float, start: float, stop: float) -> Complex:
     """Few vertices along the curve between arc lengths `start` and `stop` (neither included unless closed), area kept.
 

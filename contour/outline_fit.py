@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contour.errors import NoBlockFound
 from contour.geometry import Ring
 from contour.outline_chains import Chain, free_curves
-from contour.outline_curves import curve_points
+from contour.outline_curves import curve_points, within
 from contour.outline_joints import Flags, Joints, arc_points, thinned, without_reversed
 from contour.outline_labelling import label
 from contour.outline_models import Complex, Real, distance
@@ -141,7 +141,8 @@ def polygon(
         chain = curve_of.get(k)
         last = k if chain is None else chain.segments[-1]
         if chain is not None:
-            inner = curve_points(chain.curve, _CHORD_PX, 0.0, chain.curve.length)
+            start, stop = within(chain.curve, complex(begin[k]), complex(found.end[last]))
+            inner = curve_points(chain.curve, _CHORD_PX, start, stop)
             if chain.curve.closed:
                 return inner, _members(chain, len(inner))
         elif segments.bend[k]:

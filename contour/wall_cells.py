@@ -137,8 +137,13 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     usual = areas[(areas > typical / 2) & (areas < 2 * typical)]
     if len(usual) < 6:
         return None
-    wall = wall_width(mask)
-    size = float(np.sqrt(2 / np.sqrt(3) * np.median(usual))) + wall
+    inner = float(np.sqrt(2 / np.sqrt(3) * np.median(usual)))
+    # A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
+    side = max(3, round(0.7 * inner))
+    sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    walls = cv2.bitwise_and(mask, cv2.bitwise_not(cv2.dilate(sheet, np.ones((3, 3), np.uint8))))
+    wall = wall_width(walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask)
+    size = inner + wall
     if wall > _WIDEST_WALL * size:
         return None
     # Area a regular comb of this pitch would fill with as many cells.

@@ -49,7 +49,7 @@ def centred_axes(light: Gray, tip: Points, axis: Points, wall: float, straight: 
     half = 0.8 * wall + 1.5
     across = np.arange(-np.ceil(half), np.ceil(half) + 0.25, 0.5)
     for _ in range(2):
-        values = sign * _sample(light, tip, axis, back[:, :, None], across)
+        values = sign * sample_across(light, tip, axis, back[:, :, None], across)
         floor = np.minimum(values[:, :, :2].mean(axis=2), values[:, :, -2:].mean(axis=2))[:, :, None]
         # Weights above half height only: the other side of a neighbouring wall must not draw the centre.
         peak = values.max(axis=2, keepdims=True)
@@ -97,7 +97,7 @@ def fit_ends(light: Gray, tip: Points, axis: Points, normal: Points, model: EndM
     width = max(0.4 * model.width, 0.5)
     across = np.linspace(-width, width, max(3, 2 * round(width) + 1))
     place = along[None, :, None] - shear[:, None, None] * across
-    profile = model.sign * _sample(light, tip, axis, place, across).mean(axis=2)
+    profile = model.sign * sample_across(light, tip, axis, place, across).mean(axis=2)
     return _fit(profile, along, tip, axis, cosine, widening, model)
 
 
@@ -146,7 +146,7 @@ def _fit(
     return FittedEnds(tip + end[:, None] * axis, axis, spread / widening, top - bottom, sigma, misfit)
 
 
-def _sample(light: Gray, tip: Points, axis: Points, along: NDArray[np.float64], across: Vector) -> NDArray[np.float64]:
+def sample_across(light: Gray, tip: Points, axis: Points, along: NDArray[np.float64], across: Vector) -> NDArray[np.float64]:
     """Grey levels at tip + along · axis + across · normal, shape (N, S, A), for along (N, S, 1) or (N, S, A), across (A,)."""
     along = np.broadcast_to(along, (len(tip), along.shape[1], len(across)))
     x = tip[:, 0, None, None] + along * axis[:, 0, None, None] - across * axis[:, 1, None, None]

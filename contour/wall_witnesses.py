@@ -13,8 +13,9 @@ from contour.coarse_block import CoarseBlock, coarse_block
 from contour.wall_cells import Cells, probe
 from contour.wall_ends import edge_chains, find_ends, outermost
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
-from contour.wall_light import wall_light
+from contour.wall_light import light_from_table, wall_light
 from contour.wall_mask import WallMask, wall_mask
+from contour.wall_parallax import Parallax, parallax
 from contour.wall_profile import EndModel, centred_axes, fit_ends, true_width
 
 Gray = NDArray[np.uint8]
@@ -26,6 +27,8 @@ _HALF_SIZE_ABOVE_PX = 6_000_000
 _BLUR_PX = (0.4, 3.0)
 # What the mask's own light blur (3 × 3) adds.
 _MASK_BLUR_PX = 0.8
+# Walls of such cells are two pixels wide and more: every second pixel tells their colour.
+_SUBSAMPLED_PITCH = 20.0
 
 
 def see_block(
@@ -37,6 +40,13 @@ def see_block(
     """
     light = wall_light(picture)
     cells = probe(light, polarity)
+    if picture.ndim == 3:
+        hop = 2 if cells.pitch > _SUBSAMPLED_PITCH else 1
+        sample = np.ascontiguousarray(light[::hop, ::hop])
+        walls = wall_mask(sample, cells.pitch / hop, bright=cells.bright, contrast=cells.contrast).mask
+        coloured = light_from_table(picture, sample, walls, hop)
+        if coloured is not None:
+            light, cells = coloured, probe(coloured, "bright")
     scale = 2 if light.size > _HALF_SIZE_ABOVE_PX and cells.pitch > 20 and cells.wall > 2.5 else 1
     small = light if scale == 1 else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
@@ -64,12 +74,18 @@ def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, sc
         out=float(np.clip(0.25 * cells.pitch, 3.0, 6.0)),
         sign=sign,
     )
-    model = _learn(light, tip, axis, normal, np.argsort(-straight), model, cells, seen.contrast)
+    depth = parallax(light, tip, axis, straight, cells.wall, sign)
+    if depth.width is not None:
+        # The top is the half of the band that lies away from the picture's middle.
+        across = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
+        tip = tip + 0.5 * depth.across(tip, across)[:, None] * across
+    model = _learn(light, tip, axis, normal, np.argsort(-straight), model, depth.width or cells.wall, seen.contrast)
     fitted = fit_ends(light, tip, axis, normal, model)
     good = (fitted.sigma < 1.0) & (fitted.height > 0.4 * model.height)
     sigma = np.hypot(np.where(clean, 0.2, 0.3), fitted.sigma)
     kinds = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
     points, kinds, sigma = fitted.point[good], kinds[good], sigma[good]
+    points = _raised(points, normal[good], depth)
 
     outer = outer[_nearest(outer, (points + 0.5) / scale - 0.5) > 0.3 * pitch]
     _, _, normal = coarse.feet(outer)
@@ -79,7 +95,7 @@ def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, sc
     use = np.abs(moved) < 1.5 * scale
     # Beside a thin wall half height lies outside of it, at its corners and ends inside: about a third of the way is left.
     fat = 0.17 * (cells.wall - model.width)
-    place = np.where(use[:, None], side.point, place) - fat * normal
+    place = _raised(np.where(use[:, None], side.point, place) - fat * normal, normal, depth)
     points = np.concatenate([points, place])
     kinds = np.concatenate([kinds, np.full(len(place), WitnessKind.OUTERMOST, np.int8)])
     sigma = np.concatenate([sigma, np.where(use, 0.5, 1.0)])
@@ -90,15 +106,20 @@ def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, sc
     )
 
 
-def _learn(light: Gray, tip: Points, axis: Points, normal: Points, longest: NDArray[np.int64], model: EndModel, cells: Cells, contrast: float) -> EndModel:
+def _learn(light: Gray, tip: Points, axis: Points, normal: Points, longest: NDArray[np.int64], model: EndModel, wall: float, contrast: float) -> EndModel:
     """The model with blur and height as the straightest ends show them."""
     some = longest[: max(5, min(64, len(longest) // 2))]
     if not len(some):
         return replace(model, blur=0.9, height=contrast)
     free = fit_ends(light, tip[some], axis[some], normal[some], model)
     blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
-    width = true_width(cells.wall, float(np.hypot(blur, _MASK_BLUR_PX)))
+    width = true_width(wall, float(np.hypot(blur, _MASK_BLUR_PX)))
     return replace(model, width=width, blur=blur, height=float(np.median(free.height)))
+
+
+def _raised(points: Points, normal: Points, depth: Parallax) -> Points:
+    """Points moved from the lower edge of the block's outer side up to its top, where that side is in view."""
+    return points + np.minimum(depth.across(points, normal), 0.0)[:, None] * normal if depth.width is not None else points
 
 
 def _nearest(points: Points, others: Points) -> Vector:

@@ -16,7 +16,7 @@ from contour.outline_witnesses import Witnesses, cost
 # A straight edge longer than this is an edge, not a part of a free curve.
 _LONGEST_LINE_PITCHES = 8.0
 _PRICE_OF_FREEDOM = 4.0
-_SHARPEST = 0.5
+_SHARPEST = 0.7
 _MOST_TRIES = 10
 
 

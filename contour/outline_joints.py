@@ -16,7 +16,7 @@ Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 _REACH = 1.7
 _SLACK = 0.8
 _SMOOTH_SINE = 0.26
-_ASIDE = 0.3
+_ASIDE = 0.8
 
 
 @dataclass(frozen=True)

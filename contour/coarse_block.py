@@ -23,13 +23,16 @@ _CLOSING_PITCHES = 0.72
 _HOLE_RADIUS_PITCHES = 1.1
 _WALL_COVERAGE = 0.12
 _PAD = 8
+# Grey levels between table and walls, averaged with their cells, below which an opening's own level says nothing.
+_LEAST_SHADE = 8.0
 _SHEET_WALLS = 2.5
 _SHEET_CELLS = 2.5
 
 
 @dataclass(frozen=True)
 class CoarseRing:
-    """One ring of the coarse block: vertices (M, 2), the same smoothed over two pitches (M, 2), arc length at each (M,), outward unit normals (M, 2), total length.
+    """One ring of the coarse block: vertices (M, 2), the same smoothed over two pitches (M, 2), arc length at each
+    (M,), outward unit normals (M, 2), total length.
 
     In pixels of the wall mask. Exterior: positive shoelace; hole: negative.
     """
@@ -46,8 +49,9 @@ class CoarseRing:
 class CoarseBlock:
     """Rings (exterior first) and the maps that place any point: signed distance and nearest ring vertex.
 
-    filled, walls: coarse grid, uint8, 1 in the block, and where it has walls. depth: coarse grid, float32, mask pixels, positive inside. nearest: coarse grid, int32, index into all vertices of
-    all rings one after the other. step: mask pixels a coarse sample. leaves: whether the block runs out of the picture.
+    filled, walls: coarse grid, uint8, 1 in the block, and where it has walls. depth: coarse grid, float32, mask
+    pixels, positive inside. nearest: coarse grid, int32, index into all vertices of all rings one after the other.
+    step: mask pixels a coarse sample. leaves: whether the block runs out of the picture.
     """
 
     rings: tuple[CoarseRing, ...]
@@ -59,12 +63,16 @@ class CoarseBlock:
     leaves: bool
 
     def depth_at(self, points: Points) -> NDArray[np.float64]:
-        """Distance inside the coarse edge, negative outside, shape (N,), mask pixels, for points (N, 2) in mask pixels."""
+        """Distance inside the coarse edge, negative outside, shape (N,), mask pixels, for points (N, 2) in mask
+        pixels.
+        """
         grid = self._grid(points)
         return sample_at(self.depth, grid[:, 0], grid[:, 1])
 
     def height_at(self, points: Points) -> NDArray[np.float64]:
-        """How far points (N, 2) stand out of the ring smoothed over two pitches, along its normal, shape (N,), mask pixels."""
+        """How far points (N, 2) stand out of the ring smoothed over two pitches, along its normal, shape (N,), mask
+        pixels.
+        """
         index = self._nearest_at(points)
         base = np.concatenate([r.base for r in self.rings])[index]
         normal = np.concatenate([r.normal for r in self.rings])[index]
@@ -86,7 +94,9 @@ class CoarseBlock:
         return ring, arc, normals[index]
 
     def unpadded(self, grid: Gray) -> Gray:
-        """A map on the coarse grid without its margin: sample (i, j) covers mask pixels from step · i and step · j on."""
+        """A map on the coarse grid without its margin: sample (i, j) covers mask pixels from step · i and step · j
+        on.
+        """
         return grid[_PAD:-_PAD, _PAD:-_PAD]
 
     def _nearest_at(self, points: Points) -> NDArray[np.int32]:
@@ -98,19 +108,22 @@ class CoarseBlock:
         return (points + 0.5) / self.step - 0.5 + _PAD
 
 
-def coarse_block(mask: Gray, pitch: float, wall: float) -> CoarseBlock:
-    """The largest comb in a wall mask (H, W), uint8, with cells `pitch` and walls `wall` mask pixels wide. Raises NoBlockFound."""
+def coarse_block(mask: Gray, light: Gray, pitch: float, wall: float) -> CoarseBlock:
+    """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch` and walls `wall`
+    pixels wide.
+
+    Raises NoBlockFound.
+    """
     # A whole number of pixels a sample: averaging is several times faster so.
     step = max(1, round(pitch / _SAMPLES_PER_PITCH))
-    wide, high = -mask.shape[1] % step, -mask.shape[0] % step
-    even = cv2.copyMakeBorder(mask, 0, high, 0, wide, cv2.BORDER_CONSTANT, value=0)
-    small = cv2.resize(even, (even.shape[1] // step, even.shape[0] // step), interpolation=cv2.INTER_AREA)
+    small = _averaged(mask, step, cv2.BORDER_CONSTANT)
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8) & (1 - _sheets(small, pitch / step, wall / step))
-    walls = cv2.copyMakeBorder(walls, _PAD, _PAD, _PAD, _PAD, cv2.BORDER_CONSTANT, value=0)
+    walls = _padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch / step
     kept = _main_piece(walls, samples)
     filled = _largest(_close(kept, _CLOSING_PITCHES * samples))
-    filled = _fill_missing_cells(filled, _HOLE_RADIUS_PITCHES * samples)
+    shade = _padded(_averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
+    filled = _fill_missing_cells(filled, kept, shade, _HOLE_RADIUS_PITCHES * samples)
     if len(_sides(filled, samples)) == 4:
         raise NoBlockFound(
             "no block found: a pattern of cells runs out of the picture on all four sides, as a table's does. "
@@ -146,10 +159,11 @@ def _main_piece(walls: Gray, samples: float) -> Gray:
     large = size > 3 * samples
     if not large.any():
         raise NoBlockFound(
-            "no block found: the walls seen form no piece more than three cells wide. Check the light and that a block lies in view"
+            "no block found: the walls seen form no piece more than three cells wide. "
+            "Check the light and that a block lies in view"
         )
     kept = large & (area >= area.max()) if area.max() > 0.5 * area[large].sum() else large
-    return kept.astype(np.uint8)[labels]
+    return np.asarray(kept.astype(np.uint8)[labels], np.uint8)
 
 
 def _close(walls: Gray, radius: float) -> Gray:
@@ -173,21 +187,45 @@ def _largest(filled: Gray) -> Gray:
     return np.asarray(labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])), np.uint8)
 
 
-def _fill_missing_cells(filled: Gray, radius: float) -> Gray:
-    """The block with every inner opening filled in which no disc of `radius` fits."""
+def _padded(grid: Gray, border: int) -> Gray:
+    return np.asarray(cv2.copyMakeBorder(grid, _PAD, _PAD, _PAD, _PAD, border, value=0), np.uint8)
+
+
+def _averaged(picture: Gray, step: int, border: int) -> Gray:
+    """Mean over squares of `step` pixels, the last ones filled up."""
+    wide, high = -picture.shape[1] % step, -picture.shape[0] % step
+    even = cv2.copyMakeBorder(picture, 0, high, 0, wide, border, value=0)
+    size = (even.shape[1] // step, even.shape[0] // step)
+    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _fill_missing_cells(filled: Gray, walls: Gray, shade: Gray, radius: float) -> Gray:
+    """The block with every inner opening filled in which no disc of `radius` fits, or that is as light as its walls.
+
+    Looked into at a slant, black cells show nothing but wall: no mask of walls against cells, and no hole either.
+    """
     count, labels, _, _ = cv2.connectedComponentsWithStats(1 - filled, connectivity=4)
     room = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
     opening = np.zeros(count, np.bool_)
     opening[labels[room > radius]] = True
-    opening[labels[0, 0]] = True
-    opening[0] = False
+    outside = labels[0, 0]
+    opening[[0, outside]] = False
+    if opening.any():
+        table = float(np.median(shade[labels == outside]))
+        wall = float(np.median(shade[walls > 0]))
+        for number in np.flatnonzero(opening):
+            inside = float(np.median(shade[labels == number]))
+            opening[number] = abs(inside - table) < abs(inside - wall) or abs(table - wall) < _LEAST_SHADE
+    opening[outside] = True
     return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
 
 
 def _with_rings(filled: Gray, walls: Gray, step: int, samples: float) -> CoarseBlock:
     chains, hierarchy = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     order = sorted(range(len(chains)), key=lambda i: (hierarchy[0][i][3] >= 0, -len(chains[i])))
-    pixels = [_turned(chains[i][:, 0, :], hierarchy[0][i][3] >= 0) for i in order if len(chains[i]) >= 8]
+    pixels = [
+        _turned(np.asarray(chains[i][:, 0, :], np.int32), hierarchy[0][i][3] >= 0) for i in order if len(chains[i]) >= 8
+    ]
     rings = []
     seeds = np.ones(filled.shape, np.uint8)
     for number, chain in enumerate(pixels):

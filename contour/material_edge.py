@@ -1,7 +1,8 @@
-"""The outer boundary of the material itself, for blocks whose border cells are closed: all that differs from the table.
+"""The outer boundary of the material itself, for blocks whose border cells are closed: all that differs from the
+table.
 
-Printed and moulded honeycomb, boards and foam slabs end in whole cells: their true edge is serrated, and no line through
-wall ends describes it.
+Printed and moulded honeycomb, boards and foam slabs end in whole cells: their true edge is serrated, and no line
+through wall ends describes it.
 """
 
 from __future__ import annotations
@@ -37,36 +38,41 @@ def material_edge(picture: NDArray[np.uint8], pitch: float) -> Contour:
     level = _level(difference, noise)
     region = _region(difference > level, pitch)
     chains, hierarchy = cv2.findContours(region, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    rings = [(_sub_pixel(difference, chain[:, 0, :].astype(np.float64), level), bool(node[3] >= 0))
-             for chain, node in zip(chains, hierarchy[0], strict=True) if len(chain) >= 8]
+    rings = [
+        (_sub_pixel(difference, chain[:, 0, :].astype(np.float64), level), bool(node[3] >= 0))
+        for chain, node in zip(chains, hierarchy[0], strict=True)
+        if len(chain) >= 8
+    ]
     exterior = max((ring for ring, hole in rings if not hole), key=lambda ring: abs(_shoelace(ring)))
     holes = tuple(_turned(ring, 1.0) for ring, hole in rings if hole)
     return Contour(_turned(exterior, -1.0), holes)
 
 
 def _difference(picture: NDArray[np.uint8]) -> tuple[Gray, float]:
-    """How far each pixel is from the table: largest difference over the channels, shape (H, W), uint8; the table's spread."""
+    """How far each pixel is from the table: largest difference over the channels, shape (H, W), uint8; the table's
+    spread.
+    """
     height, width = picture.shape[:2]
     channels = picture[:, :, None] if picture.ndim == 2 else picture
     grid = (max(8, width // _GRID_PX), max(8, height // _GRID_PX))
     small = cv2.resize(picture, grid, interpolation=cv2.INTER_AREA).reshape(grid[1], grid[0], -1).astype(np.float64)
     gray = channels[:, :, channels.shape[2] // 2]
-    texture = cv2.resize(cv2.absdiff(gray, cv2.blur(gray, (5, 5))), grid, interpolation=cv2.INTER_AREA)
+    rough = cv2.absdiff(gray, cv2.blur(gray, (5, 5)))
+    texture = np.asarray(cv2.resize(rough, grid, interpolation=cv2.INTER_AREA), np.uint8)
     surface, spread = _table(small, texture)
     table = np.clip(np.rint(surface), 0, 255).astype(np.uint8)
     full = cv2.resize(table, (width, height), interpolation=cv2.INTER_LINEAR).reshape(channels.shape)
-    apart = cv2.absdiff(channels, full).reshape(channels.shape)
-    largest = apart[:, :, 0]
-    for channel in range(1, apart.shape[2]):
-        largest = cv2.max(np.ascontiguousarray(largest), np.ascontiguousarray(apart[:, :, channel]))
+    apart = cv2.absdiff(channels, full).reshape(height, width, -1)
+    largest = apart.max(axis=2) if apart.shape[2] > 1 else apart[:, :, 0]
     return np.asarray(cv2.GaussianBlur(largest, (3, 3), 0), np.uint8), spread
 
 
 def _table(small: NDArray[np.float64], texture: Gray) -> tuple[NDArray[np.float64], float]:
-    """The table's light under the block too, shape of `small` (h, w, channels), and its spread: a surface of second order.
+    """The table's light under the block too, shape of `small` (h, w, channels), and its spread: a surface of second
+    order.
 
-    First through the picture's border, then through all that lies near it and is as smooth as most of the border, so that
-    vignetting is followed inwards while a board whose mean colour is the table's stays out.
+    First through the picture's border, then through all that lies near it and is as smooth as most of the border, so
+    that vignetting is followed inwards while a board whose mean colour is the table's stays out.
     """
     height, width, _ = small.shape
     y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
@@ -108,7 +114,9 @@ def _region(apart: NDArray[np.bool_], pitch: float) -> Gray:
     area = (stats[:, cv2.CC_STAT_WIDTH] * stats[:, cv2.CC_STAT_HEIGHT]).astype(np.float64)
     area[0] = 0
     if area.max() < _LEAST_SHARE * apart.size:
-        raise NoBlockFound("no block found: all that differs from the table is smaller than a block. Check that a block lies in view")
+        raise NoBlockFound(
+            "no block found: all that differs from the table is smaller than a block. Check that a block lies in view"
+        )
     piece = (labels == int(np.argmax(area))).astype(np.uint8)
     padded = cv2.copyMakeBorder(piece, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     _, inner, _, _ = cv2.connectedComponentsWithStats(1 - padded, connectivity=4)

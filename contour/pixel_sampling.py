@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 _ROW = 1024
 
 
-def sample_at(image: NDArray[np.uint8] | NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+def sample_at(
+    image: NDArray[np.uint8] | NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Bilinear values of `image` (H, W) at (x, y), in the shape of x and y; the border goes on outside."""
     # cv2.remap takes no more than 32767 rows or columns: rows of 1024, the last one filled up.
     flat = np.zeros((2, -(-x.size // _ROW) * _ROW), np.float32)

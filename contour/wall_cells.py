@@ -65,8 +65,8 @@ def probe(light: Gray, polarity: str) -> Cells:
     if best is None or best.score < _LEAST_SCORE:
         seen = "no enclosed cells" if best is None else f"{best.count} enclosed cells, of mixed size or far apart"
         raise NoBlockFound(
-            f"no block found: the most textured part of the picture shows {seen}, expected a dozen or more of one size. "
-            "Check that a block lies in view, the light, and the polarity"
+            f"no block found: the most textured part of the picture shows {seen}, "
+            "expected a dozen or more of one size. Check that a block lies in view, the light, and the polarity"
         )
     return best
 
@@ -104,7 +104,9 @@ def _busiest_tiles(light: Gray) -> list[Gray]:
 
 
 def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> Cells | None:
-    """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own pitch."""
+    """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own
+    pitch.
+    """
     best: Cells | None = None
     for guess in guesses:
         for bright in senses:
@@ -141,7 +143,7 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     # A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
     side = max(3, round(0.7 * inner))
     sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
-    walls = cv2.bitwise_and(mask, cv2.bitwise_not(cv2.dilate(sheet, np.ones((3, 3), np.uint8))))
+    walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
     wall = wall_width(walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask)
     size = inner + wall
     if wall > _WIDEST_WALL * size:
@@ -150,7 +152,16 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     filled = len(usual) * size * size * np.sqrt(3) / 2 / (height * width)
     _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
     connected = float(pieces[1:, cv2.CC_STAT_AREA].max() / max(1, pieces[1:, cv2.CC_STAT_AREA].sum()))
-    return Cells(size, wall, bright, len(usual), float(usual.sum() / areas.sum()), float(min(1.0, filled)), seen.contrast, connected)
+    return Cells(
+        size,
+        wall,
+        bright,
+        len(usual),
+        float(usual.sum() / areas.sum()),
+        float(min(1.0, filled)),
+        seen.contrast,
+        connected,
+    )
 
 
 def wall_width(mask: Gray) -> float:

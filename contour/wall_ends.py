@@ -19,7 +19,9 @@ _DEPTH_PITCHES = 0.9
 
 @dataclass(frozen=True)
 class WallEnds:
-    """Ends in mask pixels: tip (N, 2), unit axis pointing out of the wall (N, 2), length of straight wall behind (N,)."""
+    """Ends in mask pixels: tip (N, 2), unit axis pointing out of the wall (N, 2), length of straight wall behind
+    (N,).
+    """
 
     tip: Points
     axis: Points
@@ -68,7 +70,8 @@ def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) ->
     arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch)))
     everywhere = np.arange(len(chains.points))
     gap, stick, out = _arms(chains, everywhere, arm)
-    # A sharp corner of a small cell has close arms too, but sticks out into the wall. A wall one pixel wide has none of both.
+    # A sharp corner of a small cell has close arms too, but sticks out into the wall. A wall one pixel wide has none
+    # of both.
     free = (chains.free_side(everywhere, arm) * out).sum(axis=1)
     candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm) & (free > -0.5)
     peak = _peaks(chains, np.where(candidate, stick - 0.5 * gap, -np.inf), arm)
@@ -86,10 +89,10 @@ def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) ->
     return WallEnds(chains.points[peak], axis, straight)
 
 
-def _arms(
-    chains: Chains, at: NDArray[np.int64], arm: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64], Points]:
-    """Distance of the points `arm` steps back and ahead of `at`, how far each sticks out of their middle, and where to."""
+def _arms(chains: Chains, at: NDArray[np.int64], arm: int) -> tuple[NDArray[np.float64], NDArray[np.float64], Points]:
+    """Distance of the points `arm` steps back and ahead of `at`, how far each sticks out of their middle, and where
+    to.
+    """
     back, ahead = chains.points[chains.shifted(-arm, at)], chains.points[chains.shifted(arm, at)]
     out = chains.points[at] - 0.5 * (back + ahead)
     stick = np.hypot(out[:, 0], out[:, 1])

@@ -1,4 +1,6 @@
-"""What a picture says about a block's outline: witnesses along each coarse ring, the border between seeing and fitting."""
+"""What a picture says about a block's outline: witnesses along each coarse ring, the border between seeing and
+fitting.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +23,14 @@ class WitnessKind(IntEnum):
 
 @dataclass(frozen=True)
 class RingEvidence:
-    """Witnesses of one ring of the outline, in order along the coarse ring, which runs with the material on its left in the
-    y-down picture coordinates' own shoelace sense given by `is_hole` (exterior: positive shoelace in pixels; hole: negative).
+    """Witnesses of one ring of the outline, in order along the coarse ring, which runs with the material on its left
+    in the y-down picture coordinates' own shoelace sense given by `is_hole` (exterior: positive shoelace in pixels;
+    hole: negative).
 
-    coarse: coarse ring, shape (M, 2), pixels. points: where the material ends, shape (N, 2), float64, pixels, sub-pixel.
-    position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal: outward unit normal of
-    the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected standard deviation of the
-    witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind.
+    coarse: coarse ring, shape (M, 2), pixels. points: where the material ends, shape (N, 2), float64, pixels,
+    sub-pixel. position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal:
+    outward unit normal of the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected
+    standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind.
     """
 
     coarse: Ring

@@ -1,4 +1,6 @@
-"""The picture as one channel in which the walls stand out: lightness, or the colour direction where lightness does not separate."""
+"""The picture as one channel in which the walls stand out: lightness, or the colour direction where lightness does
+not separate.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,9 @@ def wall_light(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     Raises PictureError for any other shape or type.
     """
     if picture.dtype != np.uint8 or picture.ndim not in (2, 3) or (picture.ndim == 3 and picture.shape[2] != 3):
-        raise PictureError(f"the picture is {picture.dtype} of shape {picture.shape}, expected uint8 (H, W) or (H, W, 3)")
+        raise PictureError(
+            f"the picture is {picture.dtype} of shape {picture.shape}, expected uint8 (H, W) or (H, W, 3)"
+        )
     if min(picture.shape[:2]) < 16:
         raise PictureError(f"the picture is {picture.shape[1]} × {picture.shape[0]} px, expected at least 16 × 16")
     if picture.ndim == 2:
@@ -45,15 +49,19 @@ def light_from_table(
 ) -> NDArray[np.uint8] | None:
     """A channel in which walls stand out from the table as well as from cells; None where `light` already serves.
 
-    `mask`, 255 on walls, was seen in `light`, both every `hop`-th pixel of the picture both ways; cells are what it leaves free nearby, the table is the picture's
-    border. Of all channels the one is taken in which the nearer of both is farthest: the point of the segment between
-    the two colour differences that lies nearest to the origin.
+    `mask`, 255 on walls, was seen in `light`, both every `hop`-th pixel of the picture both ways; cells are what it
+    leaves free nearby, the table is the picture's border. Of all channels the one is taken in which the nearer of
+    both is farthest: the point of the segment between the two colour differences that lies nearest to the origin.
     """
     if picture.ndim == 2:
         return None
     wide = cv2.boxFilter(mask, -1, (31, 31))
     step = max(1, round(np.sqrt(mask.size / 2e5)))
-    colours, walls, near = picture[:: hop * step, :: hop * step], mask[::step, ::step] > 0, wide[::step, ::step] > _CELLS_NEAR
+    colours, walls, near = (
+        picture[:: hop * step, :: hop * step],
+        mask[::step, ::step] > 0,
+        wide[::step, ::step] > _CELLS_NEAR,
+    )
     rim = np.ones(walls.shape, np.bool_)
     margin = max(1, min(walls.shape) // 50)
     rim[margin:-margin, margin:-margin] = False
@@ -66,7 +74,9 @@ def light_from_table(
     share = float(np.clip(-(from_table @ across) / max(float(across @ across), 1e-9), 0.0, 1.0))
     direction = from_table + share * across
     length = float(np.linalg.norm(direction))
-    sign = 1.0 if float(np.median(light[::step, ::step][walls])) > float(np.median(light[::step, ::step][free])) else -1.0
+    sign = (
+        1.0 if float(np.median(light[::step, ::step][walls])) > float(np.median(light[::step, ::step][free])) else -1.0
+    )
     served = sign * min(float(from_table @ LUMA), float(from_cell @ LUMA), key=lambda gap: sign * gap)
     if length < _LEAST_COLOUR or served > _LUMA_SERVES * length:
         return None

@@ -1,8 +1,8 @@
 """How far the walls' sides show below their top edges, read from the widths of the walls themselves.
 
-Under a camera that looks down, the lower edge of a wall lies nearer to the picture's middle than its top: the wall shows
-its side, and where side and top are alike (black foil on a bright table) the wall looks wider by the parallax across it.
-Width against parallax over the ends around a block gives both the true width and the parallax.
+Under a camera that looks down, the lower edge of a wall lies nearer to the picture's middle than its top: the wall
+shows its side, and where side and top are alike (black foil on a bright table) the wall looks wider by the parallax
+across it. Width against parallax over the ends around a block gives both the true width and the parallax.
 """
 
 from __future__ import annotations
@@ -29,28 +29,33 @@ _MIDDLE_HOLD = 0.5
 
 @dataclass(frozen=True)
 class Parallax:
-    """Displacement of the walls' lower edges towards `middle` (picture pixels), as a share of the distance from it; width of
-    the walls' tops in pixels, or None where no parallax shows."""
+    """Displacement of the walls' lower edges towards `middle` (picture pixels), as a share of the distance from it;
+    width of the walls' tops in pixels, or None where no parallax shows.
+    """
 
     share: float
     middle: Points
     width: float | None
 
     def across(self, points: Points, direction: Points) -> Vector:
-        """Displacement along unit vectors `direction` (N, 2) at `points` (N, 2), positive away from the middle, pixels."""
+        """Displacement along unit vectors `direction` (N, 2) at `points` (N, 2), positive away from the middle,
+        pixels.
+        """
         return np.asarray(self.share * ((points - self.middle) * direction).sum(axis=1), np.float64)
 
 
-def parallax(light: Gray, tip: Points, axis: Points, straight: Vector, wall: float, sign: float) -> Parallax:
-    """Parallax that the ends `tip` (N, 2) with unit `axis` (N, 2) and `straight` (N,) pixels of wall behind them show."""
+def parallax(light: Gray, tip: Points, axis: Points, *, straight: Vector, wall: float, sign: float) -> Parallax:
+    """Parallax that the ends `tip` (N, 2) with unit `axis` (N, 2) and `straight` (N,) pixels of wall behind them
+    show.
+    """
     middle = np.array([(light.shape[1] - 1) / 2.0, (light.shape[0] - 1) / 2.0])
     none = Parallax(0.0, middle, None)
-    long = straight > 1.2 * wall
+    long = straight > 0.7 * wall
     if np.count_nonzero(long) < _LEAST_ENDS:
         return none
     tip, axis = tip[long], axis[long]
     normal = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
-    width = _widths(light, tip, axis, straight[long], wall, sign)
+    width = _widths(light, tip, axis, straight=straight[long], wall=wall, sign=sign)
     seen = np.isfinite(width)
     if np.count_nonzero(seen) < _LEAST_ENDS:
         return none
@@ -71,7 +76,9 @@ def _fitted(lever: Vector, normal: Points, width: Vector) -> tuple[Vector, float
     """
     side = np.sign(lever)
     weight = np.ones_like(width)
-    factors, covariance, spread = np.zeros(4), np.eye(4), 1.0
+    factors: Vector = np.zeros(4)
+    covariance: NDArray[np.float64] = np.eye(4)
+    spread = 1.0
     for _ in range(_ROUNDS):
         terms = np.stack([np.ones_like(lever), side * lever, -side * normal[:, 0], -side * normal[:, 1]], axis=1)
         root = np.sqrt(weight)[:, None]
@@ -86,7 +93,7 @@ def _fitted(lever: Vector, normal: Points, width: Vector) -> tuple[Vector, float
     return factors, spread * float(np.sqrt(covariance[1, 1]))
 
 
-def _widths(light: Gray, tip: Points, axis: Points, straight: Vector, wall: float, sign: float) -> Vector:
+def _widths(light: Gray, tip: Points, axis: Points, *, straight: Vector, wall: float, sign: float) -> Vector:
     """Width at half height a little behind each end, nan where the profile does not fall off on both sides."""
     half = np.ceil(1.2 * wall + 3)
     across = np.arange(-half, half + 0.1, 0.25)

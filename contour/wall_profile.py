@@ -15,6 +15,7 @@ Vector = NDArray[np.float64]
 
 _STEP = 0.5
 _TURNS = 4
+_FAR = 3.5
 # A wall that meets the cut at less than 20° has no end worth the name; it is fitted as if it met it so.
 _STEEPEST = 0.34
 # Of the usual height: how walls differ in it, and what a blurred step leaves unexplained of a profile.
@@ -24,8 +25,9 @@ _MISFIT = 0.1
 
 @dataclass(frozen=True)
 class FittedEnds:
-    """Ends in picture pixels (N, 2), unit axes out of the wall (N, 2), blur (standard deviation of the edge, N), wall level
-    above background (N,), standard deviation across the outline (N,), residual in grey levels (N,)."""
+    """Ends in picture pixels (N, 2), unit axes out of the wall (N, 2), blur (standard deviation of the edge, N), wall
+    level above background (N,), standard deviation across the outline (N,), residual in grey levels (N,).
+    """
 
     point: Points
     axis: Points
@@ -35,12 +37,14 @@ class FittedEnds:
     residual: Vector
 
 
-def centred_axes(light: Gray, tip: Points, axis: Points, wall: float, straight: Vector, sign: float) -> tuple[Points, Points]:
+def centred_axes(
+    light: Gray, tip: Points, axis: Points, *, wall: float, straight: Vector, sign: float
+) -> tuple[Points, Points]:
     """Tips and axes moved onto the wall's centre line: (N, 2), (N, 2), picture pixels.
 
-    Cross profiles at five places from a third of a wall's width behind the tip to `straight` (N,) pixels give the centre;
-    a line through them, the axis. Twice, because the first profiles may be taken askew. A stub shorter than one and a
-    half wall widths gives no direction; only its middle is used.
+    Cross profiles at five places from a third of a wall's width behind the tip to `straight` (N,) pixels give the
+    centre; a line through them, the axis. Twice, because the first profiles may be taken askew. A stub shorter than
+    one and a half wall widths gives no direction; only its middle is used.
     """
     first = 0.35 * wall + 0.3
     last = np.maximum(straight - 0.5 * wall - 0.5, first + 0.5)
@@ -67,16 +71,19 @@ def centred_axes(light: Gray, tip: Points, axis: Points, wall: float, straight: 
 
 @dataclass(frozen=True)
 class EndModel:
-    """What is known of all ends beforehand: true wall width and blur in pixels (blur None: to be fitted), the wall's usual height
-    above the background (None: free), noise in grey levels, how far profiles run behind and beyond the tip, +1 for bright walls or −1."""
+    """What is known of all ends beforehand: true wall width and blur in pixels (with blur_free only a start), the
+    wall's usual height above the background (None: free), noise in grey levels, how far profiles run behind and
+    beyond the tip, +1 for bright walls or −1.
+    """
 
     width: float
-    blur: float | None
+    blur: float
     height: float | None
     noise: float
     reach: float
     out: float
     sign: float
+    blur_free: bool = False
 
 
 def fit_ends(light: Gray, tip: Points, axis: Points, normal: Points, model: EndModel) -> FittedEnds:
@@ -90,36 +97,52 @@ def fit_ends(light: Gray, tip: Points, axis: Points, normal: Points, model: EndM
     cosine = np.maximum((axis * normal).sum(axis=1), _STEEPEST)
     sine = np.clip(axis[:, 0] * normal[:, 1] - axis[:, 1] * normal[:, 0], -1.0, 1.0)
     slope = np.where(cosine > _STEEPEST, sine / cosine, 0.0)
-    # A wall much wider than the blur ends along the cut; a blurred thin one looks cut off square. Between them, with the
-    # wall's profile taken as Gaussian, the share of its variance in the whole.
-    share = model.width**2 / 12 / (model.width**2 / 12 + (model.blur or 0.9) ** 2)
+    # A wall much wider than the blur ends along the cut; a blurred thin one looks cut off square. Between them, with
+    # the wall's profile taken as Gaussian, the share of its variance in the whole.
+    share = model.width**2 / 12 / (model.width**2 / 12 + model.blur**2)
     shear, widening = share * slope, np.sqrt(1 + share * slope**2)
     width = max(0.4 * model.width, 0.5)
     across = np.linspace(-width, width, max(3, 2 * round(width) + 1))
     place = along[None, :, None] - shear[:, None, None] * across
     profile = model.sign * sample_across(light, tip, axis, place, across).mean(axis=2)
-    return _fit(profile, along, tip, axis, cosine, widening, model)
+    fitted = _fit(profile, along, model.blur * widening, model)
+    close = np.abs(fitted.end[:, None] - along) < _FAR * fitted.spread[:, None]
+    misfit = np.sqrt((fitted.residual**2 * close).sum(axis=1) / np.maximum(close.sum(axis=1) - 3, 1))
+    # Samples half a pixel apart share their noise: about two of them make one independent value.
+    sigma = misfit * np.sqrt(2 * fitted.variance) * cosine
+    point = tip + fitted.end[:, None] * axis
+    return FittedEnds(point, axis, fitted.spread / widening, fitted.height, sigma, misfit)
 
 
-def _fit(
-    profile: NDArray[np.float64], along: Vector, tip: Points, axis: Points, cosine: Vector, widening: Vector, model: EndModel
-) -> FittedEnds:
-    count = len(profile)
+@dataclass(frozen=True)
+class _Steps:
+    """Fitted steps: where, how wide, how high (N,), variance of the place for unit noise (N,), residuals (N, S)."""
+
+    end: Vector
+    spread: Vector
+    height: Vector
+    variance: Vector
+    residual: NDArray[np.float64]
+
+
+def _fit(profile: NDArray[np.float64], along: Vector, spread: Vector, model: EndModel) -> _Steps:
+    """Least squares of background + height · Φ((end − s)/spread) to each profile (N, S), by Gauss-Newton on all at
+    once.
+    """
     top = np.median(profile[:, along < -1.0], axis=1)
     bottom = profile[:, along > 1.0].min(axis=1)
     end = _crossing(profile, along, 0.5 * (top + bottom))
-    spread = (model.blur if model.blur is not None else 0.9) * widening
     residual = profile
-    covariance = np.zeros((count, 3, 3))
+    variance = np.ones(len(profile))
     for _ in range(_TURNS):
         scaled = (end[:, None] - along) / spread[:, None]
         step = _normal_cdf(scaled)
         bell = np.exp(-0.5 * scaled * scaled) / (np.sqrt(2 * np.pi) * spread[:, None])
         # Far from the end other things than this end are seen: nodes behind it, dust and other walls beyond it.
-        weight = np.where(np.abs(scaled) < 3.5, 1.0, 0.05)
+        weight = np.where(np.abs(scaled) < _FAR, 1.0, 0.05)
         height = np.maximum(top - bottom, 1e-3)
         columns = [np.ones_like(step), step, height[:, None] * bell]
-        if model.blur is None:
+        if model.blur_free:
             columns.append(-height[:, None] * bell * scaled)
         jacobian = np.stack(columns, axis=1)
         residual = profile - (bottom[:, None] + height[:, None] * step)
@@ -128,26 +151,27 @@ def _fit(
         right = (weighted @ residual[:, :, None])[:, :, 0]
         if model.height is not None:
             # A stub too short for a plateau is held by the usual height, loosely: walls differ in brightness.
-            weight_of_usual = ((model.noise / model.height) ** 2 + _MISFIT**2) / _HEIGHT_SPREAD**2
-            normal[:, 1, 1] += weight_of_usual
-            right[:, 1] += weight_of_usual * (model.height - height)
+            usual = ((model.noise / model.height) ** 2 + _MISFIT**2) / _HEIGHT_SPREAD**2
+            normal[:, 1, 1] += usual
+            right[:, 1] += usual * (model.height - height)
         normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(jacobian.shape[1])
-        change = np.linalg.solve(normal, right[:, :, None])[:, :, 0]
+        inverse = np.linalg.inv(normal)
+        change = (inverse @ right[:, :, None])[:, :, 0]
         bottom = bottom + change[:, 0]
         top = bottom + np.maximum(height + change[:, 1], 1e-3)
         end = np.clip(end + np.clip(change[:, 2], -1.0, 1.0), along[0], along[-1])
-        if model.blur is None:
+        if model.blur_free:
             spread = np.clip(spread + np.clip(change[:, 3], -0.3, 0.3), 0.3, 6.0)
-        covariance = np.linalg.inv(normal)
-    close = np.abs(end[:, None] - along) < 3.5 * spread[:, None]
-    misfit = np.sqrt((residual**2 * close).sum(axis=1) / np.maximum(close.sum(axis=1) - 3, 1))
-    # Samples half a pixel apart share their noise: about two of them make one independent value.
-    sigma = misfit * np.sqrt(2 * covariance[:, 2, 2]) * cosine
-    return FittedEnds(tip + end[:, None] * axis, axis, spread / widening, top - bottom, sigma, misfit)
+        variance = inverse[:, 2, 2]
+    return _Steps(end, spread, top - bottom, variance, residual)
 
 
-def sample_across(light: Gray, tip: Points, axis: Points, along: NDArray[np.float64], across: Vector) -> NDArray[np.float64]:
-    """Grey levels at tip + along · axis + across · normal, shape (N, S, A), for along (N, S, 1) or (N, S, A), across (A,)."""
+def sample_across(
+    light: Gray, tip: Points, axis: Points, along: NDArray[np.float64], across: Vector
+) -> NDArray[np.float64]:
+    """Grey levels at tip + along · axis + across · normal, shape (N, S, A), for along (N, S, 1) or (N, S, A), across
+    (A,).
+    """
     along = np.broadcast_to(along, (len(tip), along.shape[1], len(across)))
     x = tip[:, 0, None, None] + along * axis[:, 0, None, None] - across * axis[:, 1, None, None]
     y = tip[:, 1, None, None] + along * axis[:, 1, None, None] + across * axis[:, 0, None, None]

@@ -31,7 +31,8 @@ def wall_tips(
     rectifier: Rectifier | None = None,
     on_stage: OnStage = lambda _name: None,
 ) -> Trace:
-    """The outline of the largest block in `picture`, grey (H, W) or BGR (H, W, 3), uint8, exterior and holes, in pixels.
+    """The outline of the largest block in `picture`, grey (H, W) or BGR (H, W, 3), uint8, exterior and holes, in
+    pixels.
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `on_stage` hears
     "mask" and "trace". Raises PictureError, NoBlockFound.
@@ -46,10 +47,12 @@ def wall_tips(
     if exterior.unseen_share > _MOST_UNSEEN:
         raise NoBlockFound(
             f"no block found: wall ends witness {100 * (1 - exterior.unseen_share):.0f} % of the outline, "
-            f"expected at least {100 * (1 - _MOST_UNSEEN):.0f} %. Check the light, and that the whole block lies in view"
+            f"expected at least {100 * (1 - _MOST_UNSEEN):.0f} %. "
+            "Check the light, and that all of the block lies in view"
         )
     polarity: Polarity = "dark" if seen.polarity == "dark" else "bright"
-    # Rings are fitted with the material on their left in pixels; seen in the work frame, whose y runs up, that is clockwise.
+    # Rings are fitted with the material on their left in pixels; seen in the work frame, whose y runs up, that is
+    # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
     on_stage("trace")
     return Trace("wall-tips", polarity, seen.pitch_px, contour, max(_uncertainty(ring, seen) for ring in rings))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -13,8 +15,12 @@ from contour.wall_profile import EndModel, centred_axes, fit_ends, true_width
 SIZE, SUPER = 64, 8
 
 
-def cut_wall(width: float, angle_deg: float, cut_deg: float, blur: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """A wall that comes from one side and is cut by a line through the picture's middle: picture, end, axis, cut's normal."""
+def cut_wall(
+    width: float, angle_deg: float, cut_deg: float, blur: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A wall that comes from one side and is cut by a line through the picture's middle: picture, end, axis, cut's
+    normal.
+    """
     end = np.array([31.3, 32.6])
     axis = np.array([np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))])
     turned = np.radians(angle_deg + cut_deg)
@@ -27,7 +33,7 @@ def cut_wall(width: float, angle_deg: float, cut_deg: float, blur: float) -> tup
     return np.rint(picture).astype(np.uint8), end, axis, normal
 
 
-def model(width: float, blur: float | None) -> EndModel:
+def model(width: float, blur: float) -> EndModel:
     return EndModel(width=width, blur=blur, height=None, noise=1.0, reach=10.0, out=6.0, sign=1.0)
 
 
@@ -38,7 +44,9 @@ def model(width: float, blur: float | None) -> EndModel:
     cut=st.floats(-50.0, 50.0),
     blur=st.floats(0.5, 1.6),
 )
-def test_the_end_of_a_cut_wall_is_on_the_cut_within_a_tenth_of_a_pixel(width: float, angle: float, cut: float, blur: float) -> None:
+def test_the_end_of_a_cut_wall_is_on_the_cut_within_a_tenth_of_a_pixel(
+    width: float, angle: float, cut: float, blur: float
+) -> None:
     picture, end, axis, normal = cut_wall(width, angle, cut, blur)
     start = (end + 0.7 * axis)[None]
     found = fit_ends(picture, start, axis[None], normal[None], model(width, blur))
@@ -50,7 +58,9 @@ def test_a_guess_beside_the_wall_is_moved_onto_its_middle() -> None:
     across = np.array([-axis[1], axis[0]])
     askew = axis + 0.15 * across
     askew /= np.linalg.norm(askew)
-    tip, turned = centred_axes(picture, (end + 1.2 * across)[None], askew[None], 5.0, np.array([20.0]), 1.0)
+    tip, turned = centred_axes(
+        picture, (end + 1.2 * across)[None], askew[None], wall=5.0, straight=np.array([20.0]), sign=1.0
+    )
     assert abs(float((tip[0] - end) @ across)) < 0.2
     assert float(turned[0] @ axis) > np.cos(np.radians(2.0))
 
@@ -58,7 +68,7 @@ def test_a_guess_beside_the_wall_is_moved_onto_its_middle() -> None:
 @pytest.mark.parametrize("blur", [0.6, 1.0, 1.5])
 def test_the_blur_is_read_from_the_end_of_a_wall(blur: float) -> None:
     picture, end, axis, normal = cut_wall(7.0, 40.0, 0.0, blur)
-    found = fit_ends(picture, end[None], axis[None], normal[None], model(7.0, None))
+    found = fit_ends(picture, end[None], axis[None], normal[None], replace(model(7.0, 0.9), blur_free=True))
     # The pixel's own square and bilinear sampling add to it.
     assert found.blur[0] == pytest.approx(np.hypot(blur, 0.45), abs=0.12)
 

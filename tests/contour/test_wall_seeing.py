@@ -41,14 +41,22 @@ BLOCK = rectangle((150.0, 112.0), 190.0, 130.0, 9.0)
 
 
 @cache
-def picture(pitch_mm: float = 8.0, kind: str = "honeycomb", *, dark: bool = False, clutter: bool = False, hole: bool = False) -> Rendered:
+def picture(
+    pitch_mm: float = 8.0, kind: str = "honeycomb", *, dark: bool = False, clutter: bool = False, hole: bool = False
+) -> Rendered:
     outline = with_holes(BLOCK, disc_ring((150.0, 112.0), 26.0)) if hole else BLOCK
     wall = 0.4 if kind == "perforated" else 0.08
     return render(
         Scene(
             outline,
             camera(),
-            CellGeometry(kind=kind, pitch_mm=pitch_mm, wall_mm=wall * pitch_mm, ribbon_deg=20.0, jitter=0.2 if kind == "irregular" else 0.0),
+            CellGeometry(
+                kind=kind,
+                pitch_mm=pitch_mm,
+                wall_mm=wall * pitch_mm,
+                ribbon_deg=20.0,
+                jitter=0.2 if kind == "irregular" else 0.0,
+            ),
             thickness_mm=6.0 if dark else 15.0,
             material=Material(top=0.1, side=0.06, glints=0.0) if dark else Material(),
             table=Table(level=0.75) if dark else Table(),
@@ -136,7 +144,9 @@ def test_chips_and_dust_beside_the_block_are_no_witnesses() -> None:
 
 
 def test_a_bright_perforated_table_is_not_taken_for_walls() -> None:
-    scene = Scene(BLOCK, camera(), CellGeometry(pitch_mm=8.0, wall_mm=0.6), table=Table(level=0.3, perforation_pitch_mm=12.0))
+    scene = Scene(
+        BLOCK, camera(), CellGeometry(pitch_mm=8.0, wall_mm=0.6), table=Table(level=0.3, perforation_pitch_mm=12.0)
+    )
     rendered = render(scene)
     ring = see_block(rendered.picture, "auto").rings[0]
     assert np.mean(np.abs(signed_distance(rendered.truth_px, ring.points)) < 1.5) > 0.75
@@ -158,7 +168,7 @@ def test_walls_as_bright_as_the_table_are_seen_by_colour() -> None:
 
 def test_an_empty_mask_is_no_block() -> None:
     with pytest.raises(NoBlockFound, match="no block found"):
-        coarse_block(np.zeros((300, 400), np.uint8), 20.0, 3.0)
+        coarse_block(np.zeros((300, 400), np.uint8), np.zeros((300, 400), np.uint8), 20.0, 3.0)
 
 
 @pytest.mark.parametrize("shape", [(600, 800, 4), (8, 800), (600,)])

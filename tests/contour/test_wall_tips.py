@@ -136,7 +136,9 @@ def test_an_empty_table_is_no_block(table: Table) -> None:
 
 
 def test_a_block_that_leaves_the_picture_is_traced_along_its_border() -> None:
-    rendered = render(Scene(rectangle((150.0, 112.0), 400.0, 120.0, 5.0), CAMERA, CellGeometry(pitch_mm=8.0, wall_mm=0.6)))
+    rendered = render(
+        Scene(rectangle((150.0, 112.0), 400.0, 120.0, 5.0), CAMERA, CellGeometry(pitch_mm=8.0, wall_mm=0.6))
+    )
     exterior = wall_tips(rendered.picture, SETTINGS).contour.exterior
     assert exterior[:, 0].min() < 2.0
     assert exterior[:, 0].max() > 797.0

@@ -1,0 +1,148 @@
+"""Witnesses made ready for the fit: complex points, one noise scale, and what an outlier costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contour.outline_models import Complex, Index, Models, Real, distance
+from contour.tracing import Rectifier
+from contour.wall_evidence import RingEvidence, WitnessKind
+
+# Shares of witnesses that are no clean wall end, for the price of calling one an outlier.
+_SHARE_INSIDE = 0.20
+_SHARE_OUTSIDE = 0.02
+_LEAST_SIGMA_PX = 0.04
+_DEEPEST = 1.3
+# How much cheaper an outermost point's depth is: the wall behind a zigzag edge lies anywhere within half a pitch.
+_SERRATION = 0.03
+
+
+@dataclass(frozen=True)
+class Witnesses:
+    """Witnesses of one ring in travel order, shape (N,) each, in pixels of the fitting plane.
+
+    points and normal (outwards) are complex. inner, outer: standard deviations for points inside and outside of the
+    outline. cap_inside, cap_outside: the most a point costs there (nats). clean: a wall end, fit to measure the noise
+    by. gap: distance to the next witness along the coarse ring (cyclic).
+    """
+
+    points: Complex
+    normal: Complex
+    inner: Real
+    outer: Real
+    cap_inside: Real
+    cap_outside: Real
+    clean: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    gap: Real
+    pitch: float
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None) -> Witnesses:
+    """The ring's witnesses in the fitting plane (rectified where `rectifier` is given), with noise as the evidence
+    states it."""
+    points, normal = evidence.points, evidence.normal
+    if rectifier is not None:
+        ahead = rectifier.rectify(points + normal)
+        points = rectifier.rectify(points)
+        normal = ahead - points
+    z = points[:, 0] + 1j * points[:, 1]
+    outwards = normal[:, 0] + 1j * normal[:, 1]
+    outwards = (outwards / np.maximum(np.abs(outwards), 1e-12)).astype(np.complex128)
+    outermost = evidence.kind == WitnessKind.OUTERMOST
+    sigma = np.maximum(evidence.sigma, _LEAST_SIGMA_PX)
+    coarse = evidence.coarse
+    length = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
+    gap = np.diff(evidence.position, append=evidence.position[:1] + length)
+    inner = np.where(outermost, np.maximum(sigma, _SERRATION * pitch_px), sigma)
+    witnesses = Witnesses(z, outwards, inner, sigma, inner, inner, ~outermost, np.maximum(gap, 0.0), pitch_px)
+    return scaled(witnesses, 1.0)
+
+
+def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
+    """The same witnesses with all standard deviations times `factor`, and outlier prices that follow from them.
+
+    A point is an outlier when a uniform law over a pitch explains it better than its normal law: the price is the log
+    of their odds at the outline itself.
+    """
+    inner, outer = witnesses.inner * factor, witnesses.outer * factor
+    odds = witnesses.pitch / (np.sqrt(2.0 * np.pi) * np.minimum(inner, outer))
+    inside = np.log((1.0 - _SHARE_INSIDE) / _SHARE_INSIDE * odds)
+    outside = np.log((1.0 - _SHARE_OUTSIDE) / _SHARE_OUTSIDE * odds)
+    return replace(
+        witnesses,
+        inner=inner,
+        outer=outer,
+        cap_inside=np.where(witnesses.inner > witnesses.outer * 1.01, 3.0, np.clip(inside, 3.0, 5.5)),
+        cap_outside=np.clip(outside, 5.0, 6.5),
+    )
+
+
+def cost(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
+    """Nats of signed distances (last axis: the witnesses at `index`, or index's own shape): half squares, capped
+    either side.
+
+    Beyond a cell's depth the cap rises again: one missing cell or broken wall reaches no deeper.
+    """
+    outside = signed > 0.0
+    sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
+    cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
+    beyond = np.clip(np.abs(signed) / witnesses.pitch - _DEEPEST, 0.0, 3.0)
+    return np.minimum(0.5 * (signed / sigma) ** 2, cap) + 4.0 * beyond**2
+
+
+def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
+    """Weights of a robust fit, 1/pixel^2: inverse variance, falling smoothly to 0 where the cost reaches its inner cap.
+
+    The same cap on both sides, or clean noise alone would pull the outline outwards.
+    """
+    outside = signed > 0.0
+    sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
+    cap = witnesses.cap_inside[index]
+    inverse = 1.0 / sigma**2
+    within = np.maximum(1.0 - 0.5 * signed**2 * inverse / cap, 0.0)
+    return within**2 * inverse
+
+
+def noise_from_neighbours(witnesses: Witnesses) -> float:
+    """Noise over the stated one, from how far each witness lies off the chord of its neighbours; between 0.5 and 3.
+
+    The lesser of that and of its excess over the neighbours' own (which a bend does not raise). Reads the lower
+    quarter of the deviations: a fifth of deep witnesses spoils about half of the triples.
+    """
+    if len(witnesses) < 8:
+        return 1.0
+    points = witnesses.points
+    back, ahead = np.roll(points, 1), np.roll(points, -1)
+    chord = ahead - back
+    share = np.clip(((points - back) * chord.conj()).real / np.maximum(np.abs(chord) ** 2, 1e-12), 0.0, 1.0)
+    off = ((points - back - share * chord) * witnesses.normal.conj()).real
+    sound = witnesses.clean & np.roll(witnesses.clean, 1) & np.roll(witnesses.clean, -1)
+    if sound.sum() < 8:
+        return 1.0
+    simple = off / (witnesses.outer * np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
+    # 1.5, -1, -1, 1/4, 1/4 are the weights of five even neighbours in the excess: 2.09 is the root of their squares'
+    # sum.
+    excess = (off - 0.5 * (np.roll(off, 1) + np.roll(off, -1))) / (2.09 * witnesses.outer)
+    level = min(float(np.quantile(np.abs(simple[sound]), 0.25)), float(np.quantile(np.abs(excess[sound]), 0.25)))
+    return float(np.clip(level / 0.36, 0.5, 3.0))
+
+
+def noise_from_residuals(witnesses: Witnesses, signed: Real) -> float:
+    """Noise over the present one, from the clean witnesses' distances to their own models; 1 where there are too
+    few."""
+    ratio = np.abs(signed[witnesses.clean] / witnesses.outer[witnesses.clean])
+    ratio = ratio[ratio < 4.0]
+    if len(ratio) < 8:
+        return 1.0
+    return float(np.clip(np.median(ratio) / 0.6745, 0.5, 2.0))
+
+
+def window_cost(witnesses: Witnesses, models: Models, index: Index) -> Real:
+    """Cost of each model at its own witnesses: models of shape (K,), index of shape (K, m); result (K, m)."""
+    signed = distance(models.take((slice(None), None)), witnesses.points[index])
+    return cost(witnesses, signed, index)

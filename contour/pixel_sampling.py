@@ -1,0 +1,23 @@
+"""Values of an image between its pixels, for any number of places at once."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+_ROW = 1024
+
+
+def sample_at(
+    image: NDArray[np.uint8] | NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Bilinear values of `image` (H, W) at (x, y), in the shape of x and y; the border goes on outside."""
+    # cv2.remap takes no more than 32767 rows or columns: rows of 1024, the last one filled up.
+    flat = np.zeros((2, -(-x.size // _ROW) * _ROW), np.float32)
+    flat[0, : x.size], flat[1, : x.size] = x.ravel(), y.ravel()
+    if not x.size:
+        return np.zeros(x.shape)
+    places = flat.reshape(2, -1, _ROW)
+    values = cv2.remap(image, places[0], places[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(values, np.float64).ravel()[: x.size].reshape(x.shape)

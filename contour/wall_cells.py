@@ -1,0 +1,170 @@
+"""The scale of a block read from the picture itself: cell pitch, wall width, and whether walls are bright or dark."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.errors import NoBlockFound
+from contour.wall_mask import wall_mask
+
+Gray = NDArray[np.uint8]
+
+_TILE_PX = 512
+_TILES = 4
+# First guesses of the pitch; the mask's windows forgive a factor of two either way.
+_GUESSES = (24.0, 70.0, 8.0)
+_GOOD_SCORE = 0.2
+_LEAST_SCORE = 0.04
+# A sheet with holes far apart is a table, not a plate of cells.
+_WIDEST_WALL = 0.65
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
+    the part of the tile they fill, the wall contrast in grey levels, and the share of
+    the walls that hang together."""
+
+    pitch: float
+    wall: float
+    bright: bool
+    count: int
+    regularity: float
+    filled: float
+    contrast: float
+    connected: float
+
+    @property
+    def score(self) -> float:
+        """Larger for a better comb: many cells, of one size, over most of the tile."""
+        return self.regularity * self.filled * self.connected * min(1.0, self.count / 12)
+
+
+def probe(light: Gray, polarity: str) -> Cells:
+    """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound.
+
+    The busiest tile at full size is asked first, then the whole picture at a quarter of its size, where large cells are
+    many, then further tiles. The first good answer is taken, else the best.
+    """
+    senses = [bright for bright in (True, False) if polarity != ("dark" if bright else "bright")]
+    best: Cells | None = None
+    for part, shrink in _parts(light):
+        found = _part_cells(part, senses, _GUESSES if shrink == 1 else _GUESSES[:2])
+        if found is None:
+            continue
+        found = replace(found, pitch=found.pitch * shrink, wall=found.wall * shrink)
+        if best is None or found.score > best.score:
+            best = found
+        if best.score > _GOOD_SCORE:
+            break
+    if best is None or best.score < _LEAST_SCORE:
+        seen = "no enclosed cells" if best is None else f"{best.count} enclosed cells, of mixed size or far apart"
+        raise NoBlockFound(
+            f"no block found: the most textured part of the picture shows {seen}, "
+            "expected a dozen or more of one size. Check that a block lies in view, the light, and the polarity"
+        )
+    return best
+
+
+def _parts(light: Gray) -> Iterator[tuple[Gray, int]]:
+    tiles = _busiest_tiles(light)
+    yield from ((tile, 1) for tile in tiles[:1])
+    if min(light.shape) >= 4 * 64:
+        quarter = cv2.resize(light, (light.shape[1] // 4, light.shape[0] // 4), interpolation=cv2.INTER_AREA)
+        yield np.asarray(quarter, np.uint8), 4
+    yield from ((tile, 1) for tile in tiles[1:])
+
+
+def _busiest_tiles(light: Gray) -> list[Gray]:
+    """Tiles of up to 512 px with the most local contrast, busiest first, apart from each other."""
+    block = 32
+    sample = light[::4, ::4].astype(np.float32)
+    shape = (max(1, light.shape[1] // block), max(1, light.shape[0] // block))
+    mean = cv2.resize(sample, shape, interpolation=cv2.INTER_AREA)
+    square = cv2.resize(sample * sample, shape, interpolation=cv2.INTER_AREA)
+    # The root of the deviation, or one glaring object outweighs a whole dim block.
+    activity = np.sqrt(np.sqrt(np.maximum(square - mean * mean, 0.0)))
+    half = _TILE_PX // block // 2
+    smooth = cv2.blur(activity, (2 * half + 1, 2 * half + 1), borderType=cv2.BORDER_CONSTANT)
+    tiles = []
+    for _ in range(_TILES):
+        row, column = np.unravel_index(int(np.argmax(smooth)), smooth.shape)
+        if smooth[row, column] <= 0:
+            break
+        top = int(np.clip(int(row) * block - _TILE_PX // 2, 0, max(0, light.shape[0] - _TILE_PX)))
+        left = int(np.clip(int(column) * block - _TILE_PX // 2, 0, max(0, light.shape[1] - _TILE_PX)))
+        tiles.append(light[top : top + _TILE_PX, left : left + _TILE_PX])
+        smooth[max(0, row - half) : row + half + 1, max(0, column - half) : column + half + 1] = 0
+    return tiles
+
+
+def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> Cells | None:
+    """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own
+    pitch.
+    """
+    best: Cells | None = None
+    for guess in guesses:
+        for bright in senses:
+            cells = cells_of(part, guess, bright=bright)
+            if cells is not None and (best is None or cells.score > best.score):
+                best = cells
+        # Good enough in one sense and guess, while the other sense was heard too.
+        if best is not None and best.score > _GOOD_SCORE:
+            break
+    return None if best is None else cells_of(part, best.pitch, bright=best.bright) or best
+
+
+def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
+    """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are enclosed."""
+    seen = wall_mask(light, pitch, bright=bright)
+    mask = seen.mask
+    floor = cv2.bitwise_not(mask)
+    _, _, stats, _ = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
+    height, width = mask.shape
+    left, top, wide, high, area = (stats[1:, column] for column in range(5))
+    enclosed = (left > 0) & (top > 0) & (left + wide < width) & (top + high < height)
+    round_enough = (area > 0.3 * wide * high) & (np.maximum(wide, high) < 4 * np.minimum(wide, high))
+    areas = np.sort(area[enclosed & round_enough & (area >= 9)].astype(np.float64))
+    if len(areas) < 6:
+        return None
+    # Half of the enclosed *area* lies in cells smaller than this, so that specks do not count; then merged cells are
+    # told from single ones by a plain median.
+    by_area = areas[np.searchsorted(np.cumsum(areas), 0.5 * areas.sum())]
+    typical = float(np.median(areas[areas > by_area / 3]))
+    usual = areas[(areas > typical / 2) & (areas < 2 * typical)]
+    if len(usual) < 6:
+        return None
+    inner = float(np.sqrt(2 / np.sqrt(3) * np.median(usual)))
+    # A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
+    side = max(3, round(0.7 * inner))
+    sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
+    wall = wall_width(walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask)
+    size = inner + wall
+    if wall > _WIDEST_WALL * size:
+        return None
+    # Area a regular comb of this pitch would fill with as many cells.
+    filled = len(usual) * size * size * np.sqrt(3) / 2 / (height * width)
+    _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
+    connected = float(pieces[1:, cv2.CC_STAT_AREA].max() / max(1, pieces[1:, cv2.CC_STAT_AREA].sum()))
+    return Cells(
+        size,
+        wall,
+        bright,
+        len(usual),
+        float(usual.sum() / areas.sum()),
+        float(min(1.0, filled)),
+        seen.contrast,
+        connected,
+    )
+
+
+def wall_width(mask: Gray) -> float:
+    """Mean wall width of a mask, pixels: area over half its boundary length (Cauchy-Crofton: π/4 of its crossings)."""
+    crossings = np.count_nonzero(mask[1:] != mask[:-1]) + np.count_nonzero(mask[:, 1:] != mask[:, :-1])
+    return float(2 * np.count_nonzero(mask) / max(1.0, np.pi / 4 * crossings))

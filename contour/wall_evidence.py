@@ -1,0 +1,59 @@
+"""What a picture says about a block's outline: witnesses along each coarse ring, the border between seeing and
+fitting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry import Ring
+
+
+class WitnessKind(IntEnum):
+    """How well a witness was seen, best first."""
+
+    CLEAN = 0  # the end of a wall that sticks out: a cut wall seen whole
+    BLUNT = 1  # an end that is wide, short or merged with a neighbour: less sure along its axis
+    OUTERMOST = 2  # no wall end within a pitch: the outermost wall point there (a wall that lies along the cut)
+
+
+@dataclass(frozen=True)
+class RingEvidence:
+    """Witnesses of one ring of the outline, in order along the coarse ring, which runs with the material on its left
+    in the y-down picture coordinates' own shoelace sense given by `is_hole` (exterior: positive shoelace in pixels;
+    hole: negative).
+
+    coarse: coarse ring, shape (M, 2), pixels. points: where the material ends, shape (N, 2), float64, pixels,
+    sub-pixel. position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal:
+    outward unit normal of the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected
+    standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind.
+    """
+
+    coarse: Ring
+    is_hole: bool
+    points: NDArray[np.float64]
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    kind: NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class BlockEvidence:
+    """All that was seen of one block: its rings (exterior first), cell pitch and wall width in pixels, polarity.
+
+    leaves_picture: whether the block runs out of the picture, so that its rings follow the picture's border there.
+    """
+
+    rings: tuple[RingEvidence, ...]
+    pitch_px: float
+    wall_px: float
+    polarity: str
+    blur_px: float
+    noise: float
+    contrast: float
+    leaves_picture: bool = False

@@ -1,0 +1,142 @@
+"""Wall mask: where the picture shows wall, at half the local wall contrast, whatever the lighting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Gray = NDArray[np.uint8]
+Float = NDArray[np.float32]
+
+# Standard deviations above the level of cells, itself 1.25 below the mean where there is nothing but noise: lower, and
+# the table fills with specks.
+NOISE_FLOOR = 4.0
+# The maps of local light need no more than this many samples a pitch.
+_MAP_SAMPLES = 8
+# Foils side by side differ in brightness by a factor of three: a threshold halfway up loses the dimmer ones.
+_RISE = 0.35
+# Walls of fine cells run into each other at that height.
+_FINE_RISE = 0.08
+_REGION_RISE = 0.25
+# Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
+_PICTURE_RISE = 0.2
+_BYTE_CONTRAST = 40.0
+_FINE_PITCH = 12.0
+# What a fifth of normal deviates stay below in size, in standard deviations.
+_FIFTH_OF_NORMAL = 0.2533
+
+
+@dataclass(frozen=True)
+class WallMask:
+    """Mask (H, W), uint8, 255 on walls; noise and median wall contrast in grey levels of the picture it came from."""
+
+    mask: Gray
+    noise: float
+    contrast: float
+
+
+def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0) -> WallMask:
+    """Walls of `light` (H, W) where cells are about `pitch` pixels apart and walls are brighter (or darker) than cells.
+
+    The local mean over 1.5 pitches flattens the light without a model of it. The threshold lies a third of the
+    way from the local level of cells to that of walls, each a mean weighted with its own difference, whatever share of
+    the area is wall; it is never below NOISE_FLOOR times the noise. `contrast`, where it is known, sets one
+    more floor, and above 40 levels allows a faster way.
+    """
+    # Grey levels are kept in 1/32 where steps of one would show in the threshold; bytes are faster for the rest.
+    unit = 1 if contrast > _BYTE_CONTRAST else 32
+    smooth = cv2.GaussianBlur(light if unit == 1 else light.astype(np.uint16) * np.uint16(unit), (3, 3), 0)
+    step = max(1, int(pitch / _MAP_SAMPLES))
+    grid = (-(-light.shape[1] // step), -(-light.shape[0] // step))
+    mean = (cv2.resize(smooth, grid, interpolation=cv2.INTER_AREA) if step > 1 else smooth).astype(np.float32)
+    mean = cv2.blur(mean, (_odd(1.5 * pitch / step),) * 2, borderType=cv2.BORDER_REFLECT)
+    # Every step-th pixel, not their average: an average would take the walls' contrast away.
+    sample = smooth[step // 2 :: step, step // 2 :: step].astype(np.float32)
+    local = sample - mean[: sample.shape[0], : sample.shape[1]]
+    if not bright:
+        local = -local
+    noise = _noise_level(smooth, pitch, unit)
+    upper, lower, region = _levels(local, pitch / step)
+    # All three count from the level of cells, which on a bare table is the noise below its mean.
+    share = _RISE + _FINE_RISE * float(np.clip((16 - pitch) / 8, 0, 1))
+    rise = np.maximum(share * (upper + lower), np.maximum(_REGION_RISE * region, NOISE_FLOOR * noise))
+    rise = np.maximum(rise, _PICTURE_RISE * contrast * unit)
+    offset = rise - lower
+    offset = cv2.copyMakeBorder(
+        offset, 0, grid[1] - offset.shape[0], 0, grid[0] - offset.shape[1], cv2.BORDER_REPLICATE
+    )
+    threshold = np.clip(mean + offset if bright else mean - offset, 0, 255 * unit).astype(smooth.dtype)
+    if step > 1:
+        threshold = cv2.resize(threshold, (light.shape[1], light.shape[0]), interpolation=cv2.INTER_LINEAR)
+    mask = cv2.compare(smooth, threshold, cv2.CMP_GT if bright else cv2.CMP_LT)
+    span = upper + lower
+    strong = span[span > 0.5 * np.quantile(span[::4, ::4], 0.98)]
+    typical = float(np.median(strong[:: max(1, strong.size // 4096)])) if strong.size else 0.0
+    return WallMask(np.asarray(mask, np.uint8), noise / unit, typical / unit)
+
+
+def _noise_level(smooth: NDArray[np.uint8 | np.uint16], pitch: float, unit: int) -> float:
+    """Standard deviation of what varies within the quietest tiles, each about a third of a pitch wide."""
+    tile = max(3, round(pitch / 3))
+    hop = max(1, round(np.sqrt(smooth.size / (2e5))))
+    rows = smooth[: smooth.shape[0] // tile * tile]
+    rows = rows.reshape(-1, tile, smooth.shape[1])[::hop]
+    columns = smooth.shape[1] // tile
+    tiles = rows[:, :, : columns * tile].reshape(rows.shape[0], tile, columns, tile)[:, :, ::hop]
+    if tiles.size == 0:
+        return 0.3 * unit
+    quiet = float(np.quantile(tiles.astype(np.float32).std(axis=(1, 3)), 0.2))
+    if pitch < _FINE_PITCH:
+        # No tile of fine cells is quiet, but second differences both ways see little of a blurred structure, and keep
+        # the noise that the light blur left as it is.
+        part = smooth[: 1 << 9, : 1 << 9].astype(np.float32)
+        rows = part[:, :-2] - 2 * part[:, 1:-1] + part[:, 2:]
+        second = np.abs(rows[:-2] - 2 * rows[1:-1] + rows[2:])
+        quiet = min(quiet, float(np.quantile(second, 0.2)) / _FIFTH_OF_NORMAL)
+        # Walls of no more than twelve times their noise would not show as cells at all.
+        quiet = min(quiet, float(smooth[::hop].std()) / 6)
+    return max(quiet, 0.3 * unit)
+
+
+def _levels(local: Float, pitch: float) -> tuple[Float, Float, Float]:
+    """Local level of walls above, and of cells below, the local mean, and the level of walls of the wider region.
+
+    `pitch` in samples of `local`. The region spans a dozen pitches: on the table beside a block it still holds the
+    level of the block's walls, so that the table's own texture stays below the threshold.
+    """
+    # Glints and dust would raise the threshold around them and wipe out faint walls nearby.
+    above = np.minimum(np.maximum(local, 0), _typical_peak(local, pitch))
+    square = above * above
+    window = _odd(1.3 * pitch)
+    upper = _ratio(cv2.blur(square, (window, window)), cv2.blur(above, (window, window)))
+    below = np.maximum(-local, 0)
+    lower = _ratio(cv2.blur(below * below, (window, window)), cv2.blur(below, (window, window)))
+    coarse = max(1, round(pitch / 2))
+    grid = (max(1, local.shape[1] // coarse), max(1, local.shape[0] // coarse))
+    wide = (_odd(12 * pitch / coarse),) * 2
+    sums = [cv2.blur(cv2.resize(part, grid, interpolation=cv2.INTER_AREA), wide) for part in (square, above)]
+    region = cv2.resize(_ratio(*sums), (local.shape[1], local.shape[0]), interpolation=cv2.INTER_LINEAR)
+    return upper, lower, np.asarray(region, np.float32)
+
+
+def _typical_peak(local: Float, pitch: float) -> float:
+    """What half of the walls' peaks over tiles of a pitch stay below."""
+    size = max(2, round(pitch))
+    rows, columns = local.shape[0] // size, local.shape[1] // size
+    if rows < 2 or columns < 2:
+        return float(local.max())
+    tiles = local[: rows * size, : columns * size].reshape(rows, size, columns, size).max(axis=(1, 3))
+    walls = tiles[tiles > 0.25 * tiles.max()]
+    return float(np.quantile(walls, 0.5))
+
+
+def _ratio(square: Float, weight: Float) -> Float:
+    """Mean of values weighted by themselves from the sums of their squares and of themselves; 0 where they vanish."""
+    return np.asarray(square / np.maximum(weight, 1e-3), np.float32)
+
+
+def _odd(size: float) -> int:
+    return max(3, 2 * round(size / 2) + 1)

@@ -1,0 +1,91 @@
+"""`wall-tips`: the line along which a block was cut, through the ends of its cell walls."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.errors import NoBlockFound
+from contour.geometry import Contour
+from contour.material_edge import material_edge
+from contour.outline_fit import FittedRing, fit_ring
+from contour.tracing import OnStage, Polarity, Rectifier, Trace, TraceSettings
+from contour.wall_cells import probe
+from contour.wall_evidence import BlockEvidence, RingEvidence
+from contour.wall_light import wall_light
+from contour.wall_witnesses import see_block
+
+__all__ = ["see_block", "wall_tips"]
+
+_LEAST_WITNESSES = 8
+# With more of the outline unseen than this there is nothing to say about its corners.
+_MOST_UNSEEN = 0.5
+# What no scene has been traced better than, pixels: side walls in view, blur that is not the same everywhere.
+_FLOOR_PX = 0.1
+
+
+def wall_tips(
+    picture: NDArray[np.uint8],
+    settings: TraceSettings,
+    *,
+    rectifier: Rectifier | None = None,
+    on_stage: OnStage = lambda _name: None,
+) -> Trace:
+    """The outline of the largest block in `picture`, grey (H, W) or BGR (H, W, 3), uint8, exterior and holes, in
+    pixels.
+
+    `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `on_stage` hears
+    "mask" and "trace". Raises PictureError, NoBlockFound.
+    """
+    if settings.edge == "cells":
+        return _closed_cells(picture, settings, on_stage)
+    seen = see_block(picture, settings.polarity, lambda: on_stage("mask"))
+    if seen.leaves_picture:
+        return _cut_off(picture, seen, on_stage)
+    rings = [_fitted(ring, seen, rectifier) for ring in seen.rings]
+    exterior = rings[0]
+    if exterior.unseen_share > _MOST_UNSEEN:
+        raise NoBlockFound(
+            f"no block found: wall ends witness {100 * (1 - exterior.unseen_share):.0f} % of the outline, "
+            f"expected at least {100 * (1 - _MOST_UNSEEN):.0f} %. "
+            "Check the light, and that all of the block lies in view"
+        )
+    polarity: Polarity = "dark" if seen.polarity == "dark" else "bright"
+    # Rings are fitted with the material on their left in pixels; seen in the work frame, whose y runs up, that is
+    # clockwise.
+    contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
+    on_stage("trace")
+    return Trace("wall-tips", polarity, seen.pitch_px, contour, max(_uncertainty(ring, seen) for ring in rings))
+
+
+def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
+    """The coarse outline of a block that leaves the picture, along the picture's border there: for a refusal to show."""
+    last = np.array([picture.shape[1] - 1.0, picture.shape[0] - 1.0])
+    rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
+    on_stage("trace")
+    polarity: Polarity = "dark" if seen.polarity == "dark" else "bright"
+    return Trace("wall-tips", polarity, seen.pitch_px, Contour(rings[0], tuple(rings[1:])), 0.5 * seen.pitch_px)
+
+
+def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
+    """The serrated boundary of a block whose border cells are closed; that it is a block at all, its cells must show."""
+    cells = probe(wall_light(picture), settings.polarity)
+    on_stage("mask")
+    contour = material_edge(picture, cells.pitch)
+    on_stage("trace")
+    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch, contour)
+
+
+def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:
+    if len(ring.points) < _LEAST_WITNESSES:
+        what = "a hole's edge" if ring.is_hole else "the block's edge"
+        raise NoBlockFound(
+            f"no block found: {len(ring.points)} wall ends along {what}, expected at least {_LEAST_WITNESSES}. "
+            "Check focus and light"
+        )
+    return fit_ring(ring, pitch_px=seen.pitch_px, wall_px=seen.wall_px, rectifier=rectifier)
+
+
+def _uncertainty(ring: FittedRing, seen: BlockEvidence) -> float:
+    """Expected error along a ring, pixels: a floor, the inliers' spread, and what lies between its witnesses."""
+    return float(np.hypot(_FLOOR_PX, 0.5 * ring.spread_px) + 0.1 * seen.pitch_px * ring.unseen_share)

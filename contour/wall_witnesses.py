@@ -1,0 +1,192 @@
+"""Witnesses of a block's outline: from a picture to where its material ends, wall by wall."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.coarse_block import CoarseBlock, coarse_block
+from contour.wall_cells import Cells, probe
+from contour.wall_ends import edge_chains, find_ends, outermost
+from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
+from contour.wall_light import light_from_table, wall_light
+from contour.wall_mask import WallMask, wall_mask
+from contour.wall_parallax import Parallax, parallax
+from contour.wall_profile import EndModel, centred_axes, fit_ends, true_width
+
+Gray = NDArray[np.uint8]
+Points = NDArray[np.float64]
+Vector = NDArray[np.float64]
+
+_HALF_SIZE_ABOVE_PX = 6_000_000
+# Sharpest and softest blur that a lens in use leaves; outside of it the fit has seen something else.
+_BLUR_PX = (0.4, 3.0)
+_USUAL_BLUR_PX = 0.9
+# A second witness within this of another says nothing new.
+_LONELY_PITCHES = 0.3
+_MOST_SIGMA_PX = 1.0
+# Of the usual height: fainter ends are not ends of walls.
+_LEAST_HEIGHT = 0.4
+# What blunter things than noise do to clean ends and to blunt ones, and to sides fitted and not.
+_MODEL_SIGMA_PX = (0.2, 0.3)
+_SIDE_SIGMA_PX = (0.5, 1.0)
+_NEAR_PX = 1.5
+# What the mask's own light blur (3 × 3) adds.
+_MASK_BLUR_PX = 0.8
+# Walls of such cells are two pixels wide and more: every second pixel tells their colour.
+_SUBSAMPLED_PITCH = 20.0
+
+
+def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
+    """Witnesses of the largest block in a picture, grey (H, W) or BGR (H, W, 3), uint8.
+
+    `on_mask` is called when the wall mask is made. Raises PictureError, NoBlockFound.
+    """
+    light = wall_light(picture)
+    cells = probe(light, polarity)
+    if picture.ndim == 3:
+        hop = 2 if cells.pitch > _SUBSAMPLED_PITCH else 1
+        sample = np.ascontiguousarray(light[::hop, ::hop])
+        walls = wall_mask(sample, cells.pitch / hop, bright=cells.bright, contrast=cells.contrast).mask
+        coloured = light_from_table(picture, sample, walls, hop)
+        if coloured is not None:
+            light, cells = coloured, probe(coloured, "bright")
+    scale = 2 if light.size > _HALF_SIZE_ABOVE_PX and cells.pitch > 20 and cells.wall > 2.5 else 1
+    small = (
+        light
+        if scale == 1
+        else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
+    )
+    seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
+    on_mask()
+    coarse = coarse_block(seen.mask, small, cells.pitch / scale, cells.wall / scale)
+    return _evidence(light, seen, coarse, cells, scale)
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """Ends in picture pixels before they are fitted: tip, axis and outward normal (N, 2), straight wall behind (N,)."""
+
+    tip: Points
+    axis: Points
+    normal: Points
+    straight: Vector
+
+
+@dataclass(frozen=True)
+class _Witnesses:
+    points: Points
+    kind: NDArray[np.int8]
+    sigma: Vector
+
+
+def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, scale: int) -> BlockEvidence:
+    pitch, wall = cells.pitch / scale, max(1.0, cells.wall / scale)
+    chains = edge_chains(seen.mask, coarse, pitch)
+    found = find_ends(chains, coarse, pitch, wall)
+    outer = chains.points[outermost(chains, coarse, pitch)]
+    sign = 1.0 if cells.bright else -1.0
+    straight = found.straight * scale
+    tip, axis = centred_axes(
+        light, (found.tip + 0.5) * scale - 0.5, found.axis, wall=cells.wall, straight=straight, sign=sign
+    )
+    depth = parallax(light, tip, axis, straight=straight, wall=cells.wall, sign=sign)
+    if depth.width is not None:
+        # The top is the half of the band that lies away from the picture's middle.
+        across = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
+        tip = tip + 0.5 * depth.across(tip, across)[:, None] * across
+    ends = _Ends(tip, axis, coarse.feet(found.tip)[2], straight)
+    model = _learnt(light, ends, cells, depth.width or cells.wall, seen)
+    tips = _tips(light, ends, cells, model)
+    tips = replace(tips, points=_raised(tips.points, coarse.feet((tips.points + 0.5) / scale - 0.5)[2], depth))
+    outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch]
+    normal = coarse.feet(outer)[2]
+    sides = _sides(light, (outer + 0.5) * scale - 0.5, normal, cells, model)
+    sides = replace(sides, points=_raised(sides.points, normal, depth))
+    polarity = "bright" if cells.bright else "dark"
+    return BlockEvidence(
+        _rings(coarse, tips, sides, scale),
+        cells.pitch,
+        cells.wall,
+        polarity,
+        model.blur,
+        seen.noise,
+        seen.contrast,
+        coarse.leaves,
+    )
+
+
+def _learnt(light: Gray, ends: _Ends, cells: Cells, wall: float, seen: WallMask) -> EndModel:
+    """What the straightest ends say of all: blur, usual height, and the true width of walls that measure `wall`."""
+    model = EndModel(
+        width=true_width(wall, float(np.hypot(_USUAL_BLUR_PX, _MASK_BLUR_PX))),
+        blur=_USUAL_BLUR_PX,
+        height=None,
+        noise=seen.noise,
+        reach=float(np.clip(0.3 * cells.pitch, 2.5, 2 * cells.wall + 4)),
+        out=float(np.clip(0.25 * cells.pitch, 3.0, 6.0)),
+        sign=1.0 if cells.bright else -1.0,
+    )
+    longest = np.argsort(-ends.straight)[: max(5, min(64, len(ends.tip) // 2))]
+    if not len(longest):
+        return replace(model, height=max(seen.contrast, 1.0))
+    free = fit_ends(light, ends.tip[longest], ends.axis[longest], ends.normal[longest], replace(model, blur_free=True))
+    blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
+    width = true_width(wall, float(np.hypot(blur, _MASK_BLUR_PX)))
+    return replace(model, width=width, blur=blur, height=max(float(np.median(free.height)), 1.0))
+
+
+def _tips(light: Gray, ends: _Ends, cells: Cells, model: EndModel) -> _Witnesses:
+    """Fitted wall ends; those too faint or too unsure are left out."""
+    fitted = fit_ends(light, ends.tip, ends.axis, ends.normal, model)
+    good = (fitted.sigma < _MOST_SIGMA_PX) & (fitted.height > _LEAST_HEIGHT * (model.height or 1.0))
+    clean = ends.straight > 2 * cells.wall + 2
+    sigma = np.hypot(np.where(clean, *_MODEL_SIGMA_PX), fitted.sigma)
+    kind = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
+    return _Witnesses(fitted.point[good], kind[good], sigma[good])
+
+
+def _sides(light: Gray, place: Points, normal: Points, cells: Cells, model: EndModel) -> _Witnesses:
+    """Outermost wall points, moved along the outline's normal to half height where that is near."""
+    across = replace(model, width=1.0, reach=min(model.reach, cells.wall))
+    fitted = fit_ends(light, place, normal, normal, across)
+    near = np.abs(((fitted.point - place) * normal).sum(axis=1)) < _NEAR_PX
+    # Beside a thin wall half height lies outside of it, at its corners and ends inside: a third of the way is left.
+    fat = (cells.wall - model.width) / 6
+    points = np.where(near[:, None], fitted.point, place) - fat * normal
+    kind = np.full(len(place), WitnessKind.OUTERMOST, np.int8)
+    return _Witnesses(points, kind, np.where(near, *_SIDE_SIGMA_PX))
+
+
+def _raised(points: Points, normal: Points, depth: Parallax) -> Points:
+    """Points moved from the lower edge of the block's outer side up to its top, where that side is in view."""
+    return (
+        points + np.minimum(depth.across(points, normal), 0.0)[:, None] * normal if depth.width is not None else points
+    )
+
+
+def _nearest(points: Points, others: Points) -> Vector:
+    """Distance from each of `points` (N, 2) to the nearest of `others` (M, 2), shape (N,); inf where there is none."""
+    if not len(others) or not len(points):
+        return np.full(len(points), np.inf)
+    square = ((points[:, None, :] - others[None, :, :]) ** 2).sum(axis=2)
+    return np.asarray(np.sqrt(square.min(axis=1)), np.float64)
+
+
+def _rings(coarse: CoarseBlock, tips: _Witnesses, sides: _Witnesses, scale: int) -> tuple[RingEvidence, ...]:
+    """All witnesses, each at its nearest ring, in order along it."""
+    points = np.concatenate([tips.points, sides.points])
+    kind, sigma = np.concatenate([tips.kind, sides.kind]), np.concatenate([tips.sigma, sides.sigma])
+    ring, arc, normal = coarse.feet((points + 0.5) / scale - 0.5)
+    evidence = []
+    for number, one in enumerate(coarse.rings):
+        mine = np.flatnonzero(ring == number)
+        mine = mine[np.argsort(arc[mine], kind="stable")]
+        vertices = (one.vertices + 0.5) * scale - 0.5
+        arcs = arc[mine] * scale
+        evidence.append(RingEvidence(vertices, one.is_hole, points[mine], arcs, normal[mine], sigma[mine], kind[mine]))
+    return tuple(evidence)

@@ -1,0 +1,177 @@
+"""Mask, cells and witnesses on rendered blocks of known outline."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from contour.coarse_block import coarse_block
+from contour.errors import NoBlockFound, PictureError
+from contour.synthetic import (
+    CameraModel,
+    CellGeometry,
+    Clutter,
+    Light,
+    Material,
+    Rendered,
+    Scene,
+    Sensor,
+    Table,
+    camera_above,
+    disc_ring,
+    rectangle,
+    render,
+    signed_distance,
+    with_holes,
+)
+from contour.wall_cells import probe
+from contour.wall_evidence import WitnessKind
+from contour.wall_light import wall_light
+from contour.wall_mask import wall_mask
+from contour.wall_witnesses import see_block
+
+
+def camera() -> CameraModel:
+    return camera_above(800, 600, 0.375, distance_mm=1500.0)
+
+
+BLOCK = rectangle((150.0, 112.0), 190.0, 130.0, 9.0)
+
+
+@cache
+def picture(
+    pitch_mm: float = 8.0, kind: str = "honeycomb", *, dark: bool = False, clutter: bool = False, hole: bool = False
+) -> Rendered:
+    outline = with_holes(BLOCK, disc_ring((150.0, 112.0), 26.0)) if hole else BLOCK
+    wall = 0.4 if kind == "perforated" else 0.08
+    return render(
+        Scene(
+            outline,
+            camera(),
+            CellGeometry(
+                kind=kind,
+                pitch_mm=pitch_mm,
+                wall_mm=wall * pitch_mm,
+                ribbon_deg=20.0,
+                jitter=0.2 if kind == "irregular" else 0.0,
+            ),
+            thickness_mm=6.0 if dark else 15.0,
+            material=Material(top=0.1, side=0.06, glints=0.0) if dark else Material(),
+            table=Table(level=0.75) if dark else Table(),
+            light=Light(gradient=0.3, vignetting=0.25),
+            clutter=Clutter(specks=30, debris=10) if clutter else Clutter(),
+            seed=5,
+        )
+    )
+
+
+@pytest.mark.parametrize("pitch_mm", [3.0, 5.0, 8.0, 14.0, 22.0])
+def test_the_pitch_is_read_from_the_picture(pitch_mm: float) -> None:
+    rendered = picture(pitch_mm)
+    assert probe(wall_light(rendered.picture), "auto").pitch == pytest.approx(rendered.pitch_px, rel=0.1)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_bright_and_dark_walls_are_told_apart(dark: bool) -> None:
+    assert probe(wall_light(picture(dark=dark).picture), "auto").bright is not dark
+
+
+def test_the_polarity_can_be_fixed() -> None:
+    with pytest.raises(NoBlockFound):
+        see_block(picture().picture, "dark")
+
+
+def test_the_mask_of_the_inverted_picture_is_the_same() -> None:
+    light = wall_light(picture().picture)
+    bright = wall_mask(light, 21.0, bright=True, contrast=80.0).mask
+    dark = wall_mask(255 - light, 21.0, bright=False, contrast=80.0).mask
+    assert np.mean(bright != dark) < 0.002
+
+
+def test_the_mask_does_not_follow_the_light() -> None:
+    light = wall_light(picture().picture).astype(np.float64)
+    ramp = np.linspace(0.55, 1.0, light.shape[1])
+    even = wall_mask(np.rint(light).astype(np.uint8), 21.0, bright=True).mask
+    shaded = wall_mask(np.rint(light * ramp).astype(np.uint8), 21.0, bright=True).mask
+    assert np.mean(even != shaded) < 0.02
+
+
+@pytest.mark.parametrize("kind", ["honeycomb", "irregular", "foam", "perforated"])
+def test_witnesses_lie_on_the_outline(kind: str) -> None:
+    rendered = picture(9.0, kind)
+    ring = see_block(rendered.picture, "auto").rings[0]
+    off = signed_distance(rendered.truth_px, ring.points)
+    assert len(ring.points) > 20
+    assert abs(float(np.median(off))) < 0.3
+    assert np.mean(np.abs(off) < 1.0) > 0.8
+    assert np.mean(off > 1.0) < 0.06
+
+
+def test_witnesses_come_in_order_with_outward_normals() -> None:
+    ring = see_block(picture().picture, "auto").rings[0]
+    assert (np.diff(ring.position) >= 0).all()
+    assert np.allclose(np.linalg.norm(ring.normal, axis=1), 1.0)
+    middle = ring.points.mean(axis=0)
+    assert ((ring.points - middle) * ring.normal).sum(axis=1).min() > 0
+    assert set(np.unique(ring.kind)) <= {int(kind) for kind in WitnessKind}
+    assert (ring.sigma > 0).all()
+
+
+def test_no_stretch_of_the_outline_is_without_witness() -> None:
+    rendered = picture()
+    ring = see_block(rendered.picture, "auto").rings[0]
+    edge = rendered.truth_px.exterior
+    nearest = np.sqrt(((edge[:, None] - ring.points[None]) ** 2).sum(axis=2)).min(axis=1)
+    assert np.mean(nearest > 1.2 * rendered.pitch_px) < 0.02
+
+
+def test_rings_turn_with_the_material_on_their_left() -> None:
+    exterior, hole = see_block(picture(hole=True).picture, "auto").rings
+    for ring, sign in ((exterior, 1.0), (hole, -1.0)):
+        following = np.roll(ring.coarse, -1, axis=0)
+        area = (ring.coarse[:, 0] * following[:, 1] - following[:, 0] * ring.coarse[:, 1]).sum()
+        assert area * sign > 0
+    assert hole.is_hole
+    assert not exterior.is_hole
+
+
+def test_chips_and_dust_beside_the_block_are_no_witnesses() -> None:
+    rendered = picture(clutter=True)
+    ring = see_block(rendered.picture, "auto").rings[0]
+    assert np.mean(signed_distance(rendered.truth_px, ring.points) > 1.5) < 0.03
+
+
+def test_a_bright_perforated_table_is_not_taken_for_walls() -> None:
+    scene = Scene(
+        BLOCK, camera(), CellGeometry(pitch_mm=8.0, wall_mm=0.6), table=Table(level=0.3, perforation_pitch_mm=12.0)
+    )
+    rendered = render(scene)
+    ring = see_block(rendered.picture, "auto").rings[0]
+    assert np.mean(np.abs(signed_distance(rendered.truth_px, ring.points)) < 1.5) > 0.75
+
+
+def test_walls_as_bright_as_the_table_are_seen_by_colour() -> None:
+    scene = Scene(
+        BLOCK,
+        camera(),
+        CellGeometry(pitch_mm=9.0, wall_mm=0.7),
+        material=Material(top=0.4, side=0.3, texture=0.1, glints=0.0, colour=(0.4, 0.6, 2.0)),
+        table=Table(level=0.36, colour=(1.6, 1.0, 0.4)),
+        sensor=Sensor(colour=True),
+    )
+    rendered = render(scene)
+    ring = see_block(rendered.picture, "auto").rings[0]
+    assert np.mean(np.abs(signed_distance(rendered.truth_px, ring.points)) < 1.0) > 0.8
+
+
+def test_an_empty_mask_is_no_block() -> None:
+    with pytest.raises(NoBlockFound, match="no block found"):
+        coarse_block(np.zeros((300, 400), np.uint8), np.zeros((300, 400), np.uint8), 20.0, 3.0)
+
+
+@pytest.mark.parametrize("shape", [(600, 800, 4), (8, 800), (600,)])
+def test_an_unusable_array_is_an_error_that_names_its_shape(shape: tuple[int, ...]) -> None:
+    with pytest.raises(PictureError, match=str(shape[0])):
+        see_block(np.zeros(shape, np.uint8), "auto")

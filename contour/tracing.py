@@ -139,7 +139,8 @@ def _sliding_matrix(walls: binarize.WallMask, settings: TraceSettings) -> Contou
     if step is None:
         step = sliding_matrix.default_step_px(core)
     if threshold is None:
-        threshold = sliding_matrix.default_threshold(walls.cells)
+        by_hand = settings.core_px is not None
+        threshold = sliding_matrix.PAPER_THRESHOLD if by_hand else sliding_matrix.default_threshold(walls.cells)
     filled = sliding_matrix.fill_windows(walls.mask, core, step, threshold)
     smallest_hole_px2 = walls.cells.cell_px2 if walls.cells else float((2 * core) ** 2)
     return sliding_matrix.sliding_matrix_contour(filled, smallest_hole_px2)
@@ -156,7 +157,16 @@ def _cells(walls: binarize.WallMask, parameter: str) -> Cells:
     return walls.cells
 
 
+def _wall_tips(
+    picture: NDArray[np.uint8], settings: TraceSettings, *, rectifier: Rectifier | None, on_stage: OnStage
+) -> Trace:
+    from contour.wall_tips import wall_tips  # it needs the types above
+
+    return wall_tips(picture, settings, rectifier=rectifier, on_stage=on_stage)
+
+
 _METHODS: dict[str, _MethodCall] = {
+    "wall-tips": _wall_tips,
     "sliding-matrix": _on_mask(_sliding_matrix),
     "direct-scan": _on_mask(_direct_scan),
     "find-contours": _on_mask(_find_contours),

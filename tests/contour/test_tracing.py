@@ -183,3 +183,12 @@ def test_a_view_into_a_larger_picture_is_traced_as_its_copy() -> None:
     np.testing.assert_array_equal(
         trace(view, TraceSettings()).contour.exterior, trace(view.copy(), TraceSettings()).contour.exterior
     )
+
+
+def test_with_a_core_set_by_hand_the_papers_threshold_applies() -> None:
+    picture = block("rectangle").picture
+    by_hand = trace(picture, TraceSettings(core_px=12, step_px=6)).contour
+    paper = trace(picture, TraceSettings(core_px=12, step_px=6, threshold=64.0)).contour
+    np.testing.assert_array_equal(by_hand.exterior, paper.exterior)
+    followed = trace(picture, TraceSettings()).contour
+    assert len(followed.exterior) != len(by_hand.exterior)

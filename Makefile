@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test check format clean
+.PHONY: install demo test bench accuracy check format clean
 
 install: $(STAMP)
 
@@ -18,6 +18,12 @@ demo: install
 
 test: install
 	$(BIN)/python -m pytest
+
+bench: install
+	$(BIN)/python -m benchmarks.bench
+
+accuracy: install
+	$(BIN)/python -m benchmarks.bench --random 300 --write
 
 check: install
 	$(BIN)/ruff check .

@@ -132,7 +132,11 @@ def core_and_step_figure(folder: Path) -> None:
     block = scene(l_shape(MIDDLE, 205, 155, 68, 20.0), 6)
     tries = [(5, 5), (10, 10), (25, 25), (10, 20), (10, 5), (10, 1)]
     panels = [
-        traced(block, TraceSettings(core_px=core, step_px=step), f"sliding-matrix, core {core}, step {step}")
+        traced(
+            block,
+            TraceSettings("sliding-matrix", core_px=core, step_px=step),
+            f"sliding-matrix, core {core}, step {step}",
+        )
         for core, step in tries
     ]
     figure(folder / "methods-core-and-step.png", panels, 3)
@@ -148,7 +152,7 @@ def concave_figure(folder: Path) -> None:
     filled = fill_windows(walls.mask, core, core, 40.0)
     panels = [
         Panel(filled, None, [f"The filled picture, core {core}, step {core}"]),
-        traced(block, TraceSettings(), "sliding-matrix, sizes from the picture"),
+        traced(block, TraceSettings("sliding-matrix"), "sliding-matrix, sizes from the picture"),
     ]
     figure(folder / "methods-concave.png", panels, 2)
 

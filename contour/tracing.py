@@ -34,7 +34,7 @@ class Rectifier(Protocol):
 class TraceSettings:
     """What to trace with. Sizes left at None follow from the picture's own cell pitch."""
 
-    method: Method = "sliding-matrix"
+    method: Method = "wall-tips"
     polarity: Literal["auto", "bright", "dark"] = "auto"
     binarize: Literal["flat", "otsu"] | int = "flat"
     edge: Literal["cut", "cells"] = "cut"

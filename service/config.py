@@ -14,7 +14,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_valida
 from contour.geometry import ring_defect
 from contour.tracing import Method
 
-DEFAULT_METHOD: Method = "sliding-matrix"
+DEFAULT_METHOD: Method = "wall-tips"
 METHOD_PARAMETERS: dict[str, dict[str, tuple[float, float]]] = {
     "wall-tips": {},
     "sliding-matrix": {"core_px": (1, 1000), "step_px": (1, 2000), "threshold": (0, 255)},

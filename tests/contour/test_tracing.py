@@ -24,7 +24,7 @@ def overlap(found: np.ndarray, truth: np.ndarray) -> float:
 @pytest.mark.parametrize("name", OUTLINES)
 def test_sliding_matrix_is_close_to_the_block_with_sizes_from_the_picture(name: str, kind: str) -> None:
     scene = block(name, kind)
-    found = trace(scene.picture, TraceSettings())
+    found = trace(scene.picture, TraceSettings(method="sliding-matrix"))
     assert contour_defect(found.contour) is None
     assert overlap(found.contour.exterior, scene.truth_px.exterior) > 0.85
     assert found.pitch_px == pytest.approx(scene.pitch_px, rel=0.08)
@@ -35,18 +35,20 @@ def test_sliding_matrix_is_close_to_the_block_with_sizes_from_the_picture(name: 
 @pytest.mark.parametrize("kind", ["easy", "shop", "dim", "dark"])
 def test_the_hole_through_a_block_is_found_and_no_other(kind: str) -> None:
     scene = block("holed", kind)
-    found = trace(scene.picture, TraceSettings())
+    found = trace(scene.picture, TraceSettings(method="sliding-matrix"))
     assert len(found.contour.holes) == 1
     assert overlap(found.contour.holes[0], scene.truth_px.holes[0]) > 0.5
     for name in ("rectangle", "l", "crescent"):
-        assert trace(block(name, kind).picture, TraceSettings()).contour.holes == ()
+        assert trace(block(name, kind).picture, TraceSettings(method="sliding-matrix")).contour.holes == ()
 
 
 def test_direct_scan_is_right_on_a_convex_block_and_fills_a_concave_one() -> None:
     settings = TraceSettings(method="direct-scan")
     convex, concave = block("rectangle"), block("l")
     assert overlap(trace(convex.picture, settings).contour.exterior, convex.truth_px.exterior) > 0.85
-    good = overlap(trace(concave.picture, TraceSettings()).contour.exterior, concave.truth_px.exterior)
+    good = overlap(
+        trace(concave.picture, TraceSettings(method="sliding-matrix")).contour.exterior, concave.truth_px.exterior
+    )
     bad = overlap(trace(concave.picture, settings).contour.exterior, concave.truth_px.exterior)
     assert bad < good - 0.03
 
@@ -54,7 +56,7 @@ def test_direct_scan_is_right_on_a_convex_block_and_fills_a_concave_one() -> Non
 def test_find_contours_is_lost_in_the_cells() -> None:
     scene = block("rectangle")
     found = trace(scene.picture, TraceSettings(method="find-contours"))
-    plain = trace(scene.picture, TraceSettings())
+    plain = trace(scene.picture, TraceSettings(method="sliding-matrix"))
     assert overlap(found.contour.exterior, scene.truth_px.exterior) < overlap(
         plain.contour.exterior, scene.truth_px.exterior
     )
@@ -91,8 +93,8 @@ def test_grey_and_grey_as_colour_give_the_same_contour(method: Any) -> None:
 
 def test_sizes_given_are_used() -> None:
     picture = block("rectangle").picture
-    loose = trace(picture, TraceSettings(core_px=30, step_px=5, threshold=20.0)).contour
-    tight = trace(picture, TraceSettings(core_px=8, step_px=8, threshold=40.0)).contour
+    loose = trace(picture, TraceSettings(method="sliding-matrix", core_px=30, step_px=5, threshold=20.0)).contour
+    tight = trace(picture, TraceSettings(method="sliding-matrix", core_px=8, step_px=8, threshold=40.0)).contour
     assert abs(signed_area(loose.exterior)) > 1.15 * abs(signed_area(tight.exterior))
     scan = TraceSettings(method="direct-scan", max_gap_px=3, min_width_px=1)
     narrow = trace(picture, scan).contour
@@ -103,9 +105,9 @@ def test_sizes_given_are_used() -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        TraceSettings(binarize=100, core_px=6),
-        TraceSettings(binarize=100, method="direct-scan", max_gap_px=5, min_width_px=5),
-        TraceSettings(binarize=100, method="find-contours"),
+        TraceSettings(method="sliding-matrix", binarize=100, core_px=6),
+        TraceSettings(method="direct-scan", binarize=100, max_gap_px=5, min_width_px=5),
+        TraceSettings(method="find-contours", binarize=100),
     ],
 )
 def test_without_cells_sizes_must_be_given_and_then_suffice(settings: TraceSettings) -> None:
@@ -142,19 +144,19 @@ def test_an_empty_table_is_no_block(method: Any) -> None:
 )
 def test_an_array_that_is_no_picture_is_refused_with_what_was_seen(picture: Any, words: str) -> None:
     with pytest.raises(PictureError, match=words):
-        trace(picture, TraceSettings())
+        trace(picture, TraceSettings(method="sliding-matrix"))
 
 
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        (TraceSettings(core_px=0), "core_px is 0"),
-        (TraceSettings(step_px=-1), "step_px is -1"),
-        (TraceSettings(threshold=300.0), "threshold is 300"),
-        (TraceSettings(threshold=float("nan")), "threshold is nan"),
+        (TraceSettings(method="sliding-matrix", core_px=0), "core_px is 0"),
+        (TraceSettings(method="sliding-matrix", step_px=-1), "step_px is -1"),
+        (TraceSettings(method="sliding-matrix", threshold=300.0), "threshold is 300"),
+        (TraceSettings(method="sliding-matrix", threshold=float("nan")), "threshold is nan"),
         (TraceSettings(method="direct-scan", max_gap_px=-1), "max_gap_px is -1"),
         (TraceSettings(method="direct-scan", min_width_px=-2), "min_width_px is -2"),
-        (TraceSettings(binarize=256), "binarize is 256"),
+        (TraceSettings(method="sliding-matrix", binarize=256), "binarize is 256"),
         (TraceSettings(method="magic"), "method is 'magic': expected one of .*sliding-matrix"),  # type: ignore[arg-type]
     ],
 )
@@ -165,14 +167,14 @@ def test_a_parameter_out_of_range_is_refused_by_name(settings: TraceSettings, wo
 
 def test_the_same_picture_gives_the_same_contour() -> None:
     picture = block("holed", "shop").picture
-    first, second = (trace(picture.copy(), TraceSettings()) for _ in range(2))
+    first, second = (trace(picture.copy(), TraceSettings(method="sliding-matrix")) for _ in range(2))
     np.testing.assert_array_equal(first.contour.exterior, second.contour.exterior)
 
 
 def test_a_picture_that_cannot_be_written_to_is_traced() -> None:
     picture = block("rectangle").picture.copy()
     picture.flags.writeable = False
-    assert trace(picture, TraceSettings()).contour.point_count > 3
+    assert trace(picture, TraceSettings(method="sliding-matrix")).contour.point_count > 3
 
 
 def test_a_view_into_a_larger_picture_is_traced_as_its_copy() -> None:
@@ -181,14 +183,15 @@ def test_a_view_into_a_larger_picture_is_traced_as_its_copy() -> None:
     view = larger[:, ::2]
     assert not view.flags.c_contiguous
     np.testing.assert_array_equal(
-        trace(view, TraceSettings()).contour.exterior, trace(view.copy(), TraceSettings()).contour.exterior
+        trace(view, TraceSettings(method="sliding-matrix")).contour.exterior,
+        trace(view.copy(), TraceSettings(method="sliding-matrix")).contour.exterior,
     )
 
 
 def test_with_a_core_set_by_hand_the_papers_threshold_applies() -> None:
     picture = block("rectangle").picture
-    by_hand = trace(picture, TraceSettings(core_px=12, step_px=6)).contour
-    paper = trace(picture, TraceSettings(core_px=12, step_px=6, threshold=64.0)).contour
+    by_hand = trace(picture, TraceSettings(method="sliding-matrix", core_px=12, step_px=6)).contour
+    paper = trace(picture, TraceSettings(method="sliding-matrix", core_px=12, step_px=6, threshold=64.0)).contour
     np.testing.assert_array_equal(by_hand.exterior, paper.exterior)
-    followed = trace(picture, TraceSettings()).contour
+    followed = trace(picture, TraceSettings(method="sliding-matrix")).contour
     assert len(followed.exterior) != len(by_hand.exterior)

@@ -145,14 +145,17 @@ def test_the_embedded_defaults_need_no_file() -> None:
             "expected less than max_area_mm2",
         ),
         (
-            SMALL + "recipes: [{number: 1, name: a, parameters: {core: 3}}]\n",
+            SMALL + "recipes: [{number: 1, name: a, method: sliding-matrix, parameters: {core: 3}}]\n",
             "parameters.core is none of sliding-matrix's",
         ),
         (
-            SMALL + "recipes: [{number: 1, name: a, parameters: {core_px: 0}}]\n",
+            SMALL + "recipes: [{number: 1, name: a, method: sliding-matrix, parameters: {core_px: 0}}]\n",
             "parameters.core_px is 0, expected 1 to",
         ),
-        (SMALL + "recipes: [{number: 1, name: a, parameters: {core_px: 2.5}}]\n", "expected a whole number of pixels"),
+        (
+            SMALL + "recipes: [{number: 1, name: a, method: sliding-matrix, parameters: {core_px: 2.5}}]\n",
+            "expected a whole number of pixels",
+        ),
         (SMALL + "work_area_mm: [[0, 0], [1, 1]]\n", "work_area_mm: has 2 points, expected 3 or more"),
         (SMALL + "work_area_mm: [[0, 0], [1, 1], [0, 1], [1, 0]]\n", "work_area_mm: is no simple polygon"),
         (SMALL + "work_area_mm: [[0, 0], [1, 1, 4], [0, 1]]\n", "work_area_mm[1]"),

@@ -77,8 +77,9 @@ def test_find_contours_finds_cells_and_is_refused() -> None:
 
 
 def test_parameters_of_the_command_line_reach_the_method() -> None:
-    coarse = traced(RECTANGLE, "--core-px", "60", "--step-px", "60")[0]
-    fine = traced(RECTANGLE, "--core-px", "12", "--step-px", "4")[0]
+    windows = ("--method", "sliding-matrix", "--threshold", "30")
+    coarse = traced(RECTANGLE, *windows, "--core-px", "60", "--step-px", "60")[0]
+    fine = traced(RECTANGLE, *windows, "--core-px", "16", "--step-px", "8")[0]
     assert coarse["area_px2"] > fine["area_px2"]
 
 
@@ -103,7 +104,7 @@ def test_an_overlay_is_written_for_each_picture_and_text_names_it(tmp_path: Path
 
 def test_json_to_a_file_leaves_the_text_on_standard_output(tmp_path: Path) -> None:
     done = combtrace("trace", RECTANGLE, "--json", tmp_path / "out.jsonl")
-    assert "sliding-matrix" in done.stdout
+    assert "wall-tips" in done.stdout
     assert json.loads((tmp_path / "out.jsonl").read_text())["status"] == "ok"
 
 
@@ -232,8 +233,8 @@ def test_the_same_picture_in_another_form_gives_the_same_contour(tmp_path: Path,
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["--core-px", "0"], "core_px is 0"),
-        (["--threshold", "300"], "threshold is 300"),
+        (["--method", "sliding-matrix", "--core-px", "0"], "core_px is 0"),
+        (["--method", "sliding-matrix", "--threshold", "300"], "threshold is 300"),
         (["--method", "direct-scan", "--core-px", "5"], "parameters.core_px is none of direct-scan's"),
         (["--binarize", "fuzzy"], "expected flat, otsu, or a number 0 to 255"),
         (["--binarize", "256"], "expected flat, otsu, or a number 0 to 255"),

@@ -16,8 +16,9 @@ PRICE_LINE = 10.0
 PRICE_ARC = 15.0
 _CORNER = 1.0
 # A missing cell only ever makes a dent: a reflex corner has to be earned.
+_REFLEX = 5.0
 _REFLEX_PER_RADIAN = 6.0
-_JUMP = 12.0
+_JUMP = 16.0
 _REACH = 1.6
 _STATES = 12
 _NEARBY = 3
@@ -116,7 +117,7 @@ def joint_cost(
         np.maximum(np.maximum(-ahead - slack, ahead - reach), 0.0) ** 2
         + np.maximum(np.maximum(-behind - slack, behind - reach), 0.0) ** 2
     )
-    corner = _CORNER + reflex + 8.0 * excess / pitch**2
+    corner = _CORNER + reflex + _REFLEX * (sine < 0.0) + 8.0 * excess / pitch**2
     corner = np.where(np.abs(sine) > 0.05, corner, np.inf)
     middle = tangent + next_tangent
     aside = (middle.conj() * way).imag / np.maximum(np.abs(middle), 1e-6)

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
-from contour.geometry import Contour
+from contour.geometry import Contour, Ring
 from contour.material_edge import material_edge
 from contour.outline_fit import FittedRing, fit_ring
+from contour.ring_depth import depth_inside
 from contour.tracing import OnStage, Polarity, Rectifier, Trace, TraceSettings
 from contour.wall_cells import probe
-from contour.wall_evidence import BlockEvidence, RingEvidence
+from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import wall_light
 from contour.wall_witnesses import see_block
 
@@ -20,6 +21,7 @@ __all__ = ["see_block", "wall_tips"]
 _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
+_LEFT_OUT_PITCHES = 0.5
 # What no scene has been traced better than, pixels: side walls in view, blur that is not the same everywhere.
 _FLOOR_PX = 0.1
 
@@ -43,6 +45,8 @@ def wall_tips(
     if seen.leaves_picture:
         return _cut_off(picture, seen, on_stage)
     rings = [_fitted(ring, seen, rectifier) for ring in seen.rings]
+    for evidence, ring in zip(seen.rings, rings, strict=True):
+        _check_against_evidence(evidence, ring.ring, seen.pitch_px)
     exterior = rings[0]
     if exterior.unseen_share > _MOST_UNSEEN:
         raise NoBlockFound(
@@ -59,7 +63,7 @@ def wall_tips(
 
 
 def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
-    """The coarse outline of a block that leaves the picture, along the picture's border there: for a refusal to show."""
+    """The coarse outline of a block that leaves the picture, along its border there: for a refusal to show."""
     last = np.array([picture.shape[1] - 1.0, picture.shape[0] - 1.0])
     rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
     on_stage("trace")
@@ -68,7 +72,7 @@ def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage)
 
 
 def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
-    """The serrated boundary of a block whose border cells are closed; that it is a block at all, its cells must show."""
+    """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
     cells = probe(wall_light(picture), settings.polarity)
     on_stage("mask")
     contour = material_edge(picture, cells.pitch)
@@ -84,6 +88,19 @@ def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None
             "Check focus and light"
         )
     return fit_ring(ring, pitch_px=seen.pitch_px, wall_px=seen.wall_px, rectifier=rectifier)
+
+
+def _check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float) -> None:
+    """Raise NoBlockFound where the ring leaves several wall ends side by side outside: it is not their outline."""
+    ends = evidence.kind != WitnessKind.OUTERMOST
+    depth = depth_inside(ring, evidence.points[ends])
+    left_out = (depth if evidence.is_hole else -depth) > _LEFT_OUT_PITCHES * pitch
+    if np.count_nonzero(left_out & np.roll(left_out, 1) & np.roll(left_out, 2) & np.roll(left_out, 3)):
+        x, y = evidence.points[ends][left_out][0]
+        raise NoBlockFound(
+            f"no block found: wall ends near ({x:.0f}, {y:.0f}) px lie outside of the outline that fits the others. "
+            "Check that nothing lies against the block"
+        )
 
 
 def _uncertainty(ring: FittedRing, seen: BlockEvidence) -> float:

@@ -28,8 +28,8 @@ _WIDEST_WALL = 0.65
 @dataclass(frozen=True)
 class Cells:
     """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
-    the part of the tile they fill, the wall contrast in grey levels, and the share of
-    the walls that hang together."""
+    the part of the tile they fill, the wall contrast in grey levels, the share of the
+    walls that hang together, and the grey level of walls."""
 
     pitch: float
     wall: float
@@ -39,6 +39,7 @@ class Cells:
     filled: float
     contrast: float
     connected: float
+    level: float
 
     @property
     def score(self) -> float:
@@ -162,6 +163,7 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
         float(min(1.0, filled)),
         seen.contrast,
         connected,
+        float(np.median(light[mask > 0][::7])),
     )
 
 

@@ -62,9 +62,26 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
         else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     )
     seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
+    if not cells.bright:
+        seen = _darker_than_table(seen, small, cells)
     on_mask()
     coarse = coarse_block(seen.mask, small, cells.pitch / scale, cells.wall / scale)
     return _evidence(light, seen, coarse, cells, scale)
+
+
+def _darker_than_table(seen: WallMask, light: Gray, cells: Cells) -> WallMask:
+    """The mask without what is lighter than midway from dark walls to the table.
+
+    Cells of a black block are nearly as dark as its walls. Against so small a contrast the table's own shades, beside a
+    scratch or in the block's shadow, look like walls; but they are not dark.
+    """
+    margin = max(1, min(light.shape) // 50)
+    rim = (light[:margin], light[-margin:], light[:, :margin], light[:, -margin:])
+    table = float(np.median(np.concatenate([part[::3, ::3].ravel() for part in rim])))
+    if table - cells.level < 2 * seen.contrast:
+        return seen
+    _, dark = cv2.threshold(light, 0.5 * (cells.level + table), 255, cv2.THRESH_BINARY_INV)
+    return replace(seen, mask=np.asarray(cv2.bitwise_and(seen.mask, dark), np.uint8))
 
 
 @dataclass(frozen=True)

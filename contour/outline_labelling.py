@@ -20,7 +20,7 @@ _REFLEX = 5.0
 _REFLEX_PER_RADIAN = 6.0
 _JUMP = 16.0
 _REACH = 1.6
-_STATES = 12
+_STATES = 8
 _NEARBY = 3
 # Gains above this mark models of the present labelling, which must stay available.
 _PRESENT = 5e3

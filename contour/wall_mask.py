@@ -142,7 +142,7 @@ def _typical_peak(local: Float, pitch: float) -> float:
         return float(local.max())
     tiles = local[: rows * size, : columns * size].reshape(rows, size, columns, size).max(axis=(1, 3))
     walls = tiles[tiles > 0.25 * tiles.max()]
-    return float(np.quantile(walls, 0.5))
+    return float(np.quantile(walls, 0.5)) if walls.size else 0.0
 
 
 def _ratio(square: AnyFloat, weight: AnyFloat, window: int) -> Float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.errors import NoBlockFound
+from contour.errors import NoBlockFound, ParameterError
 from contour.geometry import Contour, Ring
 from contour.material_edge import material_edge
 from contour.outline_fit import FittedRing, fit_ring
@@ -22,8 +22,6 @@ _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
 _LEFT_OUT_PITCHES = 0.5
-# What no scene has been traced better than, pixels: side walls in view, blur that is not the same everywhere.
-_FLOOR_PX = 0.1
 
 
 def wall_tips(
@@ -37,8 +35,12 @@ def wall_tips(
     pixels.
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `on_stage` hears
-    "mask" and "trace". Raises PictureError, NoBlockFound.
+    "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound.
     """
+    if settings.binarize != "flat":
+        raise ParameterError(
+            f"binarize is {settings.binarize!r}, but wall-tips finds its own threshold; use flat, or another method"
+        )
     if settings.edge == "cells":
         return _closed_cells(picture, settings, on_stage)
     seen = see_block(picture, settings.polarity, lambda: on_stage("mask"))
@@ -59,7 +61,7 @@ def wall_tips(
     # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
     on_stage("trace")
-    return Trace("wall-tips", polarity, seen.pitch_px, contour, max(_uncertainty(ring, seen) for ring in rings))
+    return Trace("wall-tips", polarity, seen.pitch_px, contour)
 
 
 def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
@@ -68,7 +70,7 @@ def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage)
     rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
     on_stage("trace")
     polarity: Polarity = "dark" if seen.polarity == "dark" else "bright"
-    return Trace("wall-tips", polarity, seen.pitch_px, Contour(rings[0], tuple(rings[1:])), 0.5 * seen.pitch_px)
+    return Trace("wall-tips", polarity, seen.pitch_px, Contour(rings[0], tuple(rings[1:])))
 
 
 def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
@@ -101,8 +103,3 @@ def _check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float) ->
             f"no block found: wall ends near ({x:.0f}, {y:.0f}) px lie outside of the outline that fits the others. "
             "Check that nothing lies against the block"
         )
-
-
-def _uncertainty(ring: FittedRing, seen: BlockEvidence) -> float:
-    """Expected error along a ring, pixels: a floor, the inliers' spread, and what lies between its witnesses."""
-    return float(np.hypot(_FLOOR_PX, 0.5 * ring.spread_px) + 0.1 * seen.pitch_px * ring.unseen_share)

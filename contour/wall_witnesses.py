@@ -35,6 +35,8 @@ _LEAST_HEIGHT = 0.4
 _MODEL_SIGMA_PX = (0.2, 0.3)
 _SIDE_SIGMA_PX = (0.5, 1.0)
 _NEAR_PX = 1.5
+_FAINT_HEIGHT = 0.45
+_FAINT_SIGMA_PX = 3.0
 # What the mask's own light blur (3 × 3) adds.
 _MASK_BLUR_PX = 0.8
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
@@ -175,8 +177,11 @@ def _sides(light: Gray, place: Points, normal: Points, cells: Cells, model: EndM
     # Beside a thin wall half height lies outside of it, at its corners and ends inside: a third of the way is left.
     fat = (cells.wall - model.width) / 6
     points = np.where(near[:, None], fitted.point, place) - fat * normal
+    sigma = np.where(near, *_SIDE_SIGMA_PX)
+    # The outer side of the block, where it is in view below its top, is fainter than any wall.
+    sigma = np.where(fitted.height < _FAINT_HEIGHT * (model.height or 1.0), _FAINT_SIGMA_PX, sigma)
     kind = np.full(len(place), WitnessKind.OUTERMOST, np.int8)
-    return _Witnesses(points, kind, np.where(near, *_SIDE_SIGMA_PX))
+    return _Witnesses(points, kind, sigma)
 
 
 def _raised(points: Points, normal: Points, depth: Parallax) -> Points:

@@ -68,7 +68,7 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> Index:
     here = np.arange(len(which))
     low = np.maximum(here - _NEARBY, begin[which])
     high = np.minimum(here + _NEARBY + 1, (begin + reach)[which])
-    score = running[high] - running[low] + 0.02 * np.clip(proposals.gain[which], 0.0, 200.0)
+    score = running[high] - running[low] + 0.1 * np.clip(proposals.gain[which], 0.0, 200.0)
     score = np.where(proposals.gain[which] > _PRESENT, 1e3 + score, score)
     order = np.lexsort((-score, place))
     place, which = place[order], which[order]

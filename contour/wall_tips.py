@@ -21,7 +21,7 @@ __all__ = ["see_block", "wall_tips"]
 _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
-_LEFT_OUT_PITCHES = 0.5
+_FAR_OFF_PITCHES = 0.5
 
 
 def wall_tips(
@@ -93,13 +93,14 @@ def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None
 
 
 def _check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float) -> None:
-    """Raise NoBlockFound where the ring leaves several wall ends side by side outside: it is not their outline."""
-    ends = evidence.kind != WitnessKind.OUTERMOST
-    depth = depth_inside(ring, evidence.points[ends])
-    left_out = (depth if evidence.is_hole else -depth) > _LEFT_OUT_PITCHES * pitch
-    if np.count_nonzero(left_out & np.roll(left_out, 1) & np.roll(left_out, 2) & np.roll(left_out, 3)):
-        x, y = evidence.points[ends][left_out][0]
-        raise NoBlockFound(
-            f"no block found: wall ends near ({x:.0f}, {y:.0f}) px lie outside of the outline that fits the others. "
-            "Check that nothing lies against the block"
-        )
+    """Raise NoBlockFound where the ring passes several wall ends in a row far off on one side."""
+    points = evidence.points[evidence.kind != WitnessKind.OUTERMOST]
+    depth = depth_inside(ring, points)
+    for off in (depth > _FAR_OFF_PITCHES * pitch, depth < -_FAR_OFF_PITCHES * pitch):
+        in_a_row = off & np.roll(off, 1) & np.roll(off, 2) & np.roll(off, 3)
+        if in_a_row.any():
+            x, y = points[np.argmax(in_a_row)]
+            raise NoBlockFound(
+                f"no block found: the outline that fits most wall ends passes those near ({x:.0f}, {y:.0f}) px by more "
+                "than half a cell. Check that nothing lies against the block, and that its edge is in focus"
+            )

@@ -16,10 +16,11 @@ PRICE_LINE = 10.0
 PRICE_ARC = 15.0
 _CORNER = 1.0
 # A missing cell only ever makes a dent: a reflex corner has to be earned.
+_REFLEX = 5.0
 _REFLEX_PER_RADIAN = 6.0
-_JUMP = 12.0
+_JUMP = 16.0
 _REACH = 1.6
-_STATES = 12
+_STATES = 8
 _NEARBY = 3
 # Gains above this mark models of the present labelling, which must stay available.
 _PRESENT = 5e3
@@ -67,7 +68,7 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> Index:
     here = np.arange(len(which))
     low = np.maximum(here - _NEARBY, begin[which])
     high = np.minimum(here + _NEARBY + 1, (begin + reach)[which])
-    score = running[high] - running[low] + 0.02 * np.clip(proposals.gain[which], 0.0, 200.0)
+    score = running[high] - running[low] + 0.1 * np.clip(proposals.gain[which], 0.0, 200.0)
     score = np.where(proposals.gain[which] > _PRESENT, 1e3 + score, score)
     order = np.lexsort((-score, place))
     place, which = place[order], which[order]
@@ -116,7 +117,7 @@ def joint_cost(
         np.maximum(np.maximum(-ahead - slack, ahead - reach), 0.0) ** 2
         + np.maximum(np.maximum(-behind - slack, behind - reach), 0.0) ** 2
     )
-    corner = _CORNER + reflex + 8.0 * excess / pitch**2
+    corner = _CORNER + reflex + _REFLEX * (sine < 0.0) + 8.0 * excess / pitch**2
     corner = np.where(np.abs(sine) > 0.05, corner, np.inf)
     middle = tangent + next_tangent
     aside = (middle.conj() * way).imag / np.maximum(np.abs(middle), 1e-6)

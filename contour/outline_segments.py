@@ -94,8 +94,31 @@ def around(witnesses: Witnesses, segments: Segments) -> Proposals:
         size = np.repeat([5, 9, 5, 9], total)
         begins = (np.tile(segments.first, 4) - size // 2) % count
         parts.append(window_fits(witnesses, begins, size, np.repeat([False, True], 2 * total), 9))
+    begins, size = _unexplained(witnesses, segments)
+    if len(begins):
+        twice = np.repeat([False, True], len(begins))
+        parts.append(window_fits(witnesses, np.tile(begins, 2), np.tile(size, 2), twice, 16))
     merged = gather(parts)
     return merged.take(merged.gain > 0.0)
+
+
+def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Index, Index]:
+    """Stretches of four and more witnesses in a row, single ones apart, that lie off their segments: first and length.
+
+    Each comes as it is, and longer by one at either end.
+    """
+    count = len(witnesses)
+    signed = distance(segments.models.take(segments.owner(count)), witnesses.points)
+    off = np.abs(signed) > 3.0 * np.where(signed > 0.0, witnesses.outer, witnesses.inner)
+    off |= np.roll(off, 1) & np.roll(off, -1)
+    first = np.flatnonzero(off & ~np.roll(off, 1))
+    length = (np.flatnonzero(off & ~np.roll(off, -1)) - first) % count + 1 if len(first) else first
+    if len(first) and off[0] and off[-1]:
+        last = np.flatnonzero(off & ~np.roll(off, -1))
+        length = (np.roll(last, -1) - first) % count + 1
+    long = (length >= 4) & (length + 2 < count)
+    first, length = first[long], length[long]
+    return np.concatenate([first, (first - 1) % count]), np.concatenate([length, length + 2])
 
 
 def _starts(witnesses: Witnesses, segments: Segments, begin: Index, last: Index, bend: bool) -> Models:

@@ -77,7 +77,7 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
         witnesses,
         inner=inner,
         outer=outer,
-        cap_inside=np.where(witnesses.inner > witnesses.outer * 1.01, 3.0, np.clip(inside, 3.0, 5.5)),
+        cap_inside=np.where(witnesses.inner > witnesses.outer * 1.01, 4.0, np.clip(inside, 3.0, 5.5)),
         cap_outside=np.clip(outside, 5.0, 6.5),
     )
 

@@ -19,7 +19,8 @@ _TILES = 4
 # First guesses of the pitch; the mask's windows forgive a factor of two either way.
 _GUESSES = (24.0, 70.0, 8.0)
 _GOOD_SCORE = 0.2
-_LEAST_SCORE = 0.04
+_LEAST_SCORE = 0.1
+_LEAST_CELLS = 6
 # A sheet with holes far apart is a table, not a plate of cells.
 _WIDEST_WALL = 0.65
 
@@ -27,8 +28,8 @@ _WIDEST_WALL = 0.65
 @dataclass(frozen=True)
 class Cells:
     """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
-    the part of the tile they fill, the wall contrast in grey levels, and the share of
-    the walls that hang together."""
+    the part of the tile they fill, the wall contrast in grey levels, the share of the
+    walls that hang together, and the grey level of walls."""
 
     pitch: float
     wall: float
@@ -38,6 +39,7 @@ class Cells:
     filled: float
     contrast: float
     connected: float
+    level: float
 
     @property
     def score(self) -> float:
@@ -120,24 +122,22 @@ def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> C
 
 
 def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
-    """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are enclosed."""
+    """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are."""
     seen = wall_mask(light, pitch, bright=bright)
     mask = seen.mask
     floor = cv2.bitwise_not(mask)
-    _, _, stats, _ = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
-    height, width = mask.shape
-    left, top, wide, high, area = (stats[1:, column] for column in range(5))
-    enclosed = (left > 0) & (top > 0) & (left + wide < width) & (top + high < height)
-    round_enough = (area > 0.3 * wide * high) & (np.maximum(wide, high) < 4 * np.minimum(wide, high))
-    areas = np.sort(area[enclosed & round_enough & (area >= 9)].astype(np.float64))
-    if len(areas) < 6:
+    _, _, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
+    areas, places = _enclosed(np.asarray(stats[1:], np.int32), np.asarray(centroids[1:], np.float64), mask.shape)
+    if len(areas) < _LEAST_CELLS:
         return None
     # Half of the enclosed *area* lies in cells smaller than this, so that specks do not count; then merged cells are
     # told from single ones by a plain median.
-    by_area = areas[np.searchsorted(np.cumsum(areas), 0.5 * areas.sum())]
+    ascending = np.sort(areas)
+    by_area = ascending[np.searchsorted(np.cumsum(ascending), 0.5 * ascending.sum())]
     typical = float(np.median(areas[areas > by_area / 3]))
-    usual = areas[(areas > typical / 2) & (areas < 2 * typical)]
-    if len(usual) < 6:
+    regular = (areas > typical / 2) & (areas < 2 * typical)
+    usual = areas[regular]
+    if len(usual) < _LEAST_CELLS:
         return None
     inner = float(np.sqrt(2 / np.sqrt(3) * np.median(usual)))
     # A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
@@ -149,7 +149,9 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     if wall > _WIDEST_WALL * size:
         return None
     # Area a regular comb of this pitch would fill with as many cells.
-    filled = len(usual) * size * size * np.sqrt(3) / 2 / (height * width)
+    # Cells of a comb lie side by side, specks of a table all over it: the part of their place that they fill.
+    spread = np.diff(np.quantile(places[regular], [0.05, 0.95], axis=0), axis=0)[0] / 0.9 + size
+    filled = len(usual) * size * size * np.sqrt(3) / 2 / float(np.prod(spread))
     _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
     connected = float(pieces[1:, cv2.CC_STAT_AREA].max() / max(1, pieces[1:, cv2.CC_STAT_AREA].sum()))
     return Cells(
@@ -161,7 +163,18 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
         float(min(1.0, filled)),
         seen.contrast,
         connected,
+        float(np.median(light[mask > 0][::7])),
     )
+
+
+def _enclosed(
+    stats: NDArray[np.int32], centroids: NDArray[np.float64], shape: tuple[int, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Areas (N,) and centroids (N, 2) of the pieces that lie within the part and are no slivers."""
+    left, top, wide, high, area = (stats[:, column] for column in range(5))
+    within = (left > 0) & (top > 0) & (left + wide < shape[1]) & (top + high < shape[0])
+    compact = (area > 0.3 * wide * high) & (np.maximum(wide, high) < 4 * np.minimum(wide, high)) & (area >= 9)
+    return area[within & compact].astype(np.float64), centroids[within & compact]
 
 
 def wall_width(mask: Gray) -> float:

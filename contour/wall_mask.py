@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 Gray = NDArray[np.uint8]
 Float = NDArray[np.float32]
+AnyFloat = NDArray[np.floating[Any] | np.integer[Any]]
+Levels = NDArray[np.uint8] | NDArray[np.uint16]
 
 # Standard deviations above the level of cells, itself 1.25 below the mean where there is nothing but noise: lower, and
 # the table fills with specks.
@@ -46,44 +49,55 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     the area is wall; it is never below NOISE_FLOOR times the noise. `contrast`, where it is known, sets one
     more floor, and above 40 levels allows a faster way.
     """
-    # Grey levels are kept in 1/32 where steps of one would show in the threshold; bytes are faster for the rest.
-    unit = 1 if contrast > _BYTE_CONTRAST else 32
-    smooth = cv2.GaussianBlur(light if unit == 1 else light.astype(np.uint16) * np.uint16(unit), (3, 3), 0)
     step = max(1, int(pitch / _MAP_SAMPLES))
-    grid = (-(-light.shape[1] // step), -(-light.shape[0] // step))
-    mean = (cv2.resize(smooth, grid, interpolation=cv2.INTER_AREA) if step > 1 else smooth).astype(np.float32)
-    mean = cv2.blur(mean, (_odd(1.5 * pitch / step),) * 2, borderType=cv2.BORDER_REFLECT)
+    smooth, unit = _smoothed(light, step, contrast)
+    mean = _shrunk(smooth, step)
+    mean = np.asarray(cv2.blur(mean, (_odd(1.5 * pitch / step),) * 2, borderType=cv2.BORDER_REFLECT), np.float32)
     # Every step-th pixel, not their average: an average would take the walls' contrast away.
-    sample = smooth[step // 2 :: step, step // 2 :: step].astype(np.float32)
-    local = sample - mean[: sample.shape[0], : sample.shape[1]]
+    local = smooth[step // 2 :: step, step // 2 :: step].astype(np.float32) - mean
     if not bright:
         local = -local
     noise = _noise_level(smooth, pitch, unit)
     upper, lower, region = _levels(local, pitch / step)
-    # All three count from the level of cells, which on a bare table is the noise below its mean.
+    # All floors count from the level of cells, which on a bare table is the noise below its mean.
     share = _RISE + _FINE_RISE * float(np.clip((16 - pitch) / 8, 0, 1))
-    rise = np.maximum(share * (upper + lower), np.maximum(_REGION_RISE * region, NOISE_FLOOR * noise))
-    rise = np.maximum(rise, _PICTURE_RISE * contrast * unit)
-    offset = rise - lower
-    offset = cv2.copyMakeBorder(
-        offset, 0, grid[1] - offset.shape[0], 0, grid[0] - offset.shape[1], cv2.BORDER_REPLICATE
-    )
+    floor = max(NOISE_FLOOR * noise, _PICTURE_RISE * contrast * unit)
+    offset = np.maximum(np.maximum(share * (upper + lower), _REGION_RISE * region), floor) - lower
     threshold = np.clip(mean + offset if bright else mean - offset, 0, 255 * unit).astype(smooth.dtype)
     if step > 1:
-        threshold = cv2.resize(threshold, (light.shape[1], light.shape[0]), interpolation=cv2.INTER_LINEAR)
+        threshold = cv2.resize(threshold, (smooth.shape[1], smooth.shape[0]), interpolation=cv2.INTER_LINEAR)
     mask = cv2.compare(smooth, threshold, cv2.CMP_GT if bright else cv2.CMP_LT)
-    span = upper + lower
+    mask = np.asarray(mask, np.uint8)[: light.shape[0], : light.shape[1]]
+    return WallMask(np.ascontiguousarray(mask), noise / unit, _typical(upper + lower) / unit)
+
+
+def _smoothed(light: Gray, step: int, contrast: float) -> tuple[Levels, int]:
+    """Lightly blurred picture, filled up to a multiple of `step` both ways, and its units a grey level.
+
+    Grey levels are kept in 1/32 where steps of one would show in the threshold; bytes are faster for the rest.
+    """
+    even = cv2.copyMakeBorder(light, 0, -light.shape[0] % step, 0, -light.shape[1] % step, cv2.BORDER_REPLICATE)
+    if contrast > _BYTE_CONTRAST:
+        return np.asarray(cv2.GaussianBlur(even, (3, 3), 0), np.uint8), 1
+    return np.asarray(cv2.GaussianBlur(even.astype(np.uint16) * np.uint16(32), (3, 3), 0), np.uint16), 32
+
+
+def _shrunk(smooth: Levels, step: int) -> Float:
+    size = (smooth.shape[1] // step, smooth.shape[0] // step)
+    return (cv2.resize(smooth, size, interpolation=cv2.INTER_AREA) if step > 1 else smooth).astype(np.float32)
+
+
+def _typical(span: Float) -> float:
+    """Median of the wall contrast where there is any to speak of."""
     strong = span[span > 0.5 * np.quantile(span[::4, ::4], 0.98)]
-    typical = float(np.median(strong[:: max(1, strong.size // 4096)])) if strong.size else 0.0
-    return WallMask(np.asarray(mask, np.uint8), noise / unit, typical / unit)
+    return float(np.median(strong[:: max(1, strong.size // 4096)])) if strong.size else 0.0
 
 
-def _noise_level(smooth: NDArray[np.uint8 | np.uint16], pitch: float, unit: int) -> float:
+def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
     """Standard deviation of what varies within the quietest tiles, each about a third of a pitch wide."""
     tile = max(3, round(pitch / 3))
-    hop = max(1, round(np.sqrt(smooth.size / (2e5))))
-    rows = smooth[: smooth.shape[0] // tile * tile]
-    rows = rows.reshape(-1, tile, smooth.shape[1])[::hop]
+    hop = max(1, round(np.sqrt(smooth.size / 2e5)))
+    rows = smooth[: smooth.shape[0] // tile * tile].reshape(-1, tile, smooth.shape[1])[::hop]
     columns = smooth.shape[1] // tile
     tiles = rows[:, :, : columns * tile].reshape(rows.shape[0], tile, columns, tile)[:, :, ::hop]
     if tiles.size == 0:
@@ -93,8 +107,8 @@ def _noise_level(smooth: NDArray[np.uint8 | np.uint16], pitch: float, unit: int)
         # No tile of fine cells is quiet, but second differences both ways see little of a blurred structure, and keep
         # the noise that the light blur left as it is.
         part = smooth[: 1 << 9, : 1 << 9].astype(np.float32)
-        rows = part[:, :-2] - 2 * part[:, 1:-1] + part[:, 2:]
-        second = np.abs(rows[:-2] - 2 * rows[1:-1] + rows[2:])
+        bent = part[:, :-2] - 2 * part[:, 1:-1] + part[:, 2:]
+        second = np.abs(bent[:-2] - 2 * bent[1:-1] + bent[2:])
         quiet = min(quiet, float(np.quantile(second, 0.2)) / _FIFTH_OF_NORMAL)
         # Walls of no more than twelve times their noise would not show as cells at all.
         quiet = min(quiet, float(smooth[::hop].std()) / 6)
@@ -109,16 +123,14 @@ def _levels(local: Float, pitch: float) -> tuple[Float, Float, Float]:
     """
     # Glints and dust would raise the threshold around them and wipe out faint walls nearby.
     above = np.minimum(np.maximum(local, 0), _typical_peak(local, pitch))
-    square = above * above
-    window = _odd(1.3 * pitch)
-    upper = _ratio(cv2.blur(square, (window, window)), cv2.blur(above, (window, window)))
     below = np.maximum(-local, 0)
-    lower = _ratio(cv2.blur(below * below, (window, window)), cv2.blur(below, (window, window)))
+    window = _odd(1.3 * pitch)
     coarse = max(1, round(pitch / 2))
     grid = (max(1, local.shape[1] // coarse), max(1, local.shape[0] // coarse))
-    wide = (_odd(12 * pitch / coarse),) * 2
-    sums = [cv2.blur(cv2.resize(part, grid, interpolation=cv2.INTER_AREA), wide) for part in (square, above)]
-    region = cv2.resize(_ratio(*sums), (local.shape[1], local.shape[0]), interpolation=cv2.INTER_LINEAR)
+    wide = _odd(12 * pitch / coarse)
+    weight, square = (cv2.resize(part, grid, interpolation=cv2.INTER_AREA) for part in (above, above * above))
+    region = cv2.resize(_ratio(square, weight, wide), (local.shape[1], local.shape[0]), interpolation=cv2.INTER_LINEAR)
+    upper, lower = _ratio(above * above, above, window), _ratio(below * below, below, window)
     return upper, lower, np.asarray(region, np.float32)
 
 
@@ -130,12 +142,13 @@ def _typical_peak(local: Float, pitch: float) -> float:
         return float(local.max())
     tiles = local[: rows * size, : columns * size].reshape(rows, size, columns, size).max(axis=(1, 3))
     walls = tiles[tiles > 0.25 * tiles.max()]
-    return float(np.quantile(walls, 0.5))
+    return float(np.quantile(walls, 0.5)) if walls.size else 0.0
 
 
-def _ratio(square: Float, weight: Float) -> Float:
-    """Mean of values weighted by themselves from the sums of their squares and of themselves; 0 where they vanish."""
-    return np.asarray(square / np.maximum(weight, 1e-3), np.float32)
+def _ratio(square: AnyFloat, weight: AnyFloat, window: int) -> Float:
+    """Mean over a window of values weighted by themselves, from their squares and themselves; 0 where they vanish."""
+    size = (window, window)
+    return np.asarray(cv2.blur(square, size) / np.maximum(cv2.blur(weight, size), 1e-3), np.float32)
 
 
 def _odd(size: float) -> int:

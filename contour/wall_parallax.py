@@ -84,12 +84,12 @@ def _fitted(lever: Vector, normal: Points, width: Vector) -> tuple[Vector, float
         root = np.sqrt(weight)[:, None]
         # Held near the middle by a few pixels' worth of doubt: ends on one side of it cannot tell both apart.
         matrix = (terms * root).T @ (terms * root) + np.diag([0.0, 0.0, _MIDDLE_HOLD, _MIDDLE_HOLD])
-        factors = np.linalg.solve(matrix, (terms * root).T @ (width * root[:, 0]))
+        factors = np.asarray(np.linalg.solve(matrix, (terms * root).T @ (width * root[:, 0])), np.float64)
         off = np.abs(width - terms @ factors)
         spread = max(1.4826 * float(np.median(off)), 0.1)
         weight = 1 / (1 + (off / (2 * spread)) ** 2)
         side = np.where(factors[1] * lever - normal @ factors[2:] >= 0, 1.0, -1.0)
-        covariance = np.linalg.inv(matrix)
+        covariance = np.asarray(np.linalg.inv(matrix), np.float64)
     return factors, spread * float(np.sqrt(covariance[1, 1]))
 
 

@@ -202,7 +202,7 @@ def _normal_cdf(x: NDArray[np.float64]) -> NDArray[np.float64]:
     size = np.abs(x)
     t = 1 / (1 + 0.33267 * size)
     tail = np.exp(-0.5 * size * size) / np.sqrt(2 * np.pi) * t * (0.4361836 + t * (-0.1201676 + t * 0.9372980))
-    return np.where(x >= 0, 1 - tail, tail)
+    return np.asarray(np.where(x >= 0, 1 - tail, tail), np.float64)
 
 
 def true_width(seen: float, blur: float) -> float:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.errors import NoBlockFound
-from contour.geometry import Contour
+from contour.errors import NoBlockFound, ParameterError
+from contour.geometry import Contour, Ring
 from contour.material_edge import material_edge
 from contour.outline_fit import FittedRing, fit_ring
+from contour.ring_depth import depth_inside
 from contour.tracing import OnStage, Polarity, Rectifier, Trace, TraceSettings
 from contour.wall_cells import probe
-from contour.wall_evidence import BlockEvidence, RingEvidence
+from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import wall_light
 from contour.wall_witnesses import see_block
 
@@ -20,8 +21,7 @@ __all__ = ["see_block", "wall_tips"]
 _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
-# What no scene has been traced better than, pixels: side walls in view, blur that is not the same everywhere.
-_FLOOR_PX = 0.1
+_FAR_OFF_PITCHES = 0.5
 
 
 def wall_tips(
@@ -35,14 +35,20 @@ def wall_tips(
     pixels.
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `on_stage` hears
-    "mask" and "trace". Raises PictureError, NoBlockFound.
+    "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound.
     """
+    if settings.binarize != "flat":
+        raise ParameterError(
+            f"binarize is {settings.binarize!r}, but wall-tips finds its own threshold; use flat, or another method"
+        )
     if settings.edge == "cells":
         return _closed_cells(picture, settings, on_stage)
     seen = see_block(picture, settings.polarity, lambda: on_stage("mask"))
     if seen.leaves_picture:
         return _cut_off(picture, seen, on_stage)
     rings = [_fitted(ring, seen, rectifier) for ring in seen.rings]
+    for evidence, ring in zip(seen.rings, rings, strict=True):
+        _check_against_evidence(evidence, ring.ring, seen.pitch_px)
     exterior = rings[0]
     if exterior.unseen_share > _MOST_UNSEEN:
         raise NoBlockFound(
@@ -55,20 +61,20 @@ def wall_tips(
     # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
     on_stage("trace")
-    return Trace("wall-tips", polarity, seen.pitch_px, contour, max(_uncertainty(ring, seen) for ring in rings))
+    return Trace("wall-tips", polarity, seen.pitch_px, contour)
 
 
 def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
-    """The coarse outline of a block that leaves the picture, along the picture's border there: for a refusal to show."""
+    """The coarse outline of a block that leaves the picture, along its border there: for a refusal to show."""
     last = np.array([picture.shape[1] - 1.0, picture.shape[0] - 1.0])
     rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
     on_stage("trace")
     polarity: Polarity = "dark" if seen.polarity == "dark" else "bright"
-    return Trace("wall-tips", polarity, seen.pitch_px, Contour(rings[0], tuple(rings[1:])), 0.5 * seen.pitch_px)
+    return Trace("wall-tips", polarity, seen.pitch_px, Contour(rings[0], tuple(rings[1:])))
 
 
 def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
-    """The serrated boundary of a block whose border cells are closed; that it is a block at all, its cells must show."""
+    """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
     cells = probe(wall_light(picture), settings.polarity)
     on_stage("mask")
     contour = material_edge(picture, cells.pitch)
@@ -86,6 +92,15 @@ def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None
     return fit_ring(ring, pitch_px=seen.pitch_px, wall_px=seen.wall_px, rectifier=rectifier)
 
 
-def _uncertainty(ring: FittedRing, seen: BlockEvidence) -> float:
-    """Expected error along a ring, pixels: a floor, the inliers' spread, and what lies between its witnesses."""
-    return float(np.hypot(_FLOOR_PX, 0.5 * ring.spread_px) + 0.1 * seen.pitch_px * ring.unseen_share)
+def _check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float) -> None:
+    """Raise NoBlockFound where the ring passes several wall ends in a row far off on one side."""
+    points = evidence.points[evidence.kind != WitnessKind.OUTERMOST]
+    depth = depth_inside(ring, points)
+    for off in (depth > _FAR_OFF_PITCHES * pitch, depth < -_FAR_OFF_PITCHES * pitch):
+        in_a_row = off & np.roll(off, 1) & np.roll(off, 2) & np.roll(off, 3)
+        if in_a_row.any():
+            x, y = points[np.argmax(in_a_row)]
+            raise NoBlockFound(
+                f"no block found: the outline that fits most wall ends passes those near ({x:.0f}, {y:.0f}) px by more "
+                "than half a cell. Check that nothing lies against the block, and that its edge is in focus"
+            )

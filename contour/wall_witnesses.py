@@ -35,6 +35,8 @@ _LEAST_HEIGHT = 0.4
 _MODEL_SIGMA_PX = (0.2, 0.3)
 _SIDE_SIGMA_PX = (0.5, 1.0)
 _NEAR_PX = 1.5
+_FAINT_HEIGHT = 0.45
+_FAINT_SIGMA_PX = 3.0
 # What the mask's own light blur (3 × 3) adds.
 _MASK_BLUR_PX = 0.8
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
@@ -62,9 +64,26 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
         else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     )
     seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
+    if not cells.bright:
+        seen = _darker_than_table(seen, small, cells)
     on_mask()
     coarse = coarse_block(seen.mask, small, cells.pitch / scale, cells.wall / scale)
     return _evidence(light, seen, coarse, cells, scale)
+
+
+def _darker_than_table(seen: WallMask, light: Gray, cells: Cells) -> WallMask:
+    """The mask without what is lighter than midway from dark walls to the table.
+
+    Cells of a black block are nearly as dark as its walls. Against so small a contrast the table's own shades, beside a
+    scratch or in the block's shadow, look like walls; but they are not dark.
+    """
+    margin = max(1, min(light.shape) // 50)
+    rim = (light[:margin], light[-margin:], light[:, :margin], light[:, -margin:])
+    table = float(np.median(np.concatenate([part[::3, ::3].ravel() for part in rim])))
+    if table - cells.level < 2 * seen.contrast:
+        return seen
+    _, dark = cv2.threshold(light, 0.5 * (cells.level + table), 255, cv2.THRESH_BINARY_INV)
+    return replace(seen, mask=np.asarray(cv2.bitwise_and(seen.mask, dark), np.uint8))
 
 
 @dataclass(frozen=True)
@@ -158,8 +177,11 @@ def _sides(light: Gray, place: Points, normal: Points, cells: Cells, model: EndM
     # Beside a thin wall half height lies outside of it, at its corners and ends inside: a third of the way is left.
     fat = (cells.wall - model.width) / 6
     points = np.where(near[:, None], fitted.point, place) - fat * normal
+    sigma = np.where(near, *_SIDE_SIGMA_PX)
+    # The outer side of the block, where it is in view below its top, is fainter than any wall.
+    sigma = np.where(fitted.height < _FAINT_HEIGHT * (model.height or 1.0), _FAINT_SIGMA_PX, sigma)
     kind = np.full(len(place), WitnessKind.OUTERMOST, np.int8)
-    return _Witnesses(points, kind, np.where(near, *_SIDE_SIGMA_PX))
+    return _Witnesses(points, kind, sigma)
 
 
 def _raised(points: Points, normal: Points, depth: Parallax) -> Points:

@@ -106,7 +106,7 @@ def test_witnesses_lie_on_the_outline(kind: str) -> None:
     assert len(ring.points) > 20
     assert abs(float(np.median(off))) < 0.3
     assert np.mean(np.abs(off) < 1.0) > 0.8
-    assert np.mean(off > 1.0) < 0.06
+    assert np.mean(off > 1.0) < 0.08
 
 
 def test_witnesses_come_in_order_with_outward_normals() -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Literal
 
 import cv2
 import numpy as np
 import pytest
 
-from contour.errors import NoBlockFound
+from contour.errors import NoBlockFound, ParameterError, PictureError
 from contour.synthetic import (
     CellGeometry,
     Clutter,
@@ -174,3 +175,59 @@ def test_closed_border_cells_give_their_serrated_boundary() -> None:
 def test_an_empty_table_has_no_closed_cells_either() -> None:
     with pytest.raises(NoBlockFound, match="no block found"):
         wall_tips(render(Scene(ABSENT, CAMERA)).picture, TraceSettings(method="wall-tips", edge="cells"))
+
+
+NOISE = np.random.default_rng(7)
+
+
+@pytest.mark.parametrize("edge", ["cut", "cells"])
+@pytest.mark.parametrize(
+    "picture",
+    [
+        np.full((600, 800), 30),
+        np.zeros((600, 800)),
+        np.full((600, 800), 255),
+        np.full((300, 400, 3), 77),
+        NOISE.integers(0, 256, (600, 800)),
+        np.clip(NOISE.normal(100.0, 8.0, (600, 800)), 0, 255),
+        NOISE.integers(0, 256, (300, 400, 3)),
+        np.hstack([np.zeros((600, 400)), np.full((600, 400), 255)]),
+        np.tile(np.repeat([0, 255], 8), (600, 50)),
+        np.tile(np.linspace(0, 255, 800), (600, 1)),
+        NOISE.integers(0, 256, (16, 16)),
+        NOISE.integers(0, 256, (20, 3000)),
+    ],
+    ids=[
+        "grey",
+        "black",
+        "white",
+        "colour",
+        "noise",
+        "faint",
+        "colour-noise",
+        "halves",
+        "bars",
+        "ramp",
+        "tiny",
+        "strip",
+    ],
+)
+def test_a_picture_without_a_block_is_no_block(picture: np.ndarray, edge: Literal["cut", "cells"]) -> None:
+    with pytest.raises(NoBlockFound, match="no block found"):
+        wall_tips(picture.astype(np.uint8), TraceSettings(method="wall-tips", edge=edge))
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 3000), (0, 0), (0, 5, 3)])
+def test_a_picture_too_small_for_any_block_is_an_error(shape: tuple[int, ...]) -> None:
+    with pytest.raises(PictureError, match="expected at least"):
+        wall_tips(np.zeros(shape, np.uint8), SETTINGS)
+
+
+@pytest.mark.parametrize("binarize", ["otsu", 120])
+def test_a_threshold_of_ones_own_is_refused(binarize: Literal["otsu"] | int) -> None:
+    with pytest.raises(ParameterError, match="binarize"):
+        wall_tips(block().picture, TraceSettings(method="wall-tips", binarize=binarize))
+
+
+def test_an_uncertainty_that_nobody_computed_is_none() -> None:
+    assert traced().uncertainty_px is None

@@ -10,6 +10,7 @@ from concurrent.futures import Executor as ThreadPool
 from dataclasses import dataclass, field
 from typing import Any, ParamSpec, TypeVar
 
+from contour.errors import ParameterError, PictureError
 from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable
 from drivers.controller import ControllerError
 from drivers.controller.mailbox import (
@@ -22,7 +23,7 @@ from drivers.controller.mailbox import (
     withdrawal,
 )
 from service.config import Recipe
-from service.health import Fault, Health
+from service.health import Fault, Health, journal_fault
 from service.journal import Job, Journal, JournalError
 from service.link import Link, Stamp
 from service.measure import Measurement, Measurer
@@ -34,8 +35,10 @@ log = logging.getLogger("combtrace.cycle")
 P = ParamSpec("P")
 R = TypeVar("R")
 
-STAMP_LOOKS = 5
+STAMP_WAIT_S = 1.5  # a lost connection is back within that
 JOURNAL_PAUSE_S = 1.0
+NO_LIMIT = (0, 0)
+VALID_FOR = slice(27, 29)  # in a page's header, which begins with offset 1
 UNCERTAINTY_FACTOR = 1000.0  # mm to µm
 
 
@@ -131,10 +134,13 @@ class Cycle:
             return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), {})
         assert job.session is not None
         transfer = self._transfer(self._link, job, job.session, job.pages, self._now() + self._lifetime_s, sent=True)
-        if job.withdraw_reason is None:
-            settlement = await transfer.run()
-        else:
+        if job.withdraw_reason is not None:
             settlement = await transfer.withdraw(job.withdraw_reason, "a withdrawal that the restart cut short")
+        elif job.pages[0].header[VALID_FOR] == NO_LIMIT:
+            detail = "how old the contour is cannot be known after a restart, and the controller would not look"
+            settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
+        else:
+            settlement = await transfer.run()
         return await self._settle(job, settlement, {})
 
     # --- the steps ----------------------------------------------------------------------------------------------
@@ -159,7 +165,10 @@ class Cycle:
             raise _Stop(Reason.SELF_INTERSECTING, str(error)) from error
         transfer = self._transfer(self._link, job, stamp.session, pages, stamped_at + self._lifetime_s)
         before = self._now()
-        settlement = await transfer.run()
+        try:
+            settlement = await transfer.run()
+        finally:
+            self._health.report("in-flight", None)
         report["transfer_ms"] = round((self._now() - before) * 1000, 1)
         return settlement
 
@@ -178,8 +187,9 @@ class Cycle:
         """Session and clock of the controller, read before the exposure."""
         if self._link is None:
             return Stamp(0, 0)
-        stamp, trouble = None, "the controller's clock jumps"
-        for _ in range(STAMP_LOOKS):
+        trouble = "the controller's clock jumps"
+        give_up_at = self._now() + STAMP_WAIT_S
+        while True:
             try:
                 if self._link.settings.handshake:
                     await self._link.look()
@@ -188,9 +198,9 @@ class Cycle:
             stamp = self._link.stamp()
             if stamp is not None:
                 break
+            if self._now() >= give_up_at:
+                raise _Stop(Reason.CONTROLLER_LOST, self._link.fault() or trouble)
             await asyncio.sleep(self._link.settings.poll_period_s)
-        if stamp is None:
-            raise _Stop(Reason.CONTROLLER_LOST, self._link.fault() or trouble)
         if job.trigger.session is not None and stamp.session != job.trigger.session:
             raise _Stop(
                 Reason.CONTROLLER_RESTARTED,
@@ -223,7 +233,12 @@ class Cycle:
     async def _measure(self, frame: Frame, recipe: Recipe, job: Job) -> Measurement:
         thickness_mm = job.trigger.thickness_um / 1000 if job.trigger.thickness_um else recipe.thickness_mm
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._pool, self._measurer.measure, frame.pixels, recipe, thickness_mm)
+        try:
+            return await loop.run_in_executor(self._pool, self._measurer.measure, frame.pixels, recipe, thickness_mm)
+        except PictureError as error:
+            raise _Stop(Reason.NO_FRAME, f"{frame.source}: {error}") from error
+        except ParameterError as error:
+            raise _Stop(Reason.INTERNAL_ERROR, f"recipe {recipe.number}: {error}. Correct the recipe") from error
 
     def _pages(
         self, job: Job, recipe: Recipe, stamp: Stamp, frame: Frame, measurement: Measurement
@@ -265,6 +280,9 @@ class Cycle:
         async def before_withdrawal(reason: Reason) -> None:
             await self._durably(self._journal.store_withdrawal, job.job_id, reason)
 
+        def on_stuck(why: str) -> None:
+            self._health.report("in-flight", Fault(Reason.CONTROLLER_TIMEOUT, why))
+
         return Transfer(
             link,
             self._settings.transfer,
@@ -276,6 +294,7 @@ class Cycle:
             expires_at_s=expires_at_s,
             before_sending=before_sending,
             before_withdrawal=before_withdrawal,
+            on_stuck=on_stuck,
             sent=sent,
             now=self._now,
         )
@@ -288,13 +307,16 @@ class Cycle:
         )
 
     async def _durably(self, write: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Write to the journal, again and again until it is done: no step goes on without it."""
+        """Read or write the journal, again and again until it is done: no step goes on without it."""
+        told = ""
         while True:
             try:
                 result = await asyncio.to_thread(write, *args, **kwargs)
             except JournalError as error:
-                self._health.report("journal", Fault(Reason.STORAGE_FULL, str(error)))
-                log.error("journal: %s", error)
+                self._health.report("journal", journal_fault(error))
+                if str(error) != told:
+                    log.error("journal: %s", error)
+                told = str(error)
                 await asyncio.sleep(JOURNAL_PAUSE_S)
             else:
                 self._health.report("journal", None)
@@ -302,18 +324,23 @@ class Cycle:
 
     def _abort(self, job: Job) -> None:
         """At shutdown: a job of which nothing was sent ends here, one that was sent is settled by the next start."""
-        known = self._journal.find(job.job_id)
-        if known is not None and known.outcome is None and not known.sent:
-            self._journal.settle(job.job_id, Outcome.FAILED, Reason.ABORTED, "the service was stopped", {})
-            log.warning("job %d failed: %d aborted", job.job_id, Reason.ABORTED)
-        else:
-            log.warning("job %d stays in flight; the next start settles it", job.job_id)
+        try:
+            known = self._journal.find(job.job_id)
+            if known is not None and known.outcome is None and not known.sent:
+                self._journal.settle(job.job_id, Outcome.FAILED, Reason.ABORTED, "the service was stopped", {})
+                log.warning("job %d failed: %d aborted", job.job_id, Reason.ABORTED)
+                return
+        except JournalError as error:
+            log.error("journal: %s", error)
+        log.warning("job %d stays in flight; the next start settles it", job.job_id)
 
     async def _end_defect(self, job: Job, error: Exception) -> Settlement:
         """A defect's settlement; a job that was sent is withdrawn first."""
         detail = f"{type(error).__name__}: {error}"
-        known = self._journal.find(job.job_id)
-        if known is None or not known.sent or known.session is None or self._link is None:
+        known = await self._durably(self._journal.find, job.job_id)
+        never_answered = self._link is None or not self._settings.transfer.handshake
+        if known is None or not known.sent or known.session is None or never_answered:
             return Settlement(Outcome.FAILED, Reason.INTERNAL_ERROR, detail)
+        assert self._link is not None
         transfer = self._transfer(self._link, job, known.session, known.pages, self._now(), sent=True)
         return await transfer.withdraw(Reason.INTERNAL_ERROR, detail)

@@ -8,6 +8,7 @@ import signal
 from collections.abc import Awaitable, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from drivers.camera import Camera, CameraError
@@ -68,6 +69,7 @@ class Daemon:
         """The settled job of one immediate manual trigger; raise TriggerRefused where it is not taken in time."""
         for number in on_signals:
             asyncio.get_running_loop().add_signal_handler(number, self.stop)
+        self._parts.executor.ignore_controller()
         tasks = self._start([])
         try:
             ticket = await self._submit_when_ready(ready_timeout_s)
@@ -84,13 +86,12 @@ class Daemon:
         parts = self._parts
         runs: list[Callable[[], Awaitable[None]]] = [
             self._watch_camera,
-            self._watch_link,
             self._watch_journal,
             parts.executor.run,
             *triggers,
         ]
         if parts.link is not None:
-            runs.append(parts.link.run)
+            runs += [parts.link.run, partial(self._watch_link, parts.link)]
             self._report_link(parts.link)
         self._report_camera(Fault(Reason.NO_FRAME, "the camera is being opened", starting=True))
         parts.health.start()
@@ -131,10 +132,9 @@ class Daemon:
                     parts.health.report("journal", None)
             await asyncio.sleep(JOURNAL_RETRY_S)
 
-    async def _watch_link(self) -> None:
+    async def _watch_link(self, link: Link) -> None:
         """Let health follow the link: some faults show by silence, so looking at each reply would not find them."""
-        link = self._parts.link
-        while link is not None:
+        while True:
             self._report_link(link)
             await asyncio.sleep(WATCH_PERIOD_S)
 
@@ -211,9 +211,13 @@ async def _as_task(run: Callable[[], Awaitable[None]]) -> None:
 
 
 def _raise_first(tasks: list[asyncio.Task[None]]) -> None:
+    """Raise what ended a task: each runs for ever, so the end of one is a defect that ends the service."""
     for task in tasks:
-        if task.done() and not task.cancelled():
-            task.result()
+        if task.done():
+            log.critical("a part of the service has ended, so the service ends: %s", task)
+            if not task.cancelled():
+                task.result()
+            raise RuntimeError(f"{task} ended, expected it to run for ever. Report it with the log")
 
 
 def _reopen(camera: Camera) -> None:

@@ -8,14 +8,15 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from service.health import Fault, Health
-from service.journal import Job, Journal, JournalError, JournalFull, TriggerStamp
+from service.health import Fault, Health, journal_fault
+from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
 from service.reasons import Outcome, Reason
 from service.state import State
 
 log = logging.getLogger("combtrace.jobs")
 
+JOURNAL_PAUSE_S = 1.0
 COUNTER_VALUES = 65535  # a trigger counter runs 1…65535; 0 means none yet
 
 
@@ -79,6 +80,7 @@ class Executor:
         self._submitted: Ticket | None = None
         self._taking = False
         self._missed = 0
+        self._told: set[str] = set()
         self.settled_job = 0
         self._last_pair = journal.last_controller_trigger()
         self._restore_published()
@@ -107,6 +109,10 @@ class Executor:
         """Something changed that may let a job begin."""
         self._wake.set()
 
+    def ignore_controller(self) -> None:
+        """Take no triggers of the controller; they stay pending."""
+        self._controller_triggers = False
+
     async def submit(self, trigger: TriggerStamp) -> Ticket:
         """A ticket for the job, durable in the journal; raise TriggerRefused where it cannot be taken now."""
         try:
@@ -118,11 +124,16 @@ class Executor:
                 self._taking = False
         except TriggerRefused as refused:
             self._count_missed(1)
-            log.warning("trigger %s not taken: %s: %s", trigger.kind, refused.reason.label, refused)
+            self._tell(f"trigger {trigger.kind} not taken: {refused.reason.label}: {refused}")
             raise
         self._submitted = Ticket(job, asyncio.get_running_loop().create_future())
         self._wake.set()
         return self._submitted
+
+    def _tell(self, refusal: str) -> None:
+        """Log a refusal, once until a trigger is taken: at intervals it would come back all night."""
+        log.log(logging.DEBUG if refusal in self._told else logging.WARNING, refusal)
+        self._told.add(refusal)
 
     def _check_free(self) -> None:
         if self._health.job is not None or self._submitted is not None or self._taking:
@@ -130,6 +141,8 @@ class Executor:
         if self._health.state is not State.READY:
             fault = self._health.first()
             raise TriggerRefused(Reason.NOT_READY, fault.text if fault else f"state {self._health.state.label}")
+        if self._pending() is not None:  # it would be answered 5 while the controller's own trigger is open
+            raise TriggerRefused(Reason.BUSY, "the controller's own trigger comes first")
         why_not = self._link.controller_not_ready() if self._link else None
         if why_not is not None:
             raise TriggerRefused(Reason.NOT_READY, why_not)
@@ -139,10 +152,11 @@ class Executor:
         try:
             job = await asyncio.to_thread(self._journal.take, trigger, above=view.last_job if view else 0)
         except JournalError as error:
-            full = isinstance(error, JournalFull)
-            self._health.report("journal", Fault(Reason.STORAGE_FULL if full else Reason.INTERNAL_ERROR, str(error)))
-            raise TriggerRefused(Reason.STORAGE_FULL if full else Reason.INTERNAL_ERROR, str(error)) from error
+            fault = journal_fault(error)
+            self._health.report("journal", fault)
+            raise TriggerRefused(fault.reason, fault.text) from error
         self._health.report("journal", None)
+        self._told.clear()
         log.info("job %d taken: trigger %s recipe %d", job.job_id, trigger.kind, trigger.recipe)
         if self._link is not None:
             self._link.publish(job_id=job.job_id)
@@ -178,8 +192,7 @@ class Executor:
             ticket.settled.set_result(job)
 
     async def _settle_in_flight(self) -> None:
-        unsettled = self._journal.unsettled()
-        for job in unsettled:
+        for job in await self._unsettled():
             log.warning("job %d was in flight when the service ended", job.job_id)
             self._health.report(
                 "in-flight",
@@ -187,6 +200,16 @@ class Executor:
             )
             await self._finish(await self._runner.resume(job))
         self._health.report("in-flight", None)
+
+    async def _unsettled(self) -> tuple[Job, ...]:
+        """Jobs of before the start without an end; until they are known, no trigger is taken."""
+        while True:
+            try:
+                return self._journal.unsettled()  # in this thread: no trigger may come in between
+            except JournalError as error:
+                self._tell(f"journal: {error}")
+                self._health.report("in-flight", journal_fault(error))
+                await asyncio.sleep(JOURNAL_PAUSE_S)
 
     def _pending(self) -> TriggerStamp | None:
         """The controller's open trigger, where there is one and it can be taken now."""
@@ -209,7 +232,7 @@ class Executor:
         try:
             job = await self._take(trigger)
         except TriggerRefused as refused:  # it stays pending, and is taken once the journal works again
-            log.warning("trigger controller not taken yet: %s: %s", refused.reason.label, refused)
+            self._tell(f"trigger controller not taken yet: {refused.reason.label}: {refused}")
             return
         finally:
             self._taking = False

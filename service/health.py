@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from service.journal import JournalError, JournalFull
 from service.reasons import Reason
 from service.state import State, StateMachine
 
@@ -21,6 +22,11 @@ class Fault:
     reason: Reason
     text: str
     starting: bool = False
+
+
+def journal_fault(error: JournalError) -> Fault:
+    """What a failed access to the journal means for the service."""
+    return Fault(Reason.STORAGE_FULL if isinstance(error, JournalFull) else Reason.INTERNAL_ERROR, str(error))
 
 
 class Health:

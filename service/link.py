@@ -9,6 +9,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -75,7 +76,11 @@ class Link:
         self._block = ServiceBlock()
         self._dirty = True
         self._written_at = -1e9
-        self._trouble = "not connected yet"
+        self._trouble: str | None = "not connected yet"
+        self._served = False
+        self._connected_at = 0.0
+        self._clock_ran_in = 0  # the session in which the clock was seen at another value than 0
+        self._zero: tuple[int, float] = (0, 0.0)  # session, and when its clock was first seen at 0
         self._well_or_failed = False
         self._since: float | None = None
         self._forget()
@@ -84,6 +89,7 @@ class Link:
         """Drop all that an earlier connection said: nothing of it may be combined with what comes next."""
         self.view = None
         self._previous: LinkBlock | None = None
+        self._unsteady: str | None = None
         self._beat_at: float | None = None
         self._beat: int | None = None
         self._clock: tuple[int, int, float] | None = None  # session, clock in ms, when it was read
@@ -105,22 +111,34 @@ class Link:
         return fault
 
     def _fault(self) -> str | None:
-        if not self._up.is_set():
-            return self._trouble
+        if not self._up.is_set() or self._trouble is not None:
+            return self._trouble or "the connection was lost. It is being opened again"
         if not self.settings.handshake:
             return None
         view = self.view
         if view is None or view.session == 0:
-            return "the controller's program is starting (session 0)"
-        if not self._beating():
+            return self._unsteady or "the controller's program is starting (session 0)"
+        return self._beat_fault() or self._echo_fault(view) or self._clock_fault()
+
+    def _beat_fault(self) -> str | None:
+        silent_s = self._now() - (self._connected_at if self._beat_at is None else self._beat_at)
+        if silent_s > self.settings.heartbeat_timeout_s:
             return (
                 f"the controller's heartbeat has not changed for {self.settings.heartbeat_timeout_s:g} s: "
                 "its program does not run"
             )
-        return self._echo_fault(view)
+        return "the controller's heartbeat has not changed yet" if self._beat_at is None else None
 
-    def _beating(self) -> bool:
-        return self._beat_at is not None and self._now() - self._beat_at <= self.settings.heartbeat_timeout_s
+    def _clock_fault(self) -> str | None:
+        undecided = self._clock is not None and self._clock_runs(self._clock) is None
+        return "the controller's clock shows 0: whether it runs is not known yet" if undecided else None
+
+    def _clock_runs(self, reading: tuple[int, int, float]) -> bool | None:
+        """True, False where it has shown 0 for longer than a clock can, None where that is not known yet."""
+        session, clock_ms, read_at = reading
+        if clock_ms or session == self._clock_ran_in:
+            return True
+        return False if (read_at - self._zero[1]) * 1000 > CLOCK_TOLERANCE_MS else None
 
     def _echo_fault(self, view: LinkBlock) -> str | None:
         expected = self._block.test_value + 1
@@ -154,9 +172,11 @@ class Link:
         session, clock_ms, _ = self._clock
         if session != self.view.session:
             return None
-        if clock_ms == 0:
-            return Stamp(session, 0)
-        return Stamp(session, clock_ms) if self._clock_fits else None
+        runs = self._clock_runs(self._clock)
+        if not runs:
+            return Stamp(session, 0) if runs is False else None
+        # A running clock that wraps to 0 is told as 1 ms earlier: 0 would say that there is none.
+        return Stamp(session, clock_ms or CLOCK_MODULUS - 1) if self._clock_fits else None
 
     # --- reading ------------------------------------------------------------------------------------------------
 
@@ -168,19 +188,31 @@ class Link:
             previous, self._previous = self._previous, block
             if previous is not None and steady(previous) == steady(block):
                 self.view = block
+                self._unsteady = None
                 self.on_look()
                 return block
-        raise LinkUnsteady(
+        self.view = None
+        text = (
             f"the controller's block changed at each of {READS_FOR_TWO_ALIKE} reads, expected two alike in a row. "
             "Check controller.link_address"
         )
+        log.log(logging.DEBUG if self._unsteady else logging.WARNING, "link: %s", text)
+        self._unsteady = text
+        raise LinkUnsteady(text)
 
     def _heard(self, block: LinkBlock) -> None:
         now = self._now()
         if self._beat is not None and block.controller_heartbeat != self._beat:
             self._beat_at = now
         self._beat = block.controller_heartbeat
+        self._heard_clock(block, now)
+
+    def _heard_clock(self, block: LinkBlock, now: float) -> None:
         before, self._clock = self._clock, (block.session, block.clock, now)
+        if block.clock:
+            self._clock_ran_in = block.session
+        elif self._zero[0] != block.session:
+            self._zero = (block.session, now)
         if before is None or before[0] != block.session:
             self._clock_fits = False
             return
@@ -243,27 +275,38 @@ class Link:
                 try:
                     await self.controller.connect()
                     self._forget()
-                    if failures:
-                        log.info("link: controller is back")
-                    failures = 0
+                    self._connected_at = self._now()
                     self._dirty = True
                     self._up.set()
                     await self._serve()
                 except ControllerError as error:
-                    self._lost(error, first=failures == 0)
-                pause = RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)]
+                    # A connection alone is no success: there are those who answer it, and then no request.
+                    failures = 0 if self._served else failures
+                    self._lost(error)
+                await asyncio.sleep(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
                 failures += 1
-                await asyncio.sleep(pause)
         finally:
             self._up.clear()
             await self.controller.close()
 
-    def _lost(self, error: ControllerError, *, first: bool) -> None:
+    def _lost(self, error: ControllerError) -> None:
+        """Note why; one line of log from one success to the next, however many attempts that takes."""
+        first = self._served or not self._well_or_failed
         self._up.clear()
         self._forget()
+        self._served = False
         self._trouble = str(error)
         self._well_or_failed = True
         log.log(logging.WARNING if first else logging.DEBUG, "link: %s", error)
+        self.on_look()
+
+    def _serves(self) -> None:
+        """The controller answered a whole round: what was wrong before is over."""
+        if self._served:
+            return
+        if self._well_or_failed:
+            log.info("link: controller is back")
+        self._served, self._trouble = True, None
         self.on_look()
 
     async def _serve(self) -> None:
@@ -271,16 +314,12 @@ class Link:
             if not self.controller.connected:  # another's request has found it out
                 raise ControllerUnavailable("the connection was lost. It is being opened again")
             if self.settings.handshake:
-                try:
+                with suppress(LinkUnsteady):  # told by `fault`; our heartbeat goes on
                     await self.look()
-                except ControllerUnavailable:
-                    raise
-                except LinkUnsteady as error:
-                    self.view = None
-                    log.warning("link: %s", error)
             if self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S:
                 await self._write_service()
                 self.on_look()
+            self._serves()
             await self._pause()
 
     async def _pause(self) -> None:

@@ -1,7 +1,8 @@
 """One job's pages to the controller, by the protocol's "A transfer": it ends only where the controller has decided.
 
 Of one job, `before_sending` is called once, before the first request that carries any of it; `before_withdrawal` before
-the first request that takes it back. Both make it durable, so that a restart goes on where this left off.
+the first request that takes it back. Both make it durable, so that a restart goes on where this left off. `on_stuck` is
+told why a withdrawal gets no decision; it goes on all the same.
 """
 
 from __future__ import annotations
@@ -85,6 +86,7 @@ class Transfer:
         expires_at_s: float,
         before_sending: Callable[[], Awaitable[None]],
         before_withdrawal: Callable[[Reason], Awaitable[None]],
+        on_stuck: Callable[[str], None] = lambda _why: None,
         sent: bool = False,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -98,6 +100,7 @@ class Transfer:
         self._expires_at_s = expires_at_s
         self._before_sending = before_sending
         self._before_withdrawal = before_withdrawal
+        self._on_stuck = on_stuck
         self._sent = sent
         self._now = now
         self._withdrawn_for: tuple[Reason, str] | None = None
@@ -109,7 +112,7 @@ class Transfer:
             if not self._settings.handshake:
                 return await self._write_only()
             reason, detail = await self._deliver()
-            if not self._sent and not self._link.controller.connected:
+            if not self._sent and self._link.fault() is not None:
                 return Settlement(Outcome.FAILED, reason, detail)  # it never left: there is nothing to take back
             return await self.withdraw(reason, detail)
         except _Ended as ended:
@@ -120,6 +123,7 @@ class Transfer:
         log.warning("job %d: withdrawing: %s (%s)", self._job_id, reason.label, detail)
         self._withdrawn_for = (reason, detail)
         await self._before_withdrawal(reason)
+        in_vain = 0
         try:
             while True:
                 try:
@@ -129,6 +133,9 @@ class Transfer:
                     await self._link.wait_connected()
                 except ControllerError as error:
                     self._told(str(error))
+                in_vain += 1
+                if in_vain == self._settings.max_repeats:
+                    self._on_stuck(f"job {self._job_id} cannot be taken back: {self._trouble or 'connection lost'}")
                 await asyncio.sleep(WITHDRAWAL_PAUSE_S)
         except _Ended as ended:
             return ended.settlement
@@ -178,7 +185,12 @@ class Transfer:
                 give_up = await self._ready()
                 if give_up is not None:
                     return give_up
-                answer = await self._attempt(self._pages[page])
+                # No contour before the acknowledgement of its trigger has arrived.
+                if await self._link.flush(self._settings.ack_timeout_s):
+                    answer = await self._attempt(self._pages[page])
+                else:
+                    self._told("the controller does not confirm the service block")
+                    answer = None
             except ControllerUnavailable as error:
                 self._told(str(error))
                 if not await self._reconnected():
@@ -188,12 +200,17 @@ class Transfer:
                 self._told(str(error))
                 answer = None
                 await asyncio.sleep(self._settings.poll_period_s)
-            if answer is Answer.ACCEPTED:
+            if answer is Answer.ACCEPTED and page + 1 < len(self._pages):
                 page, in_vain = page + 1, 0
-            elif answer is not Answer.NOT_READY:
+            elif answer is Answer.NOT_READY:
+                await asyncio.sleep(self._settings.poll_period_s)  # its state may say ready all the while
+            else:
+                if answer is Answer.ACCEPTED:
+                    self._told("answer 1 accepted, but last_job is another: it must be written before ack_transfer")
                 page = 0 if answer is Answer.PAGE_MISSING else page
                 in_vain += 1
-        return Reason.CONTROLLER_TIMEOUT, f"{in_vain} attempts in vain, last: {self._trouble}"
+        reason = Reason.CONTROLLER_TIMEOUT if self._now() < self._expires_at_s else Reason.EXPIRED
+        return reason, f"{in_vain} attempts in vain, last: {self._trouble}"
 
     async def _ready(self) -> tuple[Reason, str] | None:
         """Step 1: None when the controller is ready, else why the job is to be withdrawn."""
@@ -229,8 +246,10 @@ class Transfer:
         if self._settings.readback and await controller.read_page(len(page.payload)) != page:
             self._told("read-back differs from what was written: check contour_address and payload_capacity")
             return None
-        view = self._link.view
-        transfer = self._counter.next(view.ack_transfer if view else 0)
+        if self._too_old():  # making it durable, or the requests, took longer than it had
+            return None
+        view = self._link.view or await self._look()
+        transfer = self._counter.next(view.ack_transfer)
         try:
             await controller.write_transfer(transfer)
         except ControllerUnavailable as error:  # it may have been done: go on with step 7
@@ -238,6 +257,13 @@ class Transfer:
             if not await self._reconnected():
                 return None
         return await self._answer(transfer)
+
+    def _too_old(self) -> bool:
+        """True where the contour must not be committed any more; a withdrawal never ages."""
+        if self._withdrawn_for is not None or self._now() < self._expires_at_s:
+            return False
+        self._told("the contour became too old on its way")
+        return True
 
     async def _about_to_send(self) -> None:
         """Make durable that the job may have been sent, before the first request of step 3."""
@@ -250,7 +276,13 @@ class Transfer:
         give_up_at = self._now() + self._settings.ack_timeout_s
         pause = FIRST_LOOKS_S
         while True:
-            view = await self._look()
+            try:
+                view = await self._look()
+            except ControllerUnavailable as error:  # the commit was confirmed: its answer is still to be had
+                self._told(str(error))
+                if self._now() >= give_up_at or not await self._reconnected():
+                    return None
+                continue
             if view.session == self._session and view.ack_transfer == transfer:
                 answer = _as_answer(view.ack_result)
                 if answer in CAN_BE_REPEATED or answer in (Answer.PAGE_MISSING, Answer.NOT_READY):
@@ -258,6 +290,8 @@ class Transfer:
                     return answer
                 if answer is Answer.ACCEPTED and self._withdrawn_for is None and view.last_job < self._job_id:
                     return answer  # of a page that is not the last one; the last one's is in last_job, looked at above
+            if self._too_old():  # without a clock of the controller's, taking it back is all that keeps it from use
+                return None
             if self._now() >= give_up_at:
                 self._told(f"no answer within {self._settings.ack_timeout_s:g} s")
                 return None
@@ -316,4 +350,6 @@ def _as_answer(value: int) -> Answer | None:
 
 def _answer_name(value: int) -> str:
     answer = _as_answer(value)
+    if answer is Answer.EXPIRED:
+        return "expired (too old, or the controller's last trigger is another)"
     return "unknown" if answer is None else answer.name.lower()

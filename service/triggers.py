@@ -74,11 +74,12 @@ class SerialTrigger:
             while True:
                 try:
                     await loop.run_in_executor(self._pool, self._port.open)
+                    line = await self._read()  # a port that opens and then cannot be read is not back
                     if failures:
                         log.info("serial %s: is back", self._name)
                     failures = 0
                     self._health.report(self._part, None)
-                    await self._serve()
+                    await self._serve(line)
                 except TriggerUnavailable as error:
                     if failures == 0:
                         log.warning("serial: %s", error)
@@ -95,13 +96,14 @@ class SerialTrigger:
     def _part(self) -> str:
         return f"serial {self._name}"
 
-    async def _serve(self) -> None:
-        loop = asyncio.get_running_loop()
+    async def _read(self) -> bytes | None:
+        return await asyncio.get_running_loop().run_in_executor(self._pool, self._port.read_line, READ_TIMEOUT_S)
+
+    async def _serve(self, line: bytes | None) -> None:
         while True:
-            line = await loop.run_in_executor(self._pool, self._port.read_line, READ_TIMEOUT_S)
-            if line is None:
-                continue
-            await self._answer(line)
+            if line is not None:
+                await self._answer(line)
+            line = await self._read()
 
     async def _answer(self, line: bytes) -> None:
         """Reply to a line; an empty one gets none."""

@@ -7,15 +7,15 @@ from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from drivers.camera.files import FileCamera
-from drivers.trigger.serial import SerialLineTrigger
 from numpy.typing import NDArray
 
 from contour.calibration import Calibration
 from drivers.camera import Camera
+from drivers.camera.files import FileCamera
 from drivers.controller import Controller
 from drivers.controller.mailbox import MailboxLayout
 from drivers.controller.modbus import ModbusTcpController
+from drivers.trigger.serial import SerialLineTrigger
 from service.calibration_file import CalibrationFileError, load_calibration
 from service.config import Config, ControllerTrigger, FilesCamera, IntervalTrigger, ModbusTcp, NoController
 from service.config import SerialTrigger as SerialTriggerSettings
@@ -42,11 +42,7 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     """The daemon's parts; raise WiringError. Must be called in the event loop's thread."""
     calibration, calibration_fault = find_calibration(config)
     camera = make_camera(config)
-    try:
-        lock = Lock(config.service.state_dir / "combtrace.lock")
-        journal = Journal(config.journal.path)
-    except (LockError, JournalError) as error:
-        raise WiringError(str(error)) from error
+    lock, journal = _make_journal(config)
     link = _make_link(config)
     health = Health(StateMachine(_publisher(link)))
     health.report("calibration", calibration_fault)
@@ -64,12 +60,27 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
         observe=observe,
     )
     kinds = {type(trigger) for trigger in config.triggers}
-    executor = Executor(journal, cycle, health, link, controller_triggers=ControllerTrigger in kinds)
+    try:
+        executor = Executor(journal, cycle, health, link, controller_triggers=ControllerTrigger in kinds)
+    except JournalError as error:
+        raise WiringError(str(error)) from error
     if link is not None:
         link.on_look = executor.wake
     parts = Parts(camera, journal, health, executor, link, pool, lock)
     _add_triggers(config, parts)
     return parts
+
+
+def _make_journal(config: Config) -> tuple[Lock, Journal]:
+    try:
+        lock = Lock(config.service.state_dir / "combtrace.lock")
+    except LockError as error:
+        raise WiringError(str(error)) from error
+    try:
+        return lock, Journal(config.journal.path)
+    except JournalError as error:
+        lock.release()
+        raise WiringError(str(error)) from error
 
 
 def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:

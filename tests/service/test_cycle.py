@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from contour.errors import ParameterError, PictureError
 from contour.geometry import Contour
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable
 from drivers.camera.simulated import SimulatedCamera
@@ -394,3 +395,73 @@ async def test_a_stop_after_sending_leaves_the_job_in_flight(tmp_path: Path) -> 
             await task
         (job,) = built.journal.unsettled()
         assert job.sent
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [(PictureError("5 x 5 px"), Reason.NO_FRAME), (ParameterError("core_px is 900"), Reason.INTERNAL_ERROR)],
+)
+async def test_an_unusable_picture_or_recipe_is_told_as_such_and_is_no_defect(
+    tmp_path: Path, error: Exception, reason: Reason, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with rig(tmp_path) as built:
+        built.plan.result = error
+        job = await built.job()
+    assert (job.outcome, job.reason) == (Outcome.FAILED, reason)
+    assert str(error) in (job.detail or "")
+    assert [record for record in caplog.records if record.exc_info] == []
+
+
+async def test_a_sent_job_without_a_limit_of_its_own_is_taken_back_after_a_restart(tmp_path: Path) -> None:
+    """How long the service was away cannot be known, and a controller without a clock would take it at any age."""
+    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
+
+        def prepare(job_id: int) -> None:
+            page = sent_page(job_id)
+            endless = Page((*page.header[:27], 0, 0, *page.header[29:]), page.payload)
+            built.journal.store_pages(job_id, 9, (endless,))
+
+        job = await resumed(built, prepare)
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
+        assert built.controller.link.last_result == Answer.WITHDRAWN
+
+
+async def test_a_defect_without_handshake_ends_the_job_at_once(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, transfer=replace(QUICK, handshake=False))
+    async with rig(tmp_path, settings) as built:
+
+        async def broken(_payload_length: int) -> object:
+            raise ZeroDivisionError("a defect")
+
+        built.controller.read_page = broken  # type: ignore[method-assign,assignment]
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.INTERNAL_ERROR)
+
+
+async def test_a_journal_that_fails_during_a_job_holds_it_up_is_told_once_and_loses_nothing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.cycle.JOURNAL_PAUSE_S", 0.01)
+    async with rig(tmp_path) as built:
+        taken = built.journal.take(TriggerStamp("serial"))
+        built.journal._db.execute("PRAGMA query_only = ON")
+        task = asyncio.ensure_future(built.cycle.run(taken))
+        await asyncio.sleep(0.3)
+        assert built.controller.count("write_page") == 0, "nothing is sent that is not durable"
+        assert built.health.first().reason is Reason.INTERNAL_ERROR
+        built.journal._db.execute("PRAGMA query_only = OFF")
+        assert (await asyncio.wait_for(task, 10)).outcome is Outcome.ACCEPTED
+    assert sum("journal" in record.message for record in caplog.records if record.name == "combtrace.cycle") == 1
+
+
+async def test_a_withdrawal_that_drags_on_is_an_error_with_its_reason(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, transfer=replace(QUICK, max_repeats=1))
+    async with rig(tmp_path, settings, controller=ScriptedController([None])) as built:
+        taken = built.journal.take(TriggerStamp("serial"))
+        task = asyncio.ensure_future(built.cycle.run(taken))
+        while built.machine.state is not State.ERROR:
+            await asyncio.sleep(0.01)
+        assert "cannot be taken back" in (built.machine.reason or "")
+        built.controller.answers = [Answer.WITHDRAWN]
+        await asyncio.wait_for(task, 10)
+        assert built.machine.state is State.READY

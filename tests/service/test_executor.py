@@ -69,6 +69,7 @@ class Bench:
         self.link.view = LinkBlock(**values)
         self.link._beat_at = 0.0
         self.link._up.set()
+        self.link._trouble = None
         self.executor.wake()
 
 
@@ -278,3 +279,58 @@ def test_missed_counts_the_values_between_on_a_ring_without_zero(last: int, new:
 def test_missed_in_a_new_session_counts_from_its_beginning() -> None:
     assert missed_between((3, 17), 4, 1) == 0
     assert missed_between((3, 17), 4, 3) == 2
+
+
+async def test_a_refusal_that_comes_back_at_intervals_is_logged_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with running(tmp_path) as bench:
+        bench.health.report("camera", Fault(Reason.NO_FRAME, "camera silent"))
+        for _ in range(5):
+            with pytest.raises(TriggerRefused):
+                await bench.executor.submit(TriggerStamp("interval"))
+        assert sum("not taken" in record.message for record in caplog.records) == 1
+        assert bench.link.published.missed_triggers == 5
+        bench.health.report("camera", None)
+        await (await bench.executor.submit(TriggerStamp("interval"))).settled
+        bench.health.report("camera", Fault(Reason.NO_FRAME, "camera silent"))
+        with pytest.raises(TriggerRefused):
+            await bench.executor.submit(TriggerStamp("interval"))
+        assert sum("not taken" in record.message for record in caplog.records) == 2
+
+
+async def test_an_open_trigger_of_the_controller_goes_before_a_trigger_of_ours(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=1)
+        with pytest.raises(TriggerRefused, match="comes first") as refusal:
+            await bench.executor.submit(TriggerStamp("serial"))
+        assert refusal.value.reason is Reason.BUSY
+        await until(lambda: bench.settled)
+
+
+async def test_no_trigger_is_taken_before_the_journal_has_told_what_is_in_flight(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.executor.JOURNAL_PAUSE_S", 0.02)
+    bench = Bench(tmp_path)
+    unsettled, failures = bench.journal.unsettled, [JournalError("disk I/O error")] * 2
+
+    def unreadable() -> tuple[Job, ...]:
+        if failures:
+            raise failures.pop()
+        return unsettled()
+
+    monkeypatch.setattr(bench.journal, "unsettled", unreadable)
+    bench.health.start()
+    bench.controller_says(trigger_counter=1)
+    task = asyncio.ensure_future(bench.executor.run())
+    try:
+        await asyncio.sleep(0)
+        with pytest.raises(TriggerRefused, match="disk I/O error"):
+            await bench.executor.submit(TriggerStamp("serial"))
+        await until(lambda: bench.settled)
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+        bench.journal.close()

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from drivers.controller.mailbox import Page
-from service.journal import Journal, JournalConflict, JournalError, TriggerStamp
+from service.journal import Journal, JournalConflict, JournalError, JournalFull, TriggerStamp
 from service.reasons import Outcome, Reason
 
 PAGE = Page(tuple(range(31)), (1, 2, 3, 4, 0xFFFF, 0))
@@ -134,3 +134,37 @@ def test_a_path_below_a_file_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     with pytest.raises(JournalError, match="cannot use the journal"):
         Journal(tmp_path / "file" / "journal.sqlite")
+
+
+def test_a_commit_that_fails_leaves_nothing_begun_and_invents_no_job(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "journal.sqlite")
+    journal._db.executescript(
+        "PRAGMA foreign_keys = ON;"
+        "CREATE TABLE late (job INTEGER REFERENCES jobs (job_id) DEFERRABLE INITIALLY DEFERRED);"
+        "CREATE TEMP TRIGGER fail AFTER INSERT ON jobs BEGIN INSERT INTO late VALUES (999); END;"
+    )
+    with pytest.raises(JournalError, match="FOREIGN KEY"):
+        journal.take(TriggerStamp("serial"))
+    journal._db.execute("DROP TRIGGER fail")
+    assert journal.last_taken() is None
+    assert journal.take(TriggerStamp("serial")).job_id == 1
+    assert [job.job_id for job in journal.unsettled()] == [1]
+    journal.close()
+
+
+def test_a_full_disk_is_called_so_and_the_journal_works_again_once_there_is_room(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "journal.sqlite")
+    pages = journal._db.execute("PRAGMA page_count").fetchone()[0]
+    journal._db.execute(f"PRAGMA max_page_count = {pages}")
+
+    def fill() -> None:
+        while True:
+            job = journal.take(TriggerStamp("serial"))
+            journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"x": "y" * 500})
+
+    with pytest.raises(JournalFull, match="disk is full"):
+        fill()
+    journal._db.execute("PRAGMA max_page_count = 1000000")
+    before = journal.last_taken()
+    assert journal.take(TriggerStamp("serial")).job_id == (before.job_id if before else 0) + 1
+    journal.close()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
+import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
@@ -232,3 +234,69 @@ async def test_without_handshake_the_controllers_block_is_not_read() -> None:
         await until(lambda: controller.count("write_service") >= 2)
         assert link.fault() is None
         assert link.stamp() == type(link.stamp())(0, 0)
+
+
+async def test_a_controller_that_connects_and_refuses_is_tried_ever_less_often_and_told_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO)
+    controller = ScriptedController()
+    controller.faults["write_service"] = ["exception"] * 1000
+    async with linked(controller) as link:
+        told = set()
+        for _ in range(100):
+            await asyncio.sleep(0.01)
+            told.add(link.fault())
+    assert controller.connects <= 5, "a connection alone is no success: the pauses must grow"
+    assert told <= {"not connected yet", "write_service: exception 4"}, "one reason, not two by turns"
+    assert [record.levelname for record in caplog.records] == ["WARNING"]
+
+
+async def test_a_block_that_never_holds_still_is_told_once_and_as_what_it_is(caplog: pytest.LogCaptureFixture) -> None:
+    controller = ScriptedController()
+    numbers = itertools.count()
+
+    async def never_the_same() -> LinkBlock:
+        return replace(controller.link, recipe=next(numbers))
+
+    controller.read_link = never_the_same  # type: ignore[method-assign]
+    async with linked(controller) as link:
+        await until(lambda: next(numbers) > 200)
+        assert "expected two alike" in (link.fault() or "")
+        assert controller.count("write_service") > 0, "our own heartbeat goes on"
+    assert len(caplog.records) == 1
+
+
+async def test_a_heartbeat_is_called_silent_only_after_the_time_it_has(caplog: pytest.LogCaptureFixture) -> None:
+    controller = ScriptedController()
+    controller.beating = False
+    async with linked(controller, LinkSettings(poll_period_s=0.01, heartbeat_timeout_s=3.0)) as link:
+        await until(lambda: link.view is not None and link.fault() != "not connected yet")
+        assert link.fault() == "the controller's heartbeat has not changed yet"
+
+
+async def test_a_clock_that_shows_0_is_no_missing_clock_before_it_had_time_to_run() -> None:
+    blocks = [LinkBlock(session=9, clock=clock) for clock in (0, 0, 0, 40)]
+    link = link_over(*blocks, times=[0.0, 0.3, 0.6, 0.64])
+    await link.look()
+    assert link.stamp() is None, "without a limit a late contour would be taken"
+    assert link._clock_fault() == "the controller's clock shows 0: whether it runs is not known yet"
+    await link.look()
+    assert link.stamp() is None
+    await link.look()
+    assert link.stamp().clock_ms == 40
+
+
+async def test_a_running_clock_that_wraps_to_0_is_not_taken_for_a_missing_one() -> None:
+    link = link_over(*(LinkBlock(session=9, clock=clock) for clock in (0xFFFFFFFF, 0)), times=[0.0, 0.001])
+    await link.look()
+    assert link.stamp().clock_ms == 0xFFFFFFFF
+
+
+async def test_a_controller_known_to_have_no_clock_is_known_after_a_reconnection_too() -> None:
+    link = link_over(*(LinkBlock(session=9) for _ in range(3)), times=[0.0, 60.0, 61.0])
+    await link.look()
+    link._forget()
+    link._previous = LinkBlock(session=9)
+    await link.look()
+    assert link.stamp().clock_ms == 0

@@ -130,7 +130,7 @@ class ClientWatch:
             self._verdict.note("transfer-not-new", f"transfer {transfer}, ack_transfer {acknowledged}")
         self._last_transfer, self._last_content = transfer, copy.content
         split = sorted(cut for cut in self._cuts if not _may_be_cut(cut, copy))
-        if split:
+        if split and copy.job_id:  # job 0: the program has restarted and cleared the page in between
             self._verdict.note("value-split", f"requests begin or end at offsets {split} of job {copy.job_id}")
 
     # --- pages --------------------------------------------------------------------------------------------------
@@ -152,7 +152,8 @@ class ClientWatch:
         before = self._pages.setdefault(copy.page, copy.content)
         if before != copy.content:
             self._verdict.note("content-changed", f"job {copy.job_id} page {copy.page}")
-        if copy.trigger and (service_block[3], service_block[10]) != (copy.trigger, session):
+        own = copy.session == session  # a page of an earlier session is answered 8, whatever it says of triggers
+        if own and copy.trigger and (service_block[3], service_block[10]) != (copy.trigger, session):
             self._verdict.note(
                 "contour-before-acknowledgement",
                 f"job {copy.job_id} for trigger {copy.trigger} of session {session}, "

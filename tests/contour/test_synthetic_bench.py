@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks import report
+from benchmarks import accuracy_page, pictures, report
 from benchmarks.bench import main
+from benchmarks.goals import goals
 from benchmarks.metrics import Agreement
 from benchmarks.photographs import photographs, run_photograph
 from benchmarks.rivals import RIVALS, Hints, RivalFailed
@@ -89,3 +90,44 @@ def test_a_hausdorff_distance_above_one_pitch_is_counted():
     text = report.random_summary([far, near], {"random-1"})
     assert "2 scenes: 0 without a contour, 1 with a Hausdorff distance above one pitch." in text
     assert "random-1 (dim)" in text
+
+
+def test_the_accuracy_page_is_written_with_its_pictures_by_one_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(pictures, "FOLDER", tmp_path / "pictures")
+    monkeypatch.setattr(accuracy_page, "PAGE", tmp_path / "accuracy.md")
+    method = "closing + findContours"
+    options = ["--method", method, "--detail", method, "--scenes", "fine-8px", "--write", "--no-photographs"]
+    assert main([*options, "--random", "1"]) == 0
+    page = (tmp_path / "accuracy.md").read_text(encoding="utf-8")
+    named = [line.split("(")[1].rstrip(")") for line in page.splitlines() if line.startswith("![")]
+    assert named == ["pictures/scenes-1.jpg", "pictures/scenes-close.png"]
+    assert all((tmp_path / name).stat().st_size > 1000 for name in named)
+    assert "| fine-8px |" in page
+    assert "1 scenes: 0 without a contour" in page
+    assert capsys.readouterr().out.count("| fine-8px |") == 1
+
+
+def trial_of(scene, mean, hausdorff=1.0, sent=4, bias=0.0):
+    found = Agreement(mean, 2 * mean, hausdorff, bias, 0.99, 4)
+    return Trial(scene, "wall-tips", 20.0, found, sent)
+
+
+def test_goals_are_met_or_not_by_the_measured_scenes_only():
+    scenes = [
+        BenchScene(dataclasses.replace(easy("x", rectangle((120.0, 90.0), 150.0, 110.0)), name=name), tuned, dim)
+        for name, tuned, dim in (("tilted", False, False), ("dim", False, True), ("tuned-a", True, False))
+    ]
+    good = goals(
+        "wall-tips", scenes, [trial_of("tilted", 0.2), trial_of("dim", 1.2), trial_of("tuned-a", 9.0, 90.0)], [], [], []
+    )
+    assert not [goal.what for goal in good if not goal.met and "median" not in goal.what]
+    bad = goals("wall-tips", scenes, [trial_of("tilted", 0.9, 11.0, 7, 0.3), trial_of("dim", 1.7)], [], [], [])
+    missed = [goal.what for goal in bad if not goal.met]
+    assert [name for name in missed if "worst" in name] == [
+        "mean error, worst scene",
+        "mean error, worst dim scene",
+        "Hausdorff, worst scene",
+        "vertices of a rectangular block at 0.1 mm through a lens, worst",
+    ]
+    lost = Trial("tilted", "wall-tips", 20.0, failure="No block found.")
+    assert any("refused" in goal.what and not goal.met for goal in goals("wall-tips", scenes, [lost], [], [], [lost]))

@@ -1,8 +1,8 @@
 """How far a traced contour lies from the true one: distances along both outlines, signed bias, overlap.
 
-Samples run along all rings, exterior and holes, at equal spacing, so every stretch of outline counts by its length. Each
-distance is taken both ways (found to true, true to found) and the worse way is told: a contour that leaves out a hole is
-near the truth wherever it is, but the truth is not near it.
+Samples run along all rings, exterior and holes, at equal spacing, so every stretch of outline counts by its length.
+Each distance is taken both ways (found to true, true to found) and the worse way is told: a contour that leaves out a
+hole is near the truth wherever it is, but the truth is not near it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SPACING_PX = 0.5
 
 @dataclass(frozen=True)
 class Agreement:
-    """Distances in pixels between a found and a true contour. `bias_px` is positive where the found one lies outside."""
+    """Distances in pixels between a found and a true contour; `bias_px` > 0: the found one lies outside."""
 
     mean_px: float
     p95_px: float
@@ -46,13 +46,13 @@ def agreement(
     found_area, true_area = region(dense), region(truth)
     outside = np.where(shapely.contains_xy(true_area, ours[:, 0], ours[:, 1]), -1.0, 1.0)
     covered = np.where(shapely.contains_xy(found_area, theirs[:, 0], theirs[:, 1]), 1.0, -1.0)
-    union = found_area.union(true_area).area
+    union = shapely.area(shapely.union(found_area, true_area))
     return Agreement(
         mean_px=max(float(to_truth.mean()), float(to_found.mean())),
         p95_px=max(float(np.percentile(to_truth, 95)), float(np.percentile(to_found, 95))),
         hausdorff_px=max(float(to_truth.max()), float(to_found.max())),
         bias_px=0.5 * (float((to_truth * outside).mean()) + float((to_found * covered).mean())),
-        iou=found_area.intersection(true_area).area / union if union > 0.0 else 0.0,
+        iou=float(shapely.area(shapely.intersection(found_area, true_area)) / union) if union > 0.0 else 0.0,
         vertices=found.point_count,
     )
 
@@ -73,7 +73,8 @@ def _along(ring: Ring, spacing: float) -> NDArray[np.float64]:
 def distances(points: NDArray[np.float64], contour: Contour) -> NDArray[np.float64]:
     """Distance of each point to the nearest place on any ring, shape (N,)."""
     ends = [np.stack((ring, np.roll(ring, -1, axis=0)), axis=1) for ring in contour.rings]
-    tree = shapely.STRtree(shapely.linestrings(np.concatenate(ends)))
+    edges = np.asarray(shapely.linestrings(np.concatenate(ends)), dtype=object)
+    tree = shapely.STRtree(edges)
     pairs, found = tree.query_nearest(shapely.points(points), return_distance=True, all_matches=False)
     result = np.empty(len(points))
     result[pairs[0]] = found

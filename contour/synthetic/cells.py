@@ -46,6 +46,8 @@ class CellGeometry:
     """Smooth displacement of the lattice, in pitches."""
     warp_length: float = 8.0
     """Wave length of the warp, in pitches."""
+    wobble: float = 0.0
+    """Displacement from cell to cell, in pitches: foils that were not expanded evenly."""
     broken: float = 0.0
     """Share of walls broken or missing."""
     missing_cells_mm: tuple[tuple[float, float], ...] = ()
@@ -120,18 +122,32 @@ def lattice_coordinates(
     x, y = x_mm - geometry.offset_mm[0], y_mm - geometry.offset_mm[1]
     along = x * math.cos(turn) + y * math.sin(turn)
     across = -x * math.sin(turn) + y * math.cos(turn)
-    if geometry.warp <= 0.0:
-        return along, across
-    rng = np.random.default_rng([seed, 11])
-    moved = [along.copy(), across.copy()]
-    for octave in range(6):
-        length = geometry.pitch_mm * geometry.warp_length * rng.uniform(0.6, 2.5)
-        size = geometry.warp * geometry.pitch_mm * 0.5 * (1.0 if octave < 4 else 0.4)
-        for axis in range(2):
-            angle, phase = rng.uniform(0.0, 2.0 * math.pi, 2)
-            wave = (along * math.cos(angle) + across * math.sin(angle)) * (2.0 * math.pi / length) + phase
-            moved[axis] += size * np.sin(wave)
-    return moved[0], moved[1]
+    moved = (along.copy(), across.copy())
+    if geometry.warp > 0.0:
+        rng = np.random.default_rng([seed, 11])
+        for octave in range(6):
+            length = geometry.pitch_mm * geometry.warp_length * rng.uniform(0.6, 2.5)
+            _add_waves(rng, moved, (along, across), length, geometry.pitch_mm * geometry.warp * (0.5, 0.2)[octave >= 4])
+    if geometry.wobble > 0.0:
+        rng = np.random.default_rng([seed, 13])
+        for _ in range(8):
+            length = geometry.pitch_mm * rng.uniform(1.9, 3.6)
+            _add_waves(rng, moved, (along, across), length, geometry.pitch_mm * geometry.wobble * 0.5)
+    return moved
+
+
+def _add_waves(
+    rng: np.random.Generator,
+    moved: tuple[NDArray[np.float64], NDArray[np.float64]],
+    place: tuple[NDArray[np.float64], NDArray[np.float64]],
+    length: float,
+    size: float,
+) -> None:
+    """Displace both coordinates in place by a wave of random direction and phase each."""
+    for axis in range(2):
+        angle, phase = rng.uniform(0.0, 2.0 * math.pi, 2)
+        wave = (place[0] * math.cos(angle) + place[1] * math.sin(angle)) * (2.0 * math.pi / length) + phase
+        moved[axis][...] += size * np.sin(wave)
 
 
 def draw_lattice(

@@ -20,8 +20,8 @@ _SIDES = ((1, 0), (0, 1), (-1, 1), (-1, 0), (0, -1), (1, -1))
 def closed_border(geometry: CellGeometry, outline: Contour, seed: int) -> Contour:
     """The outer faces of the walls around all cells whose centres lie inside `outline`, work millimetres.
 
-    `seed` is the scene's: the smooth warp bends the border as it bends the cells. Raises ParameterError for other cells
-    than a honeycomb, and where no cell fits.
+    `seed` is the scene's: the warp bends the border as it bends the cells (leave a wobble 0, it is drawn coarsely).
+    Raises ParameterError for other cells than a honeycomb, and where no cell fits.
     """
     if geometry.kind != "honeycomb":
         raise ParameterError(f"cells {geometry.kind!r}: expected 'honeycomb', whose cells have a closed form")

@@ -61,7 +61,8 @@ def _fill(scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], in
     """Turn `inside` (share inside the outline) into the share of material, and write its light beside it, by bands."""
     camera, ss, cells = scene.camera, scene.sensor.supersample, scene.cells
     scale = camera.mm_per_px(_middle(outline), scene.thickness_mm) / ss
-    step = int(np.clip(cells.pitch_mm / scale / 2.0, 4, 32))
+    finest = 8.0 if cells.wobble > 0.0 else 2.0
+    step = int(np.clip(cells.pitch_mm / scale / finest, 4, 32))
     height, width = inside.shape
     rows, columns = math.ceil(height / step), math.ceil(width / step)
     u = (np.arange(-1, columns + 1) + 0.5) * step - 0.5

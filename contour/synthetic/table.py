@@ -39,8 +39,16 @@ def table_glare(scene: Scene) -> Floats:
     x = (np.arange(camera.width) / camera.width - light.glare_at[0]).astype(np.float32)
     y = ((np.arange(camera.height) - light.glare_at[1] * camera.height) / camera.width).astype(np.float32)
     spot = np.float32(light.glare) * np.exp(-(x[None, :] ** 2 + 1.8 * y[:, None] ** 2) / np.float32(0.03))
+    return np.asarray(spot * (1.0 - _under_block(scene)), dtype=np.float32)
+
+
+def _under_block(scene: Scene) -> Floats:
+    """How far each pixel's place on the table lies under the block, 0…1: open cells at the cut let light in."""
+    camera = scene.camera
     foot = camera.project_contour(scene.outline, 0.0)
-    return np.asarray(spot * (1.0 - area_coverage(foot.rings, camera.width, camera.height)), dtype=np.float32)
+    x, y = scene.outline.exterior[0].tolist()
+    inside = area_coverage(foot.rings, camera.width, camera.height)
+    return blurred(inside, 0.45 * scene.cells.pitch_mm / camera.mm_per_px((x, y), 0.0))
 
 
 def smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], size: float) -> Floats:
@@ -102,19 +110,16 @@ def cell_floor(scene: Scene) -> float:
 def _shade(scene: Scene, picture: Floats) -> None:
     """Shadow beside the block, and the darkness at the bottom of its cells."""
     camera = scene.camera
-    foot = camera.project_contour(scene.outline, 0.0)
-    scale = camera.mm_per_px((float(scene.outline.exterior[0, 0]), float(scene.outline.exterior[0, 1])), 0.0)
-    inside = area_coverage(foot.rings, camera.width, camera.height)
+    under = _under_block(scene)
     if scene.light.shadow > 0.0 and scene.thickness_mm > 0.0:
         angle = math.radians(scene.light.direction_deg)
         away = (-0.45 * scene.thickness_mm * math.cos(angle), -0.45 * scene.thickness_mm * math.sin(angle))
         cast = camera.project_contour(moved(scene.outline, away), 0.0)
         dark = area_coverage(cast.rings, camera.width, camera.height)
-        soft = 0.3 * scene.thickness_mm / scale
-        dark = np.maximum(blurred(dark, soft), inside)
-        picture *= 1.0 - np.float32(scene.light.shadow) * dark
-    # open cells at the cut let light in, so the darkness sets in gradually
-    picture *= 1.0 - np.float32(1.0 - cell_floor(scene)) * blurred(inside, 0.45 * scene.cells.pitch_mm / scale)
+        x, y = scene.outline.exterior[0].tolist()
+        soft = 0.3 * scene.thickness_mm / camera.mm_per_px((x, y), 0.0)
+        picture *= 1.0 - np.float32(scene.light.shadow) * np.maximum(blurred(dark, soft), under)
+    picture *= 1.0 - np.float32(1.0 - cell_floor(scene)) * under
 
 
 def blurred(raster: Floats, sigma: float) -> Floats:

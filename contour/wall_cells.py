@@ -21,6 +21,8 @@ _GUESSES = (24.0, 70.0, 8.0)
 _GOOD_SCORE = 0.2
 _LEAST_SCORE = 0.1
 _LEAST_CELLS = 6
+# Two readings of one pitch differ by less than this share of it.
+_SAME_PITCH = 0.1
 # A sheet with holes far apart is a table, not a plate of cells.
 _WIDEST_WALL = 0.65
 
@@ -118,7 +120,12 @@ def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> C
         # Good enough in one sense and guess, while the other sense was heard too.
         if best is not None and best.score > _GOOD_SCORE:
             break
-    return None if best is None else cells_of(part, best.pitch, bright=best.bright) or best
+    if best is None:
+        return None
+    again = cells_of(part, best.pitch, bright=best.bright)
+    # Faint fine cells are seen better through a wide window.
+    same = again is None or abs(again.pitch - best.pitch) < _SAME_PITCH * best.pitch
+    return best if again is None or (same and again.score < best.score) else again
 
 
 def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:

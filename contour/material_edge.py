@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 from contour.errors import NoBlockFound
 from contour.geometry import Contour, Ring
 from contour.pixel_sampling import sample_at
+from contour.table_surface import OUTLIER, table_surface
 
 Gray = NDArray[np.uint8]
 Points = NDArray[np.float64]
 
 _GRID_PX = 4
-_BORDER_SHARE = 0.015
-_ROUNDS = 6
-_OUTLIER = 4.0
 # Chips and dust are small against a block; a block smaller than this share of the picture is a chip to this method.
 _LEAST_SHARE = 0.004
 _REACH_PX = 1.5
@@ -59,7 +57,7 @@ def _difference(picture: NDArray[np.uint8]) -> tuple[Gray, float]:
     gray = channels[:, :, channels.shape[2] // 2]
     rough = cv2.absdiff(gray, cv2.blur(gray, (5, 5)))
     texture = np.asarray(cv2.resize(rough, grid, interpolation=cv2.INTER_AREA), np.uint8)
-    surface, spread = _table(small, texture)
+    surface, spread = table_surface(small, texture)
     table = np.clip(np.rint(surface), 0, 255).astype(np.uint8)
     full = cv2.resize(table, (width, height), interpolation=cv2.INTER_LINEAR).reshape(channels.shape)
     apart = cv2.absdiff(channels, full).reshape(height, width, -1)
@@ -67,40 +65,10 @@ def _difference(picture: NDArray[np.uint8]) -> tuple[Gray, float]:
     return np.asarray(cv2.GaussianBlur(largest, (3, 3), 0), np.uint8), spread
 
 
-def _table(small: NDArray[np.float64], texture: Gray) -> tuple[NDArray[np.float64], float]:
-    """The table's light under the block too, shape of `small` (h, w, channels), and its spread: a surface of second
-    order.
-
-    First through the picture's border, then through all that lies near it and is as smooth as most of the border, so
-    that vignetting is followed inwards while a board whose mean colour is the table's stays out.
-    """
-    height, width, _ = small.shape
-    y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
-    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2).reshape(-1, 6)
-    values = small.reshape(len(terms), -1)
-    rim = np.maximum(np.abs(x), np.abs(y)).ravel() > 1 - 2 * _BORDER_SHARE
-    smooth = texture.ravel() <= 2 * max(1.0, float(np.median(texture.ravel()[rim])))
-    rim &= smooth
-    used = rim
-    fitted = np.broadcast_to(np.median(values[rim], axis=0), values.shape)
-    spread = 1.0
-    for _ in range(_ROUNDS):
-        off = np.abs(values - fitted).max(axis=1)
-        spread = max(1.4826 * float(np.median(off[used])), 1.0)
-        # Weights that fall with the distance: a block that touches the border must not bend the table.
-        root = np.sqrt(used / (1 + (off / spread) ** 4))[:, None]
-        factors, *_ = np.linalg.lstsq(terms * root, values * root, rcond=None)
-        fitted = terms @ factors
-        off = np.abs(values - fitted).max(axis=1)
-        near = smooth & (off < _OUTLIER * spread)
-        used = near if np.count_nonzero(near) > 0.3 * np.count_nonzero(rim) else rim
-    return fitted.reshape(small.shape), spread
-
-
 def _level(difference: Gray, spread: float) -> float:
     """The level that parts material from table best (Otsu). Raises NoBlockFound where nothing stands out."""
     split, _ = cv2.threshold(difference[::2, ::2].copy(), 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-    if split < _OUTLIER * spread:
+    if split < OUTLIER * spread:
         raise NoBlockFound(
             f"no block found: nothing stands out from the table by more than {split:.0f} grey levels, of which its own "
             f"texture makes {spread:.0f}. Check the light and that a block lies in view"

@@ -19,6 +19,9 @@ Points = NDArray[np.float64]
 _SAMPLES_PER_PITCH = 6.5
 # A disc of 0.72 pitch bridges an open cell (1.15 pitches across its corners) and a wall broken out of it.
 _CLOSING_PITCHES = 0.72
+# A gap in a ring of single cells around an opening, up to a cell wide, is a missing wall and no way out.
+_LINK_PITCHES = 1.0
+_FRAGMENT_PITCHES = 2.0
 # An inner opening in which a disc of this radius fits is a hole, not a missing cell.
 _HOLE_RADIUS_PITCHES = 1.1
 _WALL_COVERAGE = 0.12
@@ -121,7 +124,8 @@ def coarse_block(mask: Gray, light: Gray, pitch: float, wall: float) -> CoarseBl
     walls = _padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch / step
     kept = _main_piece(walls, samples)
-    filled = _largest(_close(kept, _CLOSING_PITCHES * samples))
+    filled, kept = _linked(walls, kept, _close(kept, _CLOSING_PITCHES * samples), samples)
+    filled = _largest(filled | kept)
     shade = _padded(_averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
     filled = _fill_missing_cells(filled, kept, shade, _HOLE_RADIUS_PITCHES * samples)
     if len(_sides(filled, samples)) == 4:
@@ -173,6 +177,38 @@ def _close(walls: Gray, radius: float) -> Gray:
     grown = (cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5) <= radius).astype(np.uint8)
     shrunk = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > radius).astype(np.uint8)
     return np.asarray(shrunk[pad:-pad, pad:-pad] | walls, np.uint8)
+
+
+def _linked(walls: Gray, kept: Gray, filled: Gray, samples: float) -> tuple[Gray, Gray]:
+    """The filled block and its walls with a thin line across every gap of less than a cell that leads into an opening.
+
+    Closing joins what lies side by side, but not the ends of a strand of walls between an opening and the table. Grown
+    walls part such openings from the table; where their two sides meet again, the line runs. Loose walls of the strand
+    are walls of the block then.
+    """
+    reach = 0.5 * _LINK_PITCHES * samples
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    small = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) < _FRAGMENT_PITCHES * samples
+    small[0] = False
+    strand = kept | small[labels].astype(np.uint8)
+    away = cv2.distanceTransform(1 - strand, cv2.DIST_L2, 5)
+    count, parts = cv2.connectedComponents((away > reach).astype(np.uint8), connectivity=4)
+    room = np.zeros(count, np.float64)
+    np.maximum.at(room, parts.ravel(), away.ravel())
+    # Cells are such parts too; only wide ones can be holes.
+    wide = room > _HOLE_RADIUS_PITCHES * samples
+    wide[0] = False
+    if np.count_nonzero(wide) < 2:
+        return filled, kept
+    seeds = np.where(wide, np.arange(count), 0)[parts]
+    _, nearest = cv2.distanceTransformWithLabels(
+        (seeds == 0).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP
+    )
+    low = cv2.erode(nearest.astype(np.float32), np.ones((3, 3), np.uint8))
+    line = ((low < nearest) & (away <= reach + 1)).astype(np.uint8)
+    across = np.unique(labels[(line > 0) & (cv2.dilate(filled, np.ones((3, 3), np.uint8)) == 0)])
+    joined = np.isin(np.arange(len(small)), across) & small
+    return filled | line, kept | joined[labels].astype(np.uint8)
 
 
 def _sides(filled: Gray, samples: float) -> list[int]:

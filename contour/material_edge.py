@@ -14,32 +14,37 @@ from numpy.typing import NDArray
 from contour.errors import NoBlockFound
 from contour.geometry import Contour, Ring
 from contour.pixel_sampling import sample_at
+from contour.table_surface import OUTLIER, table_surface
 
 Gray = NDArray[np.uint8]
 Points = NDArray[np.float64]
 
 _GRID_PX = 4
-_BORDER_SHARE = 0.015
-_ROUNDS = 6
-_OUTLIER = 4.0
 # Chips and dust are small against a block; a block smaller than this share of the picture is a chip to this method.
 _LEAST_SHARE = 0.004
-_REACH_PX = 1.5
+# How far behind the boundary, and before it, its own half level is looked for.
+_REACH_PX = 3.0
+_OUT_PX = 2.0
+# Gaps of a faint wall, in pitches, that do not open a cell.
+_GAP_PITCHES = 0.3
+_WALL_PITCHES = 0.62
+_CELL_AREA = 1.5
 _SIMPLE_PX = 0.25
 
 
-def material_edge(picture: NDArray[np.uint8], pitch: float) -> Contour:
-    """Boundary of the largest region that differs from the table, with holes wider than 1.1 pitches, in pixels.
+def material_edge(picture: NDArray[np.uint8], pitch: float, walls: Gray) -> Contour:
+    """Boundary of the largest region that differs from the table, with holes wider than 2.2 pitches, in pixels.
 
-    Exterior with negative shoelace, holes positive. The table is a smooth surface in every channel, learnt from the
+    `walls` (H, W), 255 where the picture shows cell walls, adds those that differ less than most. Exterior with negative shoelace, holes positive. The table is a smooth surface in every channel, learnt from the
     picture's border inwards. Raises NoBlockFound.
     """
     difference, noise = _difference(picture)
     level = _level(difference, noise)
-    region = _region(difference > level, pitch)
+    faint = cv2.bitwise_and(walls, cv2.compare(difference, OUTLIER * noise, cv2.CMP_GT))
+    region = _region((difference > level) | (faint > 0), pitch)
     chains, hierarchy = cv2.findContours(region, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     rings = [
-        (_sub_pixel(difference, chain[:, 0, :].astype(np.float64), level), bool(node[3] >= 0))
+        (_sub_pixel(difference, chain[:, 0, :].astype(np.float64)), bool(node[3] >= 0))
         for chain, node in zip(chains, hierarchy[0], strict=True)
         if len(chain) >= 8
     ]
@@ -59,7 +64,7 @@ def _difference(picture: NDArray[np.uint8]) -> tuple[Gray, float]:
     gray = channels[:, :, channels.shape[2] // 2]
     rough = cv2.absdiff(gray, cv2.blur(gray, (5, 5)))
     texture = np.asarray(cv2.resize(rough, grid, interpolation=cv2.INTER_AREA), np.uint8)
-    surface, spread = _table(small, texture)
+    surface, spread = table_surface(small, texture)
     table = np.clip(np.rint(surface), 0, 255).astype(np.uint8)
     full = cv2.resize(table, (width, height), interpolation=cv2.INTER_LINEAR).reshape(channels.shape)
     apart = cv2.absdiff(channels, full).reshape(height, width, -1)
@@ -67,40 +72,10 @@ def _difference(picture: NDArray[np.uint8]) -> tuple[Gray, float]:
     return np.asarray(cv2.GaussianBlur(largest, (3, 3), 0), np.uint8), spread
 
 
-def _table(small: NDArray[np.float64], texture: Gray) -> tuple[NDArray[np.float64], float]:
-    """The table's light under the block too, shape of `small` (h, w, channels), and its spread: a surface of second
-    order.
-
-    First through the picture's border, then through all that lies near it and is as smooth as most of the border, so
-    that vignetting is followed inwards while a board whose mean colour is the table's stays out.
-    """
-    height, width, _ = small.shape
-    y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
-    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2).reshape(-1, 6)
-    values = small.reshape(len(terms), -1)
-    rim = np.maximum(np.abs(x), np.abs(y)).ravel() > 1 - 2 * _BORDER_SHARE
-    smooth = texture.ravel() <= 2 * max(1.0, float(np.median(texture.ravel()[rim])))
-    rim &= smooth
-    used = rim
-    fitted = np.broadcast_to(np.median(values[rim], axis=0), values.shape)
-    spread = 1.0
-    for _ in range(_ROUNDS):
-        off = np.abs(values - fitted).max(axis=1)
-        spread = max(1.4826 * float(np.median(off[used])), 1.0)
-        # Weights that fall with the distance: a block that touches the border must not bend the table.
-        root = np.sqrt(used / (1 + (off / spread) ** 4))[:, None]
-        factors, *_ = np.linalg.lstsq(terms * root, values * root, rcond=None)
-        fitted = terms @ factors
-        off = np.abs(values - fitted).max(axis=1)
-        near = smooth & (off < _OUTLIER * spread)
-        used = near if np.count_nonzero(near) > 0.3 * np.count_nonzero(rim) else rim
-    return fitted.reshape(small.shape), spread
-
-
 def _level(difference: Gray, spread: float) -> float:
     """The level that parts material from table best (Otsu). Raises NoBlockFound where nothing stands out."""
     split, _ = cv2.threshold(difference[::2, ::2].copy(), 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-    if split < _OUTLIER * spread:
+    if split < OUTLIER * spread:
         raise NoBlockFound(
             f"no block found: nothing stands out from the table by more than {split:.0f} grey levels, of which its own "
             f"texture makes {spread:.0f}. Check the light and that a block lies in view"
@@ -110,7 +85,9 @@ def _level(difference: Gray, spread: float) -> float:
 
 def _region(apart: NDArray[np.bool_], pitch: float) -> Gray:
     """The largest piece with its cells filled; inner openings in which a disc of 1.1 pitches' radius fits stay open."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(apart.astype(np.uint8), connectivity=8)
+    material = apart.astype(np.uint8)
+    material = _closed(material, _GAP_PITCHES * pitch) | _leaking_cells(material, pitch)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(material, connectivity=8)
     area = (stats[:, cv2.CC_STAT_WIDTH] * stats[:, cv2.CC_STAT_HEIGHT]).astype(np.float64)
     area[0] = 0
     if area.max() < _LEAST_SHARE * apart.size:
@@ -128,21 +105,40 @@ def _region(apart: NDArray[np.bool_], pitch: float) -> Gray:
     return np.asarray(1 - open_.astype(np.uint8)[inner][1:-1, 1:-1], np.uint8)
 
 
-def _sub_pixel(difference: Gray, chain: Points, level: float) -> Ring:
-    """The chain moved onto the level between pixels, simplified to a quarter of a pixel."""
+def _closed(material: Gray, gap: float) -> Gray:
+    size = 2 * int(gap / 2) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    wide = cv2.copyMakeBorder(material, size, size, size, size, cv2.BORDER_CONSTANT, value=0)
+    return np.asarray(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, disc)[size:-size, size:-size], np.uint8)
+
+
+def _leaking_cells(material: Gray, pitch: float) -> Gray:
+    """Cells that only a broken or faint wall opens to the table: enclosed once gaps as long as a wall are closed."""
+    free = 1 - _closed(material, _WALL_PITCHES * pitch)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(free, connectivity=4)
+    cell = stats[:, cv2.CC_STAT_AREA] < _CELL_AREA * pitch * pitch
+    cell[0] = False
+    return np.asarray(cell[labels], np.uint8)
+
+
+def _sub_pixel(difference: Gray, chain: Points) -> Ring:
+    """The chain moved to half of the material's own difference behind it, simplified to a quarter of a pixel."""
     smooth = _cyclic_mean(chain, 2)
     tangent = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
     # findContours has the free side at (−dy, dx) of its direction.
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-    along = np.arange(-_REACH_PX, _REACH_PX + 0.1, 0.25)
+    along = np.arange(-_REACH_PX, _OUT_PX + 0.1, 0.25)
     places = smooth[:, None, :] + along[None, :, None] * normal[:, None, :]
     values = sample_at(difference, places[:, :, 0], places[:, :, 1])
+    level = 0.5 * (values.max(axis=1, keepdims=True) + values[:, -2:].mean(axis=1, keepdims=True))
     falls = (values[:, :-1] >= level) & (values[:, 1:] < level)
-    index = np.argmin(np.where(falls, np.abs(along[:-1]), np.inf), axis=1)
+    # The outermost one: behind it may lie cells.
+    index = falls.shape[1] - 1 - np.argmax(falls[:, ::-1], axis=1)
     rows = np.arange(len(smooth))
     high, low = values[rows, index], values[rows, index + 1]
-    shift = np.where(falls.any(axis=1), along[index] + 0.25 * (high - level) / np.maximum(high - low, 1e-6), 0.5)
+    part = (high - level[:, 0]) / np.maximum(high - low, 1e-6)
+    shift = np.where(falls.any(axis=1), along[index] + 0.25 * part, 0.5)
     moved = smooth + shift[:, None] * normal
     simple = cv2.approxPolyDP(moved.astype(np.float32)[:, None, :], _SIMPLE_PX, True)[:, 0, :]
     return np.asarray(simple, np.float64)

@@ -21,15 +21,19 @@ _GUESSES = (24.0, 70.0, 8.0)
 _GOOD_SCORE = 0.2
 _LEAST_SCORE = 0.1
 _LEAST_CELLS = 6
+# Two readings of one pitch differ by less than this share of it.
+_SAME_PITCH = 0.1
 # A sheet with holes far apart is a table, not a plate of cells.
 _WIDEST_WALL = 0.65
+# Walls wider than 0.45 pitch count for less and less.
+_WIDE_WALL = 0.2
 
 
 @dataclass(frozen=True)
 class Cells:
     """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
     the part of the tile they fill, the wall contrast in grey levels, the share of the
-    walls that hang together, and the grey level of walls."""
+    walls that hang together, and the grey levels of walls and of cells' floors."""
 
     pitch: float
     wall: float
@@ -40,11 +44,14 @@ class Cells:
     contrast: float
     connected: float
     level: float
+    floor: float
 
     @property
     def score(self) -> float:
-        """Larger for a better comb: many cells, of one size, over most of the tile."""
-        return self.regularity * self.filled * self.connected * min(1.0, self.count / 12)
+        """Larger for a better comb: many cells, of one size, over most of the tile, with walls no wider than they."""
+        # The light gaps of a comb of dark cells look like cells too, but leave less room between them.
+        thin = min(1.0, (_WIDEST_WALL - self.wall / self.pitch) / _WIDE_WALL)
+        return self.regularity * self.filled * self.connected * thin * min(1.0, self.count / 12)
 
 
 def probe(light: Gray, polarity: str) -> Cells:
@@ -118,7 +125,12 @@ def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> C
         # Good enough in one sense and guess, while the other sense was heard too.
         if best is not None and best.score > _GOOD_SCORE:
             break
-    return None if best is None else cells_of(part, best.pitch, bright=best.bright) or best
+    if best is None:
+        return None
+    again = cells_of(part, best.pitch, bright=best.bright)
+    # Faint fine cells are seen better through a wide window.
+    same = again is None or abs(again.pitch - best.pitch) < _SAME_PITCH * best.pitch
+    return best if again is None or (same and again.score < best.score) else again
 
 
 def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
@@ -144,7 +156,8 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     side = max(3, round(0.7 * inner))
     sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
     walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
-    wall = wall_width(walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask)
+    walls = walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
+    wall = wall_width(walls)
     size = inner + wall
     if wall > _WIDEST_WALL * size:
         return None
@@ -163,7 +176,9 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
         float(min(1.0, filled)),
         seen.contrast,
         connected,
-        float(np.median(light[mask > 0][::7])),
+        float(np.median(light[walls > 0][::7])),
+        # The darker part of what is free, for a lighter table may lie in it too (of the lighter part for dark walls).
+        float(np.quantile(light[mask == 0][::7], 0.3 if bright else 0.7)),
     )
 
 

@@ -14,6 +14,7 @@ from contour.tracing import OnStage, Polarity, Rectifier, Trace, TraceSettings
 from contour.wall_cells import probe
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import wall_light
+from contour.wall_mask import wall_mask
 from contour.wall_witnesses import see_block
 
 __all__ = ["see_block", "wall_tips"]
@@ -75,9 +76,11 @@ def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage)
 
 def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
     """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
-    cells = probe(wall_light(picture), settings.polarity)
+    light = wall_light(picture)
+    cells = probe(light, settings.polarity)
+    walls = wall_mask(light, cells.pitch, bright=cells.bright, contrast=cells.contrast).mask
     on_stage("mask")
-    contour = material_edge(picture, cells.pitch)
+    contour = material_edge(picture, cells.pitch, walls)
     on_stage("trace")
     return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch, contour)
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.coarse_block import CoarseBlock, coarse_block
+from contour.table_surface import without_light_table
 from contour.wall_cells import Cells, probe
 from contour.wall_ends import edge_chains, find_ends, outermost
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
@@ -64,7 +65,10 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
         else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     )
     seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
-    if not cells.bright:
+    if cells.bright:
+        mask = without_light_table(seen.mask, small, cells.pitch / scale, cells.level, cells.floor)
+        seen = replace(seen, mask=mask)
+    else:
         seen = _darker_than_table(seen, small, cells)
     on_mask()
     coarse = coarse_block(seen.mask, small, cells.pitch / scale, cells.wall / scale)

@@ -201,10 +201,9 @@ def _linked(walls: Gray, kept: Gray, filled: Gray, samples: float) -> tuple[Gray
     strand = kept | small[labels].astype(np.uint8)
     away = cv2.distanceTransform(1 - strand, cv2.DIST_L2, 5)
     count, parts = cv2.connectedComponents((away > reach).astype(np.uint8), connectivity=4)
-    room = np.zeros(count, np.float64)
-    np.maximum.at(room, parts.ravel(), away.ravel())
     # Cells are such parts too; only wide ones can be holes.
-    wide = room > _HOLE_RADIUS_PITCHES * samples
+    wide = np.zeros(count, np.bool_)
+    wide[parts[away > _HOLE_RADIUS_PITCHES * samples]] = True
     wide[0] = False
     if np.count_nonzero(wide) < 2:
         return filled, kept

@@ -21,8 +21,9 @@ NOISE_FLOOR = 4.0
 _MAP_SAMPLES = 8
 # Foils side by side differ in brightness by a factor of three: a threshold halfway up loses the dimmer ones.
 _RISE = 0.35
-# Walls of fine cells run into each other at that height.
-_FINE_RISE = 0.08
+# Walls of fine cells run into each other at that height: cells to be counted are kept apart, but once they are known,
+# no faint wall may be lost, and blur takes most from thin ones.
+_FINE_RISE = (0.08, -0.05)
 _REGION_RISE = 0.25
 # Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
 _PICTURE_RISE = 0.2
@@ -60,7 +61,7 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     noise = _noise_level(smooth, pitch, unit)
     upper, lower, region = _levels(local, pitch / step)
     # All floors count from the level of cells, which on a bare table is the noise below its mean.
-    share = _RISE + _FINE_RISE * float(np.clip((16 - pitch) / 8, 0, 1))
+    share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch) / 8, 0, 1))
     floor = max(NOISE_FLOOR * noise, _PICTURE_RISE * contrast * unit)
     offset = np.maximum(np.maximum(share * (upper + lower), _REGION_RISE * region), floor) - lower
     threshold = np.clip(mean + offset if bright else mean - offset, 0, 255 * unit).astype(smooth.dtype)

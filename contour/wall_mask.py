@@ -28,7 +28,8 @@ _REGION_RISE = 0.25
 # Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
 _PICTURE_RISE = 0.2
 _BYTE_CONTRAST = 40.0
-_FINE_PITCH = 12.0
+FINE_PITCH = 12.0
+_LEAST_OVER_NOISE = 20.0
 # What a fifth of normal deviates stay below in size, in standard deviations.
 _FIFTH_OF_NORMAL = 0.2533
 
@@ -40,6 +41,11 @@ class WallMask:
     mask: Gray
     noise: float
     contrast: float
+
+    @property
+    def may_be_noise(self) -> bool:
+        """Whether walls stand out so little that a fine comb cannot be told from noise alone, which makes 14."""
+        return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
 def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0) -> WallMask:
@@ -104,7 +110,7 @@ def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
     if tiles.size == 0:
         return 0.3 * unit
     quiet = float(np.quantile(tiles.astype(np.float32).std(axis=(1, 3)), 0.2))
-    if pitch < _FINE_PITCH:
+    if pitch < FINE_PITCH:
         # No tile of fine cells is quiet, but second differences both ways see little of a blurred structure, and keep
         # the noise that the light blur left as it is.
         part = smooth[: 1 << 9, : 1 << 9].astype(np.float32)

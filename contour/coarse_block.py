@@ -22,6 +22,8 @@ _CLOSING_PITCHES = 0.72
 # A gap in a ring of single cells around an opening, up to a cell wide, is a missing wall and no way out.
 _LINK_PITCHES = 1.0
 _FRAGMENT_PITCHES = 2.0
+# Samples of another piece within two of the main one that make both of them one block.
+_CONTACTS = 6
 # An inner opening in which a disc of this radius fits is a hole, not a missing cell.
 _HOLE_RADIUS_PITCHES = 1.1
 _WALL_COVERAGE = 0.12
@@ -166,8 +168,14 @@ def _main_piece(walls: Gray, samples: float) -> Gray:
             "no block found: the walls seen form no piece more than three cells wide. "
             "Check the light and that a block lies in view"
         )
-    kept = large & (area >= area.max()) if area.max() > 0.5 * area[large].sum() else large
-    return np.asarray(kept.astype(np.uint8)[labels], np.uint8)
+    if area.max() <= 0.5 * area[large].sum():
+        return np.asarray(large.astype(np.uint8)[labels], np.uint8)
+    main = labels == int(np.argmax(area))
+    # Another large piece that all but hangs together with it at several walls is a part behind a faint row.
+    beside = labels[cv2.dilate(main.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0]
+    touching = np.bincount(beside, minlength=len(area)) >= _CONTACTS
+    kept = large & touching
+    return np.asarray((main | kept[labels]).astype(np.uint8), np.uint8)
 
 
 def _close(walls: Gray, radius: float) -> Gray:
@@ -193,10 +201,9 @@ def _linked(walls: Gray, kept: Gray, filled: Gray, samples: float) -> tuple[Gray
     strand = kept | small[labels].astype(np.uint8)
     away = cv2.distanceTransform(1 - strand, cv2.DIST_L2, 5)
     count, parts = cv2.connectedComponents((away > reach).astype(np.uint8), connectivity=4)
-    room = np.zeros(count, np.float64)
-    np.maximum.at(room, parts.ravel(), away.ravel())
     # Cells are such parts too; only wide ones can be holes.
-    wide = room > _HOLE_RADIUS_PITCHES * samples
+    wide = np.zeros(count, np.bool_)
+    wide[parts[away > _HOLE_RADIUS_PITCHES * samples]] = True
     wide[0] = False
     if np.count_nonzero(wide) < 2:
         return filled, kept
@@ -251,7 +258,10 @@ def _fill_missing_cells(filled: Gray, walls: Gray, shade: Gray, radius: float) -
         wall = float(np.median(shade[walls > 0]))
         for number in np.flatnonzero(opening):
             inside = float(np.median(shade[labels == number]))
-            opening[number] = abs(inside - table) < abs(inside - wall) or abs(table - wall) < _LEAST_SHADE
+            # Glare on the table in a hole of a bright block is darker than walls and cells together at least.
+            darker = inside < wall and table < wall
+            like_table = abs(inside - table) < abs(inside - wall)
+            opening[number] = darker or like_table or abs(table - wall) < _LEAST_SHADE
     opening[outside] = True
     return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
 

@@ -35,8 +35,9 @@ _SIMPLE_PX = 0.25
 def material_edge(picture: NDArray[np.uint8], pitch: float, walls: Gray) -> Contour:
     """Boundary of the largest region that differs from the table, with holes wider than 2.2 pitches, in pixels.
 
-    `walls` (H, W), 255 where the picture shows cell walls, adds those that differ less than most. Exterior with negative shoelace, holes positive. The table is a smooth surface in every channel, learnt from the
-    picture's border inwards. Raises NoBlockFound.
+    `walls` (H, W), 255 where the picture shows cell walls, adds those that differ less than most. Exterior with
+    negative shoelace, holes positive. The table is a smooth surface in every channel, learnt from the picture's border
+    inwards. Raises NoBlockFound.
     """
     difference, noise = _difference(picture)
     level = _level(difference, noise)

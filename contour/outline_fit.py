@@ -12,9 +12,9 @@ from contour.geometry import Ring
 from contour.outline_chains import Chain, free_curves
 from contour.outline_curves import curve_points, within
 from contour.outline_joints import Flags, Joints, arc_points, thinned, without_reversed
-from contour.outline_labelling import label
+from contour.outline_labelling import FEW, label
 from contour.outline_models import Complex, Real, distance
-from contour.outline_proposals import propose
+from contour.outline_proposals import gather, propose
 from contour.outline_segments import Segments, around, fitted, runs
 from contour.outline_spread import unseen_share, vertex_sigma
 from contour.outline_witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
@@ -23,6 +23,8 @@ from contour.wall_evidence import RingEvidence
 
 _FEWEST = 6
 _ROUNDS = 4
+# Residuals understate the noise where a segment has hardly more witnesses than parameters.
+_LEAST_NOISE = 0.7
 _CHORD_PX = 0.3
 _FLAT_PX = 0.08
 
@@ -86,11 +88,16 @@ def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
     """
     proposals = propose(witnesses)
     segments = runs(label(witnesses, proposals), proposals)
+    least = _LEAST_NOISE
     for round_ in range(_ROUNDS):
         segments = _refitted(witnesses, segments)
         if round_ < 2:
-            witnesses = scaled(witnesses, noise_from_residuals(witnesses, residuals(witnesses, segments)))
+            noise = max(noise_from_residuals(witnesses, residuals(witnesses, segments)), least)
+            witnesses, least = scaled(witnesses, noise), least / noise
         proposals = around(witnesses, segments)
+        if round_ == 1 or len(witnesses) <= FEW:
+            # With the noise known, and free of what the first labelling took for granted.
+            proposals = gather([proposals, propose(witnesses)])
         found = runs(label(witnesses, proposals), proposals)
         settled = round_ >= 1 and len(found) == len(segments) and bool((found.first == segments.first).all())
         segments = found

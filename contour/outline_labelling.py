@@ -15,12 +15,15 @@ from contour.outline_witnesses import Witnesses, cost
 PRICE_LINE = 10.0
 PRICE_ARC = 15.0
 _CORNER = 1.0
-# A missing cell only ever makes a dent: a reflex corner has to be earned.
+# A missing cell only ever makes a dent: a reflex corner has to be earned (around a hole, where all sides of a rectangle
+# meet in reflex corners, a convex one).
 _REFLEX = 5.0
 _REFLEX_PER_RADIAN = 6.0
 _JUMP = 16.0
 _REACH = 1.6
 _STATES = 8
+# A ring of so few witnesses is a small hole: twice the states, and all proposals anew in every round.
+FEW = 64
 _NEARBY = 3
 # Gains above this mark models of the present labelling, which must stay available.
 _PRESENT = 5e3
@@ -44,7 +47,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     signed = distance(models, points)
     unary = cost(witnesses, signed, np.arange(count)[:, None])
     unary = np.where(here >= 0, unary, _FAR)
-    unary = unary + _REFLEX_PER_RADIAN * np.maximum(-models.curvature, 0.0) * witnesses.gap[:, None]
+    unary = unary + _REFLEX_PER_RADIAN * np.maximum(witnesses.rare * models.curvature, 0.0) * witnesses.gap[:, None]
     foot, tangent = feet(models, points)
     facing = (tangent * witnesses.normal.conj()[:, None]).imag
     unary = np.where(facing > -0.2, unary, unary + 20.0)
@@ -73,8 +76,9 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> Index:
     order = np.lexsort((-score, place))
     place, which = place[order], which[order]
     rank = np.arange(len(place)) - np.searchsorted(place, place)
-    fits = rank < _STATES
-    states = np.full((count, _STATES), -1, dtype=np.intp)
+    most = _STATES if count > FEW else 2 * _STATES
+    fits = rank < most
+    states = np.full((count, most), -1, dtype=np.intp)
     states[place[fits], rank[fits]] = which[fits]
     return states[:, : int(rank[fits].max()) + 1]
 
@@ -90,6 +94,7 @@ def _steps(witnesses: Witnesses, proposals: Proposals, here: Index, foot: Comple
         gap=witnesses.gap[:, None, None],
         sigma=np.maximum(witnesses.outer, np.roll(witnesses.outer, -1))[:, None, None],
         pitch=witnesses.pitch,
+        rare=witnesses.rare,
     )
     price = np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
     same = here[:, :, None] == following[:, None, :]
@@ -97,10 +102,20 @@ def _steps(witnesses: Witnesses, proposals: Proposals, here: Index, foot: Comple
 
 
 def joint_cost(
-    foot: Complex, tangent: Complex, next_foot: Complex, next_tangent: Complex, *, gap: Real, sigma: Real, pitch: float
+    foot: Complex,
+    tangent: Complex,
+    next_foot: Complex,
+    next_tangent: Complex,
+    *,
+    gap: Real,
+    sigma: Real,
+    pitch: float,
+    rare: float,
 ) -> Real:
     """Nats of a joint between two models, given their feet and tangents at the last and the next witness (shapes
     broadcast).
+
+    rare: sign of the turns that have to be earned.
 
     A corner: the tangents meet ahead of the one and behind the other, within reach of the evidence. A smooth join:
     small turn, small step aside. Else a jump at a fixed price.
@@ -108,7 +123,7 @@ def joint_cost(
     way = next_foot - foot
     turn = tangent.conj() * next_tangent
     sine = turn.imag
-    reflex = _REFLEX_PER_RADIAN * np.maximum(-np.angle(turn), 0.0)
+    reflex = _REFLEX_PER_RADIAN * np.maximum(rare * np.angle(turn), 0.0)
     safe = np.where(np.abs(sine) > 0.05, sine, 1.0)
     ahead = (way.conj() * next_tangent).imag / safe
     behind = (tangent.conj() * way).imag / safe
@@ -117,7 +132,7 @@ def joint_cost(
         np.maximum(np.maximum(-ahead - slack, ahead - reach), 0.0) ** 2
         + np.maximum(np.maximum(-behind - slack, behind - reach), 0.0) ** 2
     )
-    corner = _CORNER + reflex + _REFLEX * (sine < 0.0) + 8.0 * excess / pitch**2
+    corner = _CORNER + reflex + _REFLEX * (rare * sine > 0.0) + 8.0 * excess / pitch**2
     corner = np.where(np.abs(sine) > 0.05, corner, np.inf)
     middle = tangent + next_tangent
     aside = (middle.conj() * way).imag / np.maximum(np.abs(middle), 1e-6)

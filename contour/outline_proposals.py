@@ -42,6 +42,8 @@ _TRIPLES = np.array(
 _LEAST_RADIUS_CONVEX = 1.25
 _LEAST_RADIUS_CONCAVE = 1.05
 _REDUNDANT = 2.0
+# Rings of fewer witnesses, holes mostly, are looked at from every place.
+_FEW = 48
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,8 @@ def _levels(witnesses: Witnesses, sizes: list[int]) -> list[list[Proposals]]:
 
 
 def _stride(size: int, count: int) -> int:
+    if count < _FEW:
+        return 1 if size < count else count
     return max(1, size // 4 if size != 6 else 2) if size < count else count
 
 

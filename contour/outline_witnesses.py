@@ -15,6 +15,11 @@ _SHARE_INSIDE = 0.20
 _SHARE_OUTSIDE = 0.02
 _LEAST_SIGMA_PX = 0.04
 _DEEPEST = 1.3
+# Corners and outliers are most of a ring of so few witnesses, and pass for noise.
+_FEW = 48
+_NOISIEST, _NOISIEST_OF_FEW = 3.0, 1.5
+# How much dearer an outlier is along a hole: each side has few witnesses, and an arc that passes half of them would do.
+_HOLE = 1.7
 # How much cheaper an outermost point's depth is: the wall behind a zigzag edge lies anywhere within half a pitch.
 _SERRATION = 0.03
 
@@ -25,7 +30,8 @@ class Witnesses:
 
     points and normal (outwards) are complex. inner, outer: standard deviations for points inside and outside of the
     outline. cap_inside, cap_outside: the most a point costs there (nats). clean: a wall end, fit to measure the noise
-    by. gap: distance to the next witness along the coarse ring (cyclic).
+    by. gap: distance to the next witness along the coarse ring (cyclic). rare: -1 where turns to the right are the rare
+    ones (an exterior runs to the left on the whole), 1 for a hole.
     """
 
     points: Complex
@@ -37,6 +43,7 @@ class Witnesses:
     clean: np.ndarray[tuple[int], np.dtype[np.bool_]]
     gap: Real
     pitch: float
+    rare: float
 
     def __len__(self) -> int:
         return len(self.points)
@@ -59,7 +66,9 @@ def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None
     length = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
     gap = np.diff(evidence.position, append=evidence.position[:1] + length)
     inner = np.where(outermost, np.maximum(sigma, _SERRATION * pitch_px), sigma)
-    witnesses = Witnesses(z, outwards, inner, sigma, inner, inner, ~outermost, np.maximum(gap, 0.0), pitch_px)
+    gap = np.maximum(gap, 0.0)
+    rare = 1.0 if evidence.is_hole else -1.0
+    witnesses = Witnesses(z, outwards, inner, sigma, inner, inner, ~outermost, gap, pitch_px, rare)
     return scaled(witnesses, 1.0)
 
 
@@ -72,12 +81,13 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
     inner, outer = witnesses.inner * factor, witnesses.outer * factor
     odds = witnesses.pitch / (np.sqrt(2.0 * np.pi) * np.minimum(inner, outer))
     inside = np.log((1.0 - _SHARE_INSIDE) / _SHARE_INSIDE * odds)
+    dearer = _HOLE if witnesses.rare > 0.0 else 1.0
     outside = np.log((1.0 - _SHARE_OUTSIDE) / _SHARE_OUTSIDE * odds)
     return replace(
         witnesses,
         inner=inner,
         outer=outer,
-        cap_inside=np.where(witnesses.inner > witnesses.outer * 1.01, 4.0, np.clip(inside, 3.0, 5.5)),
+        cap_inside=dearer * np.where(witnesses.inner > witnesses.outer * 1.01, 4.0, np.clip(inside, 3.0, 5.5)),
         cap_outside=np.clip(outside, 5.0, 6.5),
     )
 
@@ -109,7 +119,8 @@ def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(Non
 
 
 def noise_from_neighbours(witnesses: Witnesses) -> float:
-    """Noise over the stated one, from how far each witness lies off the chord of its neighbours; between 0.5 and 3.
+    """Noise over the stated one, from how far each witness lies off the chord of its neighbours; between 0.5 and 3
+    (1.5 for few witnesses).
 
     The lesser of that and of its excess over the neighbours' own (which a bend does not raise). Reads the lower
     quarter of the deviations: a fifth of deep witnesses spoils about half of the triples.
@@ -129,7 +140,8 @@ def noise_from_neighbours(witnesses: Witnesses) -> float:
     # sum.
     excess = (off - 0.5 * (np.roll(off, 1) + np.roll(off, -1))) / (2.09 * witnesses.outer)
     level = min(float(np.quantile(np.abs(simple[sound]), 0.25)), float(np.quantile(np.abs(excess[sound]), 0.25)))
-    return float(np.clip(level / 0.36, 0.5, 3.0))
+    most = _NOISIEST if len(witnesses) > _FEW else _NOISIEST_OF_FEW
+    return float(np.clip(level / 0.36, 0.5, most))
 
 
 def noise_from_residuals(witnesses: Witnesses, signed: Real) -> float:

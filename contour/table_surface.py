@@ -15,7 +15,7 @@ _BORDER_SHARE = 0.015
 _ROUNDS = 6
 _GRID = 64
 # Of the way from cells to walls: a table as light as this lies near the mask's threshold.
-_LIGHT_TABLE = 0.2
+_LIGHT_TABLE = 0.1
 # Area in square pitches: a wall of usual width has an eighth.
 _DIM_WALLS = 0.25
 # Of the way from table to walls.

@@ -18,8 +18,8 @@ _HIGH_PASS_PX = 12
 # Lightness is preferred: it averages three channels' noise and keeps grey table dirt grey. Colour takes over
 # where its best direction carries this many times the local variance that lightness does.
 _COLOUR_GAIN = 4.0
-# Grey differences weigh 0.58 in lightness for their length; less than half of that, and lightness wastes the colour.
-_LUMA_SERVES = 0.25
+# Grey differences weigh 0.58 in lightness for their length; less than two thirds of that, and lightness wastes colour.
+_LUMA_SERVES = 0.4
 _LEAST_COLOUR = 25.0
 _CELLS_NEAR = 12
 

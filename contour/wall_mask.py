@@ -21,13 +21,15 @@ NOISE_FLOOR = 4.0
 _MAP_SAMPLES = 8
 # Foils side by side differ in brightness by a factor of three: a threshold halfway up loses the dimmer ones.
 _RISE = 0.35
-# Walls of fine cells run into each other at that height.
-_FINE_RISE = 0.08
+# Walls of fine cells run into each other at that height: cells to be counted are kept apart, but once they are known,
+# no faint wall may be lost, and blur takes most from thin ones.
+_FINE_RISE = (0.08, -0.05)
 _REGION_RISE = 0.25
 # Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
 _PICTURE_RISE = 0.2
 _BYTE_CONTRAST = 40.0
-_FINE_PITCH = 12.0
+FINE_PITCH = 12.0
+_LEAST_OVER_NOISE = 20.0
 # What a fifth of normal deviates stay below in size, in standard deviations.
 _FIFTH_OF_NORMAL = 0.2533
 
@@ -39,6 +41,11 @@ class WallMask:
     mask: Gray
     noise: float
     contrast: float
+
+    @property
+    def may_be_noise(self) -> bool:
+        """Whether walls stand out so little that a fine comb cannot be told from noise alone, which makes 14."""
+        return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
 def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0) -> WallMask:
@@ -60,7 +67,7 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     noise = _noise_level(smooth, pitch, unit)
     upper, lower, region = _levels(local, pitch / step)
     # All floors count from the level of cells, which on a bare table is the noise below its mean.
-    share = _RISE + _FINE_RISE * float(np.clip((16 - pitch) / 8, 0, 1))
+    share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch) / 8, 0, 1))
     floor = max(NOISE_FLOOR * noise, _PICTURE_RISE * contrast * unit)
     offset = np.maximum(np.maximum(share * (upper + lower), _REGION_RISE * region), floor) - lower
     threshold = np.clip(mean + offset if bright else mean - offset, 0, 255 * unit).astype(smooth.dtype)
@@ -103,7 +110,7 @@ def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
     if tiles.size == 0:
         return 0.3 * unit
     quiet = float(np.quantile(tiles.astype(np.float32).std(axis=(1, 3)), 0.2))
-    if pitch < _FINE_PITCH:
+    if pitch < FINE_PITCH:
         # No tile of fine cells is quiet, but second differences both ways see little of a blurred structure, and keep
         # the noise that the light blur left as it is.
         part = smooth[: 1 << 9, : 1 << 9].astype(np.float32)

@@ -97,9 +97,11 @@ def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None
 
 def _check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float) -> None:
     """Raise NoBlockFound where the ring passes several wall ends in a row far off on one side."""
-    points = evidence.points[evidence.kind != WitnessKind.OUTERMOST]
-    depth = depth_inside(ring, points)
-    for off in (depth > _FAR_OFF_PITCHES * pitch, depth < -_FAR_OFF_PITCHES * pitch):
+    ends = evidence.kind != WitnessKind.OUTERMOST
+    depth = depth_inside(ring, evidence.points)
+    # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
+    inside, outside = depth > _FAR_OFF_PITCHES * pitch, (depth < -_FAR_OFF_PITCHES * pitch)[ends]
+    for off, points in ((inside, evidence.points), (outside, evidence.points[ends])):
         in_a_row = off & np.roll(off, 1) & np.roll(off, 2) & np.roll(off, 3)
         if in_a_row.any():
             x, y = points[np.argmax(in_a_row)]

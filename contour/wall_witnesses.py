@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.coarse_block import CoarseBlock, coarse_block
+from contour.errors import NoBlockFound
 from contour.table_surface import without_light_table
 from contour.wall_cells import Cells, probe
 from contour.wall_ends import edge_chains, find_ends, outermost
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import light_from_table, wall_light
-from contour.wall_mask import WallMask, wall_mask
+from contour.wall_mask import FINE_PITCH, WallMask, wall_mask
 from contour.wall_parallax import Parallax, parallax
 from contour.wall_profile import EndModel, centred_axes, fit_ends, true_width
 
@@ -65,6 +66,11 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
         else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     )
     seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
+    if cells.pitch < FINE_PITCH and seen.may_be_noise:
+        raise NoBlockFound(
+            f"no block found: cells of {cells.pitch:.0f} px with a contrast of {seen.contrast:.0f} grey levels look like "
+            "noise. Check the light, and that a block lies in view"
+        )
     if cells.bright:
         mask = without_light_table(seen.mask, small, cells.pitch / scale, cells.level, cells.floor)
         seen = replace(seen, mask=mask)

@@ -23,9 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Trigger and wait."""
-    from drivers.trigger.serial import SerialLineTrigger
-
     from drivers.trigger import TriggerUnavailable
+    from drivers.trigger.serial import SerialLineTrigger
 
     port = SerialLineTrigger(args.port, args.baudrate)
     try:

@@ -145,6 +145,6 @@ def _shape(polygon: Polygon) -> Finding | None:
         if defect:
             return Finding(
                 Refusal.SELF_INTERSECTING,
-                f"The contour cannot be cut{unit}: {defect}. Check the mask and the method's sizes.",
+                f"The contour cannot be cut{unit}: {defect}. Look at the overlay; check edge, method, light and focus.",
             )
     return None

@@ -94,11 +94,20 @@ class Calibration(Model):
     """Where pixels become millimetres."""
 
     file: FilePath = Field(description="Calibration file.")
-    max_age_days: float = Field(0, ge=0, le=36_500, description="Oldest accepted calibration, days; 0 = no limit.")
+    max_age_days: float = Field(
+        0, ge=0, le=36_500, description="Oldest accepted calibration, days; 0 = no limit, the only value so far."
+    )
+
+    @field_validator("max_age_days")
+    @classmethod
+    def _not_yet(cls, value: float) -> float:
+        if value:
+            raise ValueError(f"is {value:g}, expected 0: the age of a calibration is not checked yet")
+        return value
 
 
 class NoController(Model):
-    """No controller: contours are traced and kept, and go nowhere."""
+    """No controller: contours are traced and go nowhere; the journal keeps a summary of each job."""
 
     kind: Literal["none"]
     ready_timeout_s: Seconds = Field(30, description="Longest wait for the service to be ready, s.")
@@ -228,13 +237,19 @@ class Recipe(Model):
         "flat", description="How walls are told from gaps: flat, otsu, or a fixed grey level 0 to 255."
     )
     edge: Literal["cut", "cells"] = Field("cut", description="cut: cells are cut open at the edge; cells: closed.")
-    pieces: Literal["one", "largest"] = Field("one", description="one: several blocks are refused; largest: it counts.")
+    pieces: Literal["one", "largest"] = Field(
+        "one", description="one: several blocks are refused; largest: it counts. Not applied yet."
+    )
     parameters: dict[str, Number] = Field(
         default_factory=dict, description="Sizes of the method; left out, they follow from the picture."
     )
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.method == "wall-tips" and self.binarize != "flat":
+            raise ValueError(
+                f"binarize is {self.binarize!r}, but wall-tips finds its own threshold; use flat, or another method"
+            )
         if self.min_area_mm2 >= self.max_area_mm2:
             raise ValueError(
                 f"min_area_mm2 is {self.min_area_mm2:g}, expected less than max_area_mm2, {self.max_area_mm2:g}"

@@ -51,6 +51,19 @@ def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
 _Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
 
 
+def _decimal_integer(loader: _Loader, node: yaml.ScalarNode) -> int:
+    """An integer; YAML 1.1 would read 05020 as octal 2576."""
+    digits = node.value.lstrip("+-")
+    if len(digits) > 1 and digits[0] == "0" and digits[1].isdigit():
+        raise yaml.constructor.ConstructorError(
+            None, None, f"{node.value} begins with 0; write {digits.lstrip('0') or '0'}", node.start_mark
+        )
+    return loader.construct_yaml_int(node)
+
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _decimal_integer)
+
+
 def read_yaml(path: Path) -> Any:
     """What a YAML file holds; raise ConfigError that names file, line and column."""
     try:

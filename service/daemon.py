@@ -25,6 +25,7 @@ log = logging.getLogger("combtrace.daemon")
 CAMERA_RETRY_S = 1.0
 JOURNAL_RETRY_S = 1.0
 WATCH_PERIOD_S = 0.1
+TELL_AFTER_S = 1.0
 STOP_BOUND_S = 8.0
 
 
@@ -149,9 +150,14 @@ class Daemon:
     async def _submit_when_ready(self, ready_timeout_s: float) -> Ticket:
         loop = asyncio.get_running_loop()
         give_up_at = loop.time() + ready_timeout_s
+        told_at = loop.time() + TELL_AFTER_S
         while True:
             why_not = self._parts.link.controller_not_ready() if self._parts.link else None
             ready = self._parts.health.state is State.READY and why_not is None
+            if not ready and loop.time() >= told_at:
+                fault = self._parts.health.first()
+                log.warning("waiting up to %g s to be ready: %s", ready_timeout_s, fault.text if fault else why_not)
+                told_at = give_up_at + TELL_AFTER_S
             if ready or loop.time() >= give_up_at:
                 return await self._parts.executor.submit(TriggerStamp("manual"))
             if self._stop.is_set():

@@ -157,7 +157,7 @@ class Executor:
             raise TriggerRefused(fault.reason, fault.text) from error
         self._health.report("journal", None)
         self._told.clear()
-        log.info("job %d taken: trigger %s recipe %d", job.job_id, trigger.kind, trigger.recipe)
+        log.info("job %d taken: trigger %s, recipe %s", job.job_id, trigger.kind, trigger.recipe or "default")
         if self._link is not None:
             self._link.publish(job_id=job.job_id)
         return job
@@ -253,6 +253,9 @@ class Executor:
         assert job.outcome is not None
         done = job.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
         text = "" if job.reason is None else f": {int(job.reason)} {job.reason.label}: {job.detail}"
+        if done and job.report.get("vertices"):
+            area = job.report.get("area_mm2")
+            text = f": {job.report['vertices']} vertices" + (f", {area:.0f} mm²" if area else "")
         log.log(logging.INFO if done else logging.WARNING, "job %d %s%s", job.job_id, job.outcome, text)
         self.settled_job = job.job_id
         if self._link is not None:

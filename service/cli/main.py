@@ -80,7 +80,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = build_parser()
     args = parser.parse_args(argv)
     if args.version:
-        print(_version())
+        from service.cli.run import version
+
+        print(version())
         return 0
     if args.command is None:
         parser.print_help()
@@ -97,12 +99,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone; that is no error of ours
         sys.stderr.close()
         return 141
-
-
-def _version() -> str:
-    from importlib.metadata import version
-
-    return f"combtrace {version('combtrace')}"
 
 
 if __name__ == "__main__":

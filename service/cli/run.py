@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import logging
+import os
 import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,8 @@ from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_REFUSED, UserError
 if TYPE_CHECKING:
     from service.config import Config
     from service.journal import Job
+
+log = logging.getLogger("combtrace.daemon")
 
 HELP = "run the daemon"
 DESCRIPTION = """\
@@ -38,10 +41,25 @@ def run(args: argparse.Namespace) -> int:
     except ConfigError as error:
         raise UserError(str(error)) from error
     start_logging(logging.DEBUG if args.verbose else logging.INFO)
-    return asyncio.run(_run(config, once=args.once))
+    return asyncio.run(_run(config, args.config, once=args.once))
 
 
-async def _run(config: Config, *, once: bool) -> int:
+def version() -> str:
+    """`combtrace` and its version."""
+    import importlib.metadata
+
+    return f"combtrace {importlib.metadata.version('combtrace')}"
+
+
+def summary(config: Config) -> str:
+    """What the daemon will do, in one line, for the log's beginning."""
+    controller = config.controller
+    where = f" {getattr(controller, 'host', '')}:{getattr(controller, 'port', '')}".removesuffix(" :")
+    triggers = ", ".join(trigger.kind for trigger in config.triggers) or "none"
+    return f"camera {config.camera.kind}, controller {controller.kind}{where}, triggers {triggers}"
+
+
+async def _run(config: Config, config_path: Path, *, once: bool) -> int:
     from service.daemon import Daemon
     from service.executor import TriggerRefused
     from service.reasons import Outcome
@@ -51,6 +69,7 @@ async def _run(config: Config, *, once: bool) -> int:
         parts = build(config)
     except WiringError as error:
         raise UserError(str(error)) from error
+    log.info("%s, process %d, %s: %s", version(), os.getpid(), config_path, summary(config))
     daemon = Daemon(parts)
     signals = (signal.SIGTERM, signal.SIGINT)
     if not once:

@@ -92,6 +92,9 @@ class _Setup:
             raise UserError(f"--thickness-mm {args.thickness_mm:g}: expected 0 to 10000")
         work_area = np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
         overlay = args.overlay
+        for image in args.images:
+            if overlay is not None and overlay.exists() and image.exists() and overlay.samefile(image):
+                raise UserError(f"--overlay {overlay}: is the picture being traced. Name another file")
         folder = overlay is not None and (len(args.images) > 1 or overlay.is_dir())
         if folder:
             _make_folder(overlay)

@@ -131,6 +131,9 @@ def test_the_embedded_defaults_need_no_file() -> None:
         ),
         (SMALL + "triggers: [{kind: serial}]\n", "triggers[0].port: is missing"),
         (SMALL + "recipes: []\n", "recipes is empty"),
+        (SMALL.replace("c.yaml", "c.yaml, max_age_days: 30"), "is 30, expected 0: the age of a calibration is not"),
+        (SMALL.replace("modbus-tcp", "modbus-tcp, port: 05020"), "05020 begins with 0; write 5020"),
+        (SMALL + "recipes: [{number: 1, name: a, binarize: otsu}]\n", "wall-tips finds its own threshold"),
         (
             SMALL + "recipes: [{number: 1, name: a}, {number: 1, name: b}]\n",
             "recipes: number 1 is there more than once",

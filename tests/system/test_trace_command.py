@@ -102,6 +102,15 @@ def test_an_overlay_is_written_for_each_picture_and_text_names_it(tmp_path: Path
     assert green.sum() > 2000
 
 
+def test_an_overlay_never_replaces_the_picture_it_is_of(tmp_path: Path) -> None:
+    picture = tmp_path / "block.jpg"
+    picture.write_bytes(RECTANGLE.read_bytes())
+    done = combtrace("trace", picture, "--overlay", picture)
+    assert done.returncode == 2
+    assert "is the picture being traced" in done.stderr
+    assert picture.read_bytes() == RECTANGLE.read_bytes()
+
+
 def test_json_to_a_file_leaves_the_text_on_standard_output(tmp_path: Path) -> None:
     done = combtrace("trace", RECTANGLE, "--json", tmp_path / "out.jsonl")
     assert "wall-tips" in done.stdout

@@ -13,9 +13,12 @@ OUTLIER = 4.0
 
 _BORDER_SHARE = 0.015
 _ROUNDS = 6
-_GRID = 64
+_GRID = 48
 # Of the way from cells to walls: a table as light as this lies near the mask's threshold.
 _LIGHT_TABLE = 0.1
+# Squares of this side that are covered so far (of 255) are wider than dim walls.
+_PATCH_PITCHES = 0.35
+_PATCH_COVER = 160
 # Area in square pitches: a wall of usual width has an eighth.
 _DIM_WALLS = 0.25
 _SQUARE_PITCHES = 1.5
@@ -74,10 +77,13 @@ def without_light_table(mask: Gray, light: Gray, pitch: float, level: float, flo
     clear = smooth * (1 + max(_CLEAR * (level - table), 2 * spread) / max(table, 1.0))
     limit = cv2.resize(np.clip(np.rint(clear), 0, 255).astype(np.uint8), (width, height))
     like = cv2.bitwise_and(mask, cv2.compare(cv2.GaussianBlur(light, (3, 3), 0), limit, cv2.CMP_LE))
+    side = max(2, round(_PATCH_PITCHES * pitch))
+    patches = cv2.resize(like, (max(1, width // side), max(1, height // side)), interpolation=cv2.INTER_AREA)
+    if patches.max() < _PATCH_COVER:
+        return mask
     _, labels, stats, _ = cv2.connectedComponentsWithStats(like, connectivity=4)
-    beside = cv2.dilate(cv2.subtract(mask, like), np.ones((3, 3), np.uint8)) > 0
     kept = np.zeros(len(stats), np.bool_)
-    kept[labels[beside]] = True
+    kept[labels[cv2.dilate(cv2.subtract(mask, like), np.ones((3, 3), np.uint8)) > 0]] = True
     kept &= stats[:, cv2.CC_STAT_AREA] < _DIM_WALLS * pitch * pitch
     kept[0] = True
     return np.where(kept[labels], mask, np.uint8(0))

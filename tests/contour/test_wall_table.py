@@ -40,7 +40,7 @@ def test_a_table_darker_than_the_cells_leaves_the_mask_as_it_is() -> None:
 def test_an_opening_behind_a_broken_strand_of_walls_is_a_hole() -> None:
     light, _ = comb(5.0)
     light[63:140, 240:320] = 5
-    light[85:95, 318:326] = 5
+    light[85:105, 318:326] = 5
     mask = np.where(light > 45, np.uint8(255), np.uint8(0))
     rings = coarse_block(mask, light, 20.0, 3.0).rings
     assert [ring.is_hole for ring in rings] == [False, True]

@@ -41,8 +41,8 @@ def material_edge(picture: NDArray[np.uint8], pitch: float, walls: Gray) -> Cont
     """
     difference, noise = _difference(picture)
     level = _level(difference, noise)
-    faint = cv2.bitwise_and(walls, cv2.compare(difference, OUTLIER * noise, cv2.CMP_GT))
-    region = _region((difference > level) | (faint > 0), pitch)
+    faint = (walls > 0) & (difference > OUTLIER * noise)
+    region = _region((difference > level) | faint, pitch)
     chains, hierarchy = cv2.findContours(region, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     rings = [
         (_sub_pixel(difference, chain[:, 0, :].astype(np.float64)), bool(node[3] >= 0))

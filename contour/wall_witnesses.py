@@ -68,8 +68,8 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
     seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
     if cells.pitch < FINE_PITCH and seen.may_be_noise:
         raise NoBlockFound(
-            f"no block found: cells of {cells.pitch:.0f} px with a contrast of {seen.contrast:.0f} grey levels look like "
-            "noise. Check the light, and that a block lies in view"
+            f"no block found: cells of {cells.pitch:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
+            "like noise. Check the light, and that a block lies in view"
         )
     if cells.bright:
         mask = without_light_table(seen.mask, small, cells.pitch / scale, cells.level, cells.floor)

@@ -237,9 +237,7 @@ class Recipe(Model):
         "flat", description="How walls are told from gaps: flat, otsu, or a fixed grey level 0 to 255."
     )
     edge: Literal["cut", "cells"] = Field("cut", description="cut: cells are cut open at the edge; cells: closed.")
-    pieces: Literal["one", "largest"] = Field(
-        "one", description="one: several blocks are refused; largest: it counts. Not applied yet."
-    )
+    pieces: Literal["one", "largest"] = Field("one", description="What several blocks lead to; not applied yet.")
     parameters: dict[str, Number] = Field(
         default_factory=dict, description="Sizes of the method; left out, they follow from the picture."
     )

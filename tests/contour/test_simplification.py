@@ -58,7 +58,7 @@ def fewest_by_trial(ring: Ring, tolerance: float) -> int:
             for i in range(j):
                 segment = shapely.LineString([ring[path[i]], ring[path[j]]]) if j - i < count else None
                 between = shapely.points(ring[path[i + 1 : j]])
-                if segment is not None and (shapely.distance(segment, between) <= tolerance).all():
+                if segment is not None and (shapely.distance(segment, between) <= tolerance + 1e-9).all():
                     cost[j] = min(cost[j], cost[i] + 1)
         best = min(best, int(cost[count]))
     return max(best, 3)

@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from contour.acceptance import Limits, judge
 from contour.calibration import Calibration
-from contour.errors import CalibrationError, NoBlockFound, PictureError
+from contour.errors import CalibrationError, NoBlockFound
 from contour.geometry import Contour, Ring
 from contour.polygon import cutting_polygon
 from contour.tracing import Trace, TraceSettings, check_picture, trace
 from service.config import Recipe
 from service.reasons import Reason
-
-STAGES = ("read", "mask", "trace", "convert", "simplify")
 
 
 @dataclass(frozen=True)
@@ -186,6 +184,3 @@ def trace_settings(recipe: Recipe) -> TraceSettings:
 
 def _rounded(value: float | None) -> float | None:
     return None if value is None else round(float(value), 3)
-
-
-__all__ = ["STAGES", "Measurement", "Measurer", "PictureError", "trace_settings"]

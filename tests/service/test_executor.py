@@ -19,6 +19,7 @@ from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link, LinkSettings
 from service.reasons import Outcome, Reason
 from service.state import State, StateMachine
+from tests.service.waiting import until
 
 
 class HeldRunner:
@@ -87,14 +88,6 @@ async def running(folder: Path) -> AsyncIterator[Bench]:
         with suppress(asyncio.CancelledError):
             await task
         bench.journal.close()
-
-
-async def until(condition, bound_s: float = 5.0) -> None:
-    loop = asyncio.get_running_loop()
-    give_up_at = loop.time() + bound_s
-    while not condition():
-        assert loop.time() < give_up_at, "it did not come"
-        await asyncio.sleep(0.005)
 
 
 async def test_a_trigger_becomes_a_durable_job_before_the_ticket_is_handed_out(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import pytest
 from drivers.controller.mailbox import LinkBlock
 from service.link import Link, LinkSettings, LinkUnsteady, steady
 from tests.service.scripted_controller import ScriptedController
+from tests.service.waiting import until
 
 QUICK = LinkSettings(poll_period_s=0.01, heartbeat_timeout_s=0.15)
 
@@ -28,14 +29,6 @@ async def linked(controller: ScriptedController, settings: LinkSettings = QUICK)
         task.cancel()
         with suppress(asyncio.CancelledError):
             await task
-
-
-async def until(condition, bound_s: float = 5.0) -> None:
-    loop = asyncio.get_running_loop()
-    give_up_at = loop.time() + bound_s
-    while not condition():
-        assert loop.time() < give_up_at, "it did not come"
-        await asyncio.sleep(0.005)
 
 
 class Reading:

@@ -48,18 +48,6 @@ class ControllerState(IntEnum):
     FAULT = 3
 
 
-class ServiceState(IntEnum):
-    """`service_state`, by the names of OPC 40100-1."""
-
-    PREOPERATIONAL = 1
-    HALTED = 2
-    ERROR = 3
-    INITIALIZED = 4
-    READY = 5
-    SINGLE_EXECUTION = 6
-    CONTINUOUS_EXECUTION = 7
-
-
 @dataclass(frozen=True)
 class LinkBlock:
     """What the controller writes, 16 registers; names as in the protocol. Lengths in µm, times in ms."""

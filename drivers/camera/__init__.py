@@ -31,7 +31,8 @@ class Frame:
 
     pixels: shape (H, W) grey or (H, W, 3) BGR, uint8. exposed_at_s: start of the exposure on `time.monotonic`'s
     scale; a file counts as exposed when it is read. simulated: not from a live camera. source: what it came from,
-    for log and journal. sequence: counts frames of this camera from 1.
+    for log and journal. sequence: counts frames of this camera from 1. camera: which device took it, its name with its
+    serial number or, without one, its place on the bus; a calibration holds for that one. "" = not told, as of files.
     """
 
     pixels: NDArray[np.uint8]
@@ -39,6 +40,7 @@ class Frame:
     simulated: bool
     source: str
     sequence: int
+    camera: str = ""
 
 
 class Camera(Protocol):

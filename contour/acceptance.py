@@ -7,6 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from contour.error_budget import ErrorBudget
 from contour.geometry import Contour, Ring, contour_defect
 from contour.polygon import Polygon
 from contour.segments import BoxTree, contains, first_meeting
@@ -55,16 +56,17 @@ class Finding:
 
 
 def judge(
-    polygon: Polygon, frame_size: tuple[int, int], limits: Limits, *, uncertainty_mm: float | None = None
+    polygon: Polygon, frame_size: tuple[int, int], limits: Limits, *, budget: ErrorBudget | None = None
 ) -> tuple[Finding, ...]:
     """Every reason to refuse the polygon, lowest code first; empty = accepted.
 
-    `frame_size` is (width, height) in pixels. `uncertainty_mm` None (nobody computed it) breaks no limit.
+    `frame_size` is (width, height) in pixels. Where there is a limit to the uncertainty in millimetres, a `budget` of
+    None (nobody knows it) is refused as one too large.
     """
     findings = [
         _touches_border(polygon.pixels.exterior, frame_size, limits.border_px),
         _area(polygon.area_mm2, limits),
-        _uncertainty(uncertainty_mm, limits.max_uncertainty_mm),
+        _uncertainty(polygon, budget, limits.max_uncertainty_mm),
         _work_area(polygon.millimetres, limits.work_area_mm),
         _points(polygon.pixels, limits.max_vertices),
         _shape(polygon),
@@ -96,13 +98,21 @@ def _area(area_mm2: float | None, limits: Limits) -> Finding | None:
     )
 
 
-def _uncertainty(uncertainty_mm: float | None, limit: float | None) -> Finding | None:
-    if uncertainty_mm is None or limit is None or uncertainty_mm <= limit:
+def _uncertainty(polygon: Polygon, budget: ErrorBudget | None, limit: float | None) -> Finding | None:
+    if limit is None or polygon.millimetres is None:
+        return None
+    if budget is None:
+        return Finding(
+            Refusal.UNCERTAINTY_TOO_LARGE,
+            f"How sure the contour is, is not known, {limit:g} mm are allowed. Use wall-tips with edge: cut, and a "
+            "calibration that knows the scale at the block's height, or set max_uncertainty_mm to 0.",
+        )
+    if budget.total_mm <= limit:
         return None
     return Finding(
         Refusal.UNCERTAINTY_TOO_LARGE,
-        f"The contour is sure within {uncertainty_mm:.2f} mm only, {limit:g} mm are allowed. "
-        "Check the light and the sharpness.",
+        f"The contour is sure within {budget.total_mm:.2f} mm only ({budget}), {limit:g} mm are allowed. "
+        "Check the light and the sharpness; calibrate again if that part is the largest.",
     )
 
 

@@ -70,6 +70,11 @@ class Calibration(Protocol):
         """True where the calibration carries an alignment, be it the identity."""
         ...
 
+    @property
+    def stated_uncertainty_mm(self) -> float | None:
+        """95 % bound on positions in the traced plane by the calibration's own account; None where it gives none."""
+        ...
+
     def check_fits(self, width: int, height: int) -> None:
         """Raise CalibrationError unless pictures of this size are the ones it was made for."""
         ...
@@ -146,6 +151,7 @@ class SimpleCalibration(_Frames):
     rotation_deg: float = 0.0
     """Of the work x axis against the picture's x axis, counter-clockwise as seen."""
     alignment: Alignment | None = None
+    stated_uncertainty_mm: float | None = None
 
     def __post_init__(self) -> None:
         self._check_size()
@@ -195,6 +201,7 @@ class CameraCalibration(_Frames):
     translation_mm: Floats
     camera_name: str = ""
     alignment: Alignment | None = None
+    stated_uncertainty_mm: float | None = None
 
     def __post_init__(self) -> None:
         self._check_size()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from contour.calibration import Calibration, scales
 from contour.errors import ParameterError
 from contour.geometry import Contour, area, contour_defect, oriented_contour, simplify_indices
+from contour.segments import distances_to_ring
 
 PIXEL_TOLERANCE = 0.25
 """What simplification may shift where there is no calibration, px: below what any method here claims to resolve."""
@@ -26,6 +27,7 @@ class Polygon:
     `pixels` and `millimetres` hold the same vertices in the same order; pixels run y down, so their exterior has a
     negative shoelace area. Millimetres are in the machine frame. `mm_per_px` is the largest scale on the exterior: an
     uncertainty in pixels times it is one in millimetres. All three millimetre fields are None without a calibration.
+    `shift_px` is the largest distance of a traced vertex from the polygon: what leaving vertices out has cost.
     """
 
     pixels: Contour
@@ -33,6 +35,7 @@ class Polygon:
     area_px2: float
     area_mm2: float | None
     mm_per_px: float | None
+    shift_px: float = 0.0
 
 
 def cutting_polygon(
@@ -53,15 +56,17 @@ def cutting_polygon(
     if calibration is None:
         on_stage("convert")
         pixels = _subset(contour_px, _kept_vertices(contour_px, PIXEL_TOLERANCE))
+        shift_px = _shift(contour_px, pixels)
         on_stage("simplify")
-        return Polygon(pixels, None, area(pixels), None, None)
-    millimetres = convert(contour_px, calibration, height_mm)
+        return Polygon(pixels, None, area(pixels), None, None, shift_px)
+    traced_mm = convert(contour_px, calibration, height_mm)
     mm_per_px = float(scales(calibration, contour_px.exterior, height_mm).max())
     on_stage("convert")
-    kept = _kept_vertices(millimetres, tolerance_mm)
-    pixels, millimetres = _subset(contour_px, kept), _subset(millimetres, kept)
+    kept = _kept_vertices(traced_mm, tolerance_mm)
+    pixels, millimetres = _subset(contour_px, kept), _subset(traced_mm, kept)
+    shift_px = _shift(traced_mm, millimetres) / mm_per_px
     on_stage("simplify")
-    return Polygon(pixels, millimetres, area(pixels), area(millimetres), mm_per_px)
+    return Polygon(pixels, millimetres, area(pixels), area(millimetres), mm_per_px, shift_px)
 
 
 def convert(contour_px: Contour, calibration: Calibration, height_mm: float) -> Contour:
@@ -79,6 +84,12 @@ def _kept_vertices(contour: Contour, tolerance: float) -> list[NDArray[np.intp]]
         if not contour.holes or contour_defect(_subset(contour, kept)) is None or contour_defect(contour) is not None:
             return kept
     return [np.arange(len(ring)) for ring in contour.rings]
+
+
+def _shift(traced: Contour, kept: Contour) -> float:
+    """Largest distance of a traced vertex from the ring made of those kept."""
+    pairs = [(one, few) for one, few in zip(traced.rings, kept.rings, strict=True) if len(few) < len(one)]
+    return max((float(distances_to_ring(one, few).max()) for one, few in pairs), default=0.0)
 
 
 def _subset(contour: Contour, kept: list[NDArray[np.intp]]) -> Contour:

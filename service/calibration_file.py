@@ -59,12 +59,19 @@ class _Alignment(_Model):
     translation_mm: tuple[Number, Number] = (0.0, 0.0)
 
 
+class _Uncertainty(_Model):
+    """What the calibration states of itself, 95 %: plane_mm, of a position in the traced plane."""
+
+    plane_mm: Annotated[Number, Field(ge=0)]
+
+
 class _File(_Model):
     version: Literal[1]
     image_width: Size
     image_height: Size
     camera_name: str = ""
     alignment: _Alignment | None = None
+    uncertainty: _Uncertainty | None = None
     hash: str | None = None
 
 
@@ -141,6 +148,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _calibration(file: _CameraFile | _SimpleFile) -> Calibration:
     alignment = None if file.alignment is None else Alignment(**file.alignment.model_dump())
+    stated_mm = None if file.uncertainty is None else file.uncertainty.plane_mm
     if isinstance(file, _SimpleFile):
         return SimpleCalibration(
             image_width=file.image_width,
@@ -150,6 +158,7 @@ def _calibration(file: _CameraFile | _SimpleFile) -> Calibration:
             plane_height_mm=file.plane_height_mm,
             rotation_deg=file.rotation_deg,
             alignment=alignment,
+            stated_uncertainty_mm=stated_mm,
         )
     return CameraCalibration(
         image_width=file.image_width,
@@ -160,6 +169,7 @@ def _calibration(file: _CameraFile | _SimpleFile) -> Calibration:
         translation_mm=np.array(file.work_plane.translation_mm),
         camera_name=file.camera_name,
         alignment=alignment,
+        stated_uncertainty_mm=stated_mm,
     )
 
 
@@ -201,6 +211,8 @@ def _data(calibration: Calibration) -> dict[str, Any]:
             "rotation_deg": float(alignment.rotation_deg),
             "translation_mm": [float(value) for value in alignment.translation_mm],
         }
+    if calibration.stated_uncertainty_mm is not None:
+        data["uncertainty"] = {"plane_mm": float(calibration.stated_uncertainty_mm)}
     return data
 
 

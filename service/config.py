@@ -229,6 +229,12 @@ class Recipe(Model):
     method: Method = Field(DEFAULT_METHOD, description="How the contour is traced.")
     thickness_mm: float = Field(20, ge=0, le=10_000, description="Height of the block's top above the table, mm.")
     tolerance_mm: float = Field(0.1, ge=0, le=100, description="Largest shift by leaving vertices out, mm.")
+    thickness_tolerance_mm: float = Field(
+        0, ge=0, le=1000, description="How far the block's top may lie from that height, mm."
+    )
+    max_uncertainty_mm: float = Field(
+        0, ge=0, le=1000, description="Largest accepted 95 % bound on the contour's position, mm; 0 = not checked."
+    )
     max_vertices: int = Field(4000, ge=3, le=1_000_000, description="Most vertices of all rings together.")
     min_area_mm2: float = Field(100, ge=0, le=4e9, description="Smallest accepted area, mm², holes taken off.")
     max_area_mm2: float = Field(4_000_000, gt=0, le=4e9, description="Largest accepted area, mm², holes taken off.")

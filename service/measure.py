@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from contour.acceptance import Limits, judge
 from contour.calibration import Calibration
+from contour.error_budget import ErrorBudget, error_budget
 from contour.errors import CalibrationError, NoBlockFound
 from contour.geometry import Contour, Ring
-from contour.polygon import cutting_polygon
+from contour.polygon import Polygon, cutting_polygon
 from contour.tracing import Trace, TraceSettings, check_picture, trace
 from service.config import Recipe
 from service.reasons import Reason
@@ -36,7 +37,7 @@ class Measurement:
     area_px2: float | None = None
     area_mm2: float | None = None
     uncertainty_px: float | None = None
-    uncertainty_mm: float | None = None
+    uncertainty: ErrorBudget | None = None
     thickness_mm: float | None = None
     aligned: bool = False
     findings: tuple[tuple[Reason, str], ...] = ()
@@ -51,6 +52,11 @@ class Measurement:
     def texts(self) -> tuple[str, ...]:
         """The findings as sentences, each with the measured value and the limit."""
         return tuple(text for _, text in self.findings)
+
+    @property
+    def uncertainty_mm(self) -> float | None:
+        """95 % bound on the position of the polygon that is sent, all causes together; None where it is not known."""
+        return None if self.uncertainty is None else self.uncertainty.total_mm
 
     @property
     def size_mm(self) -> tuple[float, float] | None:
@@ -148,7 +154,10 @@ class Measurer:
             tolerance_mm=recipe.tolerance_mm,
             on_stage=watch.lap,
         )
-        findings = judge(polygon, (width, height), self._limits(recipe))
+        # What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither.
+        sure_px = None if traced.uncertainty_px is None else float(np.hypot(traced.uncertainty_px, polygon.shift_px))
+        budget = self._budget(polygon, recipe, thickness_mm, sure_px)
+        findings = judge(polygon, (width, height), self._limits(recipe), budget=budget)
         watch.lap("judge")
         return replace(
             result,
@@ -156,8 +165,23 @@ class Measurer:
             millimetres=polygon.millimetres,
             area_px2=polygon.area_px2,
             area_mm2=polygon.area_mm2,
-            uncertainty_px=traced.uncertainty_px,
+            uncertainty_px=sure_px,
+            uncertainty=budget,
             findings=tuple((Reason(int(finding.refusal)), finding.text) for finding in findings),
+        )
+
+    def _budget(
+        self, polygon: Polygon, recipe: Recipe, thickness_mm: float, uncertainty_px: float | None
+    ) -> ErrorBudget | None:
+        if self._calibration is None or polygon.mm_per_px is None:
+            return None
+        return error_budget(
+            polygon.pixels,
+            self._calibration,
+            height_mm=thickness_mm,
+            thickness_tolerance_mm=recipe.thickness_tolerance_mm,
+            uncertainty_px=uncertainty_px,
+            mm_per_px=polygon.mm_per_px,
         )
 
     def _limits(self, recipe: Recipe) -> Limits:
@@ -166,6 +190,7 @@ class Measurer:
             max_area_mm2=recipe.max_area_mm2,
             max_vertices=recipe.max_vertices,
             work_area_mm=self._work_area_mm,
+            max_uncertainty_mm=recipe.max_uncertainty_mm or None,
         )
 
 

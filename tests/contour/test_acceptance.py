@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from contour.acceptance import Limits, Refusal, judge
+from contour.error_budget import ErrorBudget
 from contour.geometry import Contour
 from contour.polygon import Polygon
 from tests.contour.rings import SQUARE
@@ -124,14 +125,19 @@ def test_the_whole_contour_must_lie_in_the_work_area(work_area: np.ndarray, word
         assert words in findings[0].text
 
 
-def test_an_uncertainty_is_judged_only_where_it_is_known_and_limited() -> None:
-    limits = replace(LIMITS, max_uncertainty_mm=0.3)
-    assert judge(GOOD, FRAME, limits, uncertainty_mm=None) == ()
-    assert judge(GOOD, FRAME, limits, uncertainty_mm=0.3) == ()
-    assert judge(GOOD, FRAME, LIMITS, uncertainty_mm=99.0) == ()
-    (finding,) = judge(GOOD, FRAME, limits, uncertainty_mm=0.31)
+def test_an_uncertainty_is_judged_where_it_is_limited_and_told_with_its_parts() -> None:
+    limits = replace(LIMITS, max_uncertainty_mm=0.5)
+    assert judge(GOOD, FRAME, limits, budget=ErrorBudget(0.3, 0.4, 0.0)) == ()
+    assert judge(GOOD, FRAME, LIMITS, budget=ErrorBudget(99.0, 0.0, None)) == ()
+    (finding,) = judge(GOOD, FRAME, limits, budget=ErrorBudget(0.3, 0.41, None))
     assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
-    assert "0.31 mm" in finding.text
+    assert "0.51 mm only (picture 0.30, thickness 0.41, calibration not stated), 0.5 mm are allowed" in finding.text
+
+
+def test_an_uncertainty_that_nobody_knows_is_not_within_a_limit() -> None:
+    limits = replace(LIMITS, max_uncertainty_mm=0.5)
+    assert [finding.refusal for finding in judge(GOOD, FRAME, limits)] == [Refusal.UNCERTAINTY_TOO_LARGE]
+    assert judge(polygon(SQUARE * 10 + 100, mm_per_px=None), FRAME, limits) == ()
 
 
 def test_all_findings_are_told_lowest_code_first() -> None:

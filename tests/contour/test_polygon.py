@@ -37,6 +37,15 @@ def test_a_dense_rectangle_with_an_opening_becomes_eight_vertices() -> None:
     assert polygon.mm_per_px == pytest.approx(0.375)
 
 
+@pytest.mark.parametrize("calibration", [SIMPLE, None])
+def test_the_shift_is_that_of_the_farthest_vertex_left_out(calibration: SimpleCalibration | None) -> None:
+    ring = np.array([[300, 400], [500, 400.2], [700, 400], [700, 700], [300, 700.0]])
+    polygon = cutting_polygon(Contour(ring), calibration, height_mm=0.0, tolerance_mm=0.1)
+    assert len(polygon.pixels.exterior) == 4
+    assert polygon.shift_px == pytest.approx(0.2)
+    assert converted(Contour(ring), tolerance_mm=0.0).shift_px == 0.0
+
+
 def test_a_straight_edge_behind_a_lens_becomes_one_edge_in_millimetres() -> None:
     calibration = camera(tilt=(5.0, 0.0), distortion=(-0.15, 0.0, 0.0, 0.0, 0.0))
     block_mm = densified(np.array([[100.0, 80.0], [500.0, 80.0], [500.0, 320.0], [100.0, 320.0]]), 1.0)

@@ -49,6 +49,15 @@ def written(folder: Path, data: object) -> Path:
     return path
 
 
+@pytest.mark.parametrize("form", [CAMERA, SIMPLE], ids=["camera", "simple"])
+def test_what_a_calibration_states_of_itself_is_read_and_written(tmp_path: Path, form: dict[str, Any]) -> None:
+    assert load_calibration(written(tmp_path, form)).stated_uncertainty_mm is None
+    stated = load_calibration(written(tmp_path, {**form, "uncertainty": {"plane_mm": 0.12}}))
+    assert stated.stated_uncertainty_mm == 0.12
+    save_calibration(tmp_path / "again.yaml", stated)
+    assert load_calibration(tmp_path / "again.yaml").stated_uncertainty_mm == 0.12
+
+
 def test_the_simple_form_is_read_as_the_contract_says(tmp_path: Path) -> None:
     """The origin's pixel is work (0, 0); 100 px to its right are 37.5 mm in x, 100 px above it 37.5 mm in y."""
     calibration = load_calibration(written(tmp_path, SIMPLE))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from contour._cv import camera_rays, project, rotation_matrix
 from contour.errors import CalibrationError
+from contour.position_uncertainty import PositionUncertainty
 from contour.tracing import Rectifier
 
 Floats = NDArray[np.float64]
@@ -66,13 +67,13 @@ class Calibration(Protocol):
     def alignment(self) -> Alignment | None: ...
 
     @property
-    def aligned(self) -> bool:
-        """True where the calibration carries an alignment, be it the identity."""
+    def uncertainty(self) -> PositionUncertainty | None:
+        """How sure it is, None where nobody found out."""
         ...
 
     @property
-    def stated_uncertainty_mm(self) -> float | None:
-        """95 % bound on positions in the traced plane by the calibration's own account; None where it gives none."""
+    def aligned(self) -> bool:
+        """True where the calibration carries an alignment, be it the identity."""
         ...
 
     def check_fits(self, width: int, height: int) -> None:
@@ -100,12 +101,13 @@ class Calibration(Protocol):
         ...
 
 
-class _Frames:
+class Frames:
     """What both forms share: the alignment and the picture's size."""
 
     image_width: int
     image_height: int
     alignment: Alignment | None
+    uncertainty: PositionUncertainty | None
 
     @property
     def aligned(self) -> bool:
@@ -132,10 +134,16 @@ class _Frames:
             raise CalibrationError(
                 f"Calibration for pictures of {self.image_width} x {self.image_height} px: expected at least 1 x 1."
             )
+        sure = self.uncertainty
+        if sure is not None and (sure.image_width, sure.image_height) != (self.image_width, self.image_height):
+            raise CalibrationError(
+                f"Its uncertainty is of pictures of {sure.image_width} x {sure.image_height} px, the calibration of "
+                f"{self.image_width} x {self.image_height} px: expected the same. Calibrate again."
+            )
 
 
 @dataclass(frozen=True)
-class SimpleCalibration(_Frames):
+class SimpleCalibration(Frames):
     """One scale for the whole picture: a camera that looks straight down through a lens without distortion.
 
     `mm_per_pixel` holds on the plane z = `plane_height_mm`. How the scale changes with height depends on the
@@ -151,7 +159,7 @@ class SimpleCalibration(_Frames):
     rotation_deg: float = 0.0
     """Of the work x axis against the picture's x axis, counter-clockwise as seen."""
     alignment: Alignment | None = None
-    stated_uncertainty_mm: float | None = None
+    uncertainty: PositionUncertainty | None = None
 
     def __post_init__(self) -> None:
         self._check_size()
@@ -186,7 +194,7 @@ class SimpleCalibration(_Frames):
 
 
 @dataclass(frozen=True, eq=False)
-class CameraCalibration(_Frames):
+class CameraCalibration(Frames):
     """A pinhole camera with lens distortion, and where the work frame lies before it (OpenCV's conventions).
 
     `camera_matrix` is (3, 3); `distortion_coefficients` hold 4, 5, 8, 12 or 14 numbers (plumb_bob: k1 k2 p1 p2 k3);
@@ -201,7 +209,7 @@ class CameraCalibration(_Frames):
     translation_mm: Floats
     camera_name: str = ""
     alignment: Alignment | None = None
-    stated_uncertainty_mm: float | None = None
+    uncertainty: PositionUncertainty | None = None
 
     def __post_init__(self) -> None:
         self._check_size()

@@ -55,4 +55,6 @@ def error_budget(
         place = calibration.to_work(points, height_mm)
         shifts = [calibration.to_work(points, height) - place for height in heights]
         thickness_mm = float(np.hypot(*np.concatenate(shifts).T).max())
-    return ErrorBudget(uncertainty_px * mm_per_px, thickness_mm, calibration.stated_uncertainty_mm)
+    sure = calibration.uncertainty
+    calibration_mm = None if sure is None else float(sure.at(points, height_mm).max())
+    return ErrorBudget(uncertainty_px * mm_per_px, thickness_mm, calibration_mm)

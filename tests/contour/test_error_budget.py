@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from contour.calibration import SimpleCalibration
 from contour.error_budget import ErrorBudget, error_budget
 from contour.geometry import Contour
+from contour.position_uncertainty import PositionUncertainty
 from tests.contour.rings import SQUARE
 from tests.contour.test_calibration import camera
 
@@ -34,7 +35,7 @@ def test_the_picture_alone_counts_where_nothing_else_is_stated() -> None:
 
 
 def test_what_the_calibration_states_of_itself_joins_by_squares() -> None:
-    stated = replace(SIMPLE, stated_uncertainty_mm=0.5)
+    stated = replace(SIMPLE, uncertainty=PositionUncertainty.everywhere(1600, 1200, 0.5))
     assert budget(stated, uncertainty_px=3.2).total_mm == pytest.approx(1.3)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +14,17 @@ import pytest
 import yaml
 
 from contour.calibration import Alignment, CameraCalibration, SimpleCalibration
+from contour.plane_calibration import PlaneCalibration
+from contour.position_uncertainty import PositionUncertainty
+from contour.sentinels import Mark, Sentinels
 from service.calibration_file import (
     CalibrationFileError,
+    CalibrationRecord,
     calibration_hash,
     load_calibration,
+    load_record,
     save_calibration,
+    save_record,
 )
 
 CAMERA: dict[str, Any] = {
@@ -41,6 +49,10 @@ SIMPLE: dict[str, Any] = {
     "origin_px": [100.0, 1100.0],
     "rotation_deg": 0,
 }
+PLANE: dict[str, Any] = {"height_mm": 0, "figure_mm": 0.1, "map": {"rows": 2, "cols": 2, "data": [1, 2, 3, 4]}}
+BIG: dict[str, Any] = {"rows": 3, "cols": 2, "data": [1, 2, 3, 4, 5, 6]}
+MARK: dict[str, Any] = {"id": 1, "corners_px": [[0, 0], [5, 0], [5, 5], [0, 5]]}
+MIRRORED: dict[str, Any] = {"rows": 3, "cols": 3, "data": [1, 0, 0, 0, 1, 0, 0, 0, 1]}
 
 
 def written(folder: Path, data: object) -> Path:
@@ -51,11 +63,14 @@ def written(folder: Path, data: object) -> Path:
 
 @pytest.mark.parametrize("form", [CAMERA, SIMPLE], ids=["camera", "simple"])
 def test_what_a_calibration_states_of_itself_is_read_and_written(tmp_path: Path, form: dict[str, Any]) -> None:
-    assert load_calibration(written(tmp_path, form)).stated_uncertainty_mm is None
+    assert load_calibration(written(tmp_path, form)).uncertainty is None
     stated = load_calibration(written(tmp_path, {**form, "uncertainty": {"plane_mm": 0.12}}))
-    assert stated.stated_uncertainty_mm == 0.12
+    assert stated.uncertainty is not None
+    assert stated.uncertainty.figure_mm(33.0) == 0.12
     save_calibration(tmp_path / "again.yaml", stated)
-    assert load_calibration(tmp_path / "again.yaml").stated_uncertainty_mm == 0.12
+    again = load_calibration(tmp_path / "again.yaml")
+    assert again.uncertainty is not None
+    np.testing.assert_allclose(again.uncertainty.at(np.array([[5.0, 7.0], [900.0, 800.0]]), 20.0), 0.12)
 
 
 def test_the_simple_form_is_read_as_the_contract_says(tmp_path: Path) -> None:
@@ -93,6 +108,34 @@ def test_what_is_saved_comes_back_as_it_was(tmp_path: Path, data: dict[str, Any]
     for name, value in vars(first).items():
         np.testing.assert_equal(vars(again)[name], value)
     assert yaml.safe_load(path.read_text())["hash"] == calibration_hash(path)
+
+
+def test_uncertainty_sentinels_and_origin_come_back_as_they_were(tmp_path: Path) -> None:
+    path = tmp_path / "calibration.yaml"
+    sure = PositionUncertainty(1600, 1200, [0.0, 60.0], [0.02, 0.03], np.arange(24.0).reshape(2, 3, 4))
+    marks = Sentinels("DICT_4X4_50", (Mark(7, np.array([[1.0, 2.0], [9.5, 2.0], [9.0, 10.0], [1.0, 10.0]])),))
+    created = datetime(2026, 5, 4, 3, 2, 1, tzinfo=UTC)
+    calibration = replace(load_calibration(written(tmp_path, CAMERA)), uncertainty=sure)
+    save_record(path, CalibrationRecord(calibration, "cam0", created, marks, {"views": 14, "board": "charuco"}))
+    again = load_record(path)
+    assert (again.camera_name, again.created) == ("cam0", created)
+    assert again.made == {"views": 14, "board": "charuco"}
+    assert again.calibration.uncertainty is not None
+    for name, value in vars(sure).items():
+        np.testing.assert_equal(vars(again.calibration.uncertainty)[name], value)
+    assert again.sentinels is not None
+    assert again.sentinels.dictionary == "DICT_4X4_50"
+    np.testing.assert_equal(again.sentinels.marks[0].corners_px, marks.marks[0].corners_px)
+
+
+def test_a_homography_comes_back_as_it_was(tmp_path: Path) -> None:
+    path = tmp_path / "calibration.yaml"
+    first = PlaneCalibration(1600, 1200, np.array([[0.4, 0.01, -9], [0.02, -0.41, 480], [1e-5, 2e-5, 1]]), 5.0)
+    save_calibration(path, first)
+    again = load_calibration(path)
+    assert isinstance(again, PlaneCalibration)
+    np.testing.assert_allclose(again.homography, first.homography, rtol=1e-14)
+    assert again.plane_height_mm == 5.0
 
 
 def test_a_changed_file_no_longer_matches_its_hash(tmp_path: Path) -> None:
@@ -154,7 +197,7 @@ def changed(data: dict[str, Any], **changes: Any) -> dict[str, Any]:
     [
         (None, "holds no keys"),
         ([1], "holds no keys"),
-        (changed(SIMPLE, kind="fisheye"), "kind is 'fisheye', expected 'camera' or 'simple'"),
+        (changed(SIMPLE, kind="fisheye"), "kind is 'fisheye', expected one of 'camera', 'simple', 'plane'"),
         (changed(SIMPLE, kind=None), "kind is None"),
         (changed(SIMPLE, kind=["camera"]), "kind is ['camera'], expected"),
         (changed(SIMPLE, mm_per_pixel=True), "mm_per_pixel: is a truth value"),
@@ -180,6 +223,16 @@ def changed(data: dict[str, Any], **changes: Any) -> dict[str, Any]:
         (changed(CAMERA, distortion_model="equidistant"), "distortion_model: seen 'equidistant'"),
         (changed(CAMERA, distortion_coefficients={"rows": 1, "cols": 3, "data": [0, 0, 0]}), "distortion_coefficients"),
         (changed(CAMERA, work_plane=None), "work_plane: is missing"),
+        (changed(SIMPLE, uncertainty={"planes": []}), "expected either plane_mm or planes"),
+        (changed(SIMPLE, uncertainty={"planes": [PLANE, {**PLANE, "map": BIG}]}), "the maps have different sizes"),
+        (changed(SIMPLE, uncertainty={"planes": [PLANE, PLANE]}), "expected rising numbers"),
+        (changed(SIMPLE, uncertainty={"planes": [{**PLANE, "figure_mm": -1}]}), "figure_mm: seen -1"),
+        (changed(SIMPLE, created="2026-01-01 00:00:00"), "created"),
+        (changed(SIMPLE, sentinels={"dictionary": "DICT_4X4_50", "marks": [MARK, MARK]}), "each id once"),
+        (
+            {"version": 1, "kind": "plane", "image_width": 9, "image_height": 9, "homography": MIRRORED},
+            "mirrors the picture",
+        ),
         (
             changed(CAMERA, work_plane={"rotation_vector": [0, 0, 0], "translation_mm": [0, 0, 1000]}),
             "under the table",

@@ -158,7 +158,8 @@ class Cycle:
         if self._link is None:
             return Settlement(Outcome.WRITTEN, None, "no controller is configured")
         try:
-            pages = self._pages(job, recipe, stamp, frame, measurement)
+            loop = asyncio.get_running_loop()  # in the pool: a large contour would hold the heartbeat up
+            pages = await loop.run_in_executor(self._pool, self._pages, job, recipe, stamp, frame, measurement)
         except ContourTooLarge as error:
             raise _Stop(Reason.TOO_MANY_POINTS, str(error)) from error
         except MailboxError as error:  # what passed the checks in float64 degenerates in whole micrometres
@@ -263,11 +264,12 @@ class Cycle:
         )
         mailbox = self._settings.mailbox
         pages = encode_pages(message, mailbox.payload_capacity, mailbox.word_order)
-        if len(pages) > 1:
+        if len(pages) > 1 and not self._settings.transfer.handshake:
+            # Without answers nobody knows when a page was read, so the next one would overwrite it unseen.
             raise _Stop(
                 Reason.TOO_MANY_POINTS,
                 f"{contour.point_count} vertices need {len(pages)} pages of {mailbox.payload_capacity} registers, "
-                "expected one page: raise tolerance_mm or payload_capacity",
+                "a controller that cannot answer takes one: raise tolerance_mm or payload_capacity",
             )
         return pages
 

@@ -8,11 +8,14 @@ from __future__ import annotations
 import json
 import secrets
 import sqlite3
+import sys
 import threading
+from array import array
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +24,7 @@ from service.reasons import Outcome, Reason
 
 SCHEMA_VERSION = 1
 HEADER_REGISTERS = 31
+PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
 UNSETTLED = "outcome IS NULL"
 
 SCHEMA = """
@@ -75,7 +79,10 @@ class TriggerStamp:
 
 @dataclass(frozen=True)
 class Job:
-    """One job as the journal holds it. `pages` are set once any request of theirs may have been sent."""
+    """One job as the journal holds it.
+
+    session: set once any request of a transfer may have been sent, and pages with it, until the job has ended.
+    """
 
     job_id: int
     taken_at: str
@@ -92,7 +99,7 @@ class Job:
     @property
     def sent(self) -> bool:
         """True where a request of a transfer may have been sent: such a job is never called failed by ourselves."""
-        return bool(self.pages)
+        return self.session is not None
 
 
 class Journal:
@@ -196,8 +203,7 @@ class Journal:
 
     def store_pages(self, job_id: int, session: int, pages: tuple[Page, ...]) -> None:
         """Make the pages durable, before the first request of theirs is sent."""
-        text = json.dumps([[*page.header, *page.payload] for page in pages], separators=(",", ":"))
-        self._update(job_id, "session = ?, pages = ?", (session, text))
+        self._update(job_id, "session = ?, pages = ?", (session, pages_to_text(pages)))
 
     def store_withdrawal(self, job_id: int, reason: Reason) -> None:
         """Make durable that the job is being withdrawn, and why; the first reason stands."""
@@ -211,10 +217,10 @@ class Journal:
         detail: str | None,
         report: dict[str, Any] | None = None,
     ) -> Job:
-        """The job with its final state, durable. A job settles once: raise JournalConflict."""
+        """The job with its final state, durable; its pages are dropped. A job settles once: raise JournalConflict."""
         self._update(
             job_id,
-            "outcome = ?, reason = ?, detail = ?, settled_at = ?, report = ?",
+            "outcome = ?, reason = ?, detail = ?, settled_at = ?, report = ?, pages = NULL",
             (str(outcome), None if reason is None else int(reason), detail, self._stamp(), json.dumps(report or {})),
         )
         job = self.find(job_id)
@@ -276,10 +282,7 @@ def _job(row: tuple[Any, ...]) -> Job:
         taken_at=taken_at,
         trigger=TriggerStamp(kind, recipe, thickness_um, trigger_session, counter),
         session=session,
-        pages=tuple(
-            Page(tuple(registers[:HEADER_REGISTERS]), tuple(registers[HEADER_REGISTERS:]))
-            for registers in json.loads(pages or "[]")
-        ),
+        pages=pages_from_text(pages or ""),
         withdraw_reason=None if withdraw_reason is None else Reason(withdraw_reason),
         outcome=None if outcome is None else Outcome(outcome),
         reason=None if reason is None else Reason(reason),
@@ -287,3 +290,25 @@ def _job(row: tuple[Any, ...]) -> Job:
         settled_at=settled_at,
         report=json.loads(report or "{}"),
     )
+
+
+def pages_to_text(pages: tuple[Page, ...]) -> str:
+    """Pages one after the other, header then payload, four hexadecimal digits a register."""
+    registers = array("H", chain.from_iterable(chain(page.header, page.payload) for page in pages))
+    if sys.byteorder == "little":
+        registers.byteswap()
+    return registers.tobytes().hex()
+
+
+def pages_from_text(text: str) -> tuple[Page, ...]:
+    """The pages that `pages_to_text` wrote; each header says where its page ends."""
+    registers = array("H", bytes.fromhex(text))
+    if sys.byteorder == "little":
+        registers.byteswap()
+    pages, start = [], 0
+    while start < len(registers):
+        body = start + HEADER_REGISTERS
+        end = body + registers[start + PAYLOAD_LENGTH]
+        pages.append(Page(tuple(registers[start:body]), tuple(registers[body:end])))
+        start = end
+    return tuple(pages)

@@ -179,7 +179,7 @@ class Transfer:
 
     async def _deliver(self) -> tuple[Reason, str]:
         """Send page after page; return why the job is to be withdrawn. A settled job leaves by _Ended."""
-        page, in_vain = 0, 0
+        page, furthest, in_vain = 0, 0, 0
         while in_vain < self._settings.max_repeats:
             try:
                 give_up = await self._ready()
@@ -201,7 +201,9 @@ class Transfer:
                 answer = None
                 await asyncio.sleep(self._settings.poll_period_s)
             if answer is Answer.ACCEPTED and page + 1 < len(self._pages):
-                page, in_vain = page + 1, 0
+                page += 1
+                # Only a page that was not held before is progress: one that is missing again and again is not.
+                furthest, in_vain = max(furthest, page), 0 if page > furthest else in_vain
             elif answer is Answer.NOT_READY:
                 await asyncio.sleep(self._settings.poll_period_s)  # its state may say ready all the while
             else:

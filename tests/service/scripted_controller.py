@@ -36,6 +36,7 @@ class ScriptedController:
         self.reachable = True
         self.beating = True
         self.clock_runs = True
+        self.withdraws = False  # True: a withdrawal is answered whatever the script says
         self.started_at = time.monotonic()
         self.before_commit: Callable[[], None] = lambda: None
         self._connected = False
@@ -115,11 +116,15 @@ class ScriptedController:
             self._say(Answer.ACCEPTED_BEFORE if self.link.last_result == Answer.ACCEPTED else self.link.last_result)
             return
         answer = self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
+        if layout == 0 and self.withdraws:
+            answer = Answer.WITHDRAWN
         if answer is None:
             return
         if layout == 0:
             answer = Answer.WITHDRAWN
-        if answer in FINAL:
+        header = self.page.header
+        held = answer == Answer.ACCEPTED and header[3] < header[4]  # a page that is not the last one
+        if answer in FINAL and not held:
             self.link = replace(self.link, last_result=int(answer), last_job=job_id)
             if answer == Answer.ACCEPTED:
                 self.accepted.append(self.page)

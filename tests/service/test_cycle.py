@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from contour.errors import ParameterError, PictureError
-from contour.geometry import Contour
+from contour.geometry import Contour, area
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable
 from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.mailbox import Answer, Page
 from service.config import Recipe
-from service.cycle import Cycle, CycleSettings, Observation
+from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation
 from service.health import Health
 from service.journal import Job, Journal, TriggerStamp
 from service.link import Link, LinkSettings
@@ -229,14 +229,42 @@ async def test_findings_refuse_the_job_with_the_lowest_code_and_all_texts(tmp_pa
         assert built.controller.count("clear") == 0
 
 
-async def test_a_contour_of_more_than_one_page_is_refused_with_130(tmp_path: Path) -> None:
-    angle = np.linspace(0, 2 * np.pi, 600, endpoint=False)
-    ring = 100 * np.column_stack([np.cos(angle), np.sin(angle)])
+def large_contour(vertices: int) -> Contour:
+    angle = np.linspace(0, 2 * np.pi, vertices, endpoint=False)
+    return Contour(1000 * np.column_stack([np.cos(angle), np.sin(angle)]))
+
+
+async def test_a_contour_of_several_pages_is_sent_page_by_page(tmp_path: Path) -> None:
+    contour = large_contour(1300)
     async with rig(tmp_path) as built:
-        built.plan.result = measured(millimetres=Contour(ring), pixels=Contour(ring))
+        built.plan.result = measured(millimetres=contour, pixels=contour, area_mm2=area(contour))
+        job = await built.job()
+        assert job.outcome is Outcome.ACCEPTED
+        pages = [page for name, page in built.controller.requests if name == "write_page"]
+        sent = decode_contour([((1, *page.header), page.payload) for page in pages])
+        assert (sent.header.page_count, sent.header.job_id) == (3, job.job_id)
+        assert [list(point) for point in sent.rings[0]] == np.rint(contour.exterior * 1000).astype(int).tolist()
+
+
+async def test_without_answers_a_contour_of_several_pages_is_refused_with_130(tmp_path: Path) -> None:
+    """Nobody would know when a page was read, so the next one would overwrite it unseen."""
+    contour = large_contour(600)
+    async with rig(tmp_path, replace(SETTINGS, transfer=replace(QUICK, handshake=False))) as built:
+        built.plan.result = measured(millimetres=contour, pixels=contour)
         job = await built.job()
         assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.TOO_MANY_POINTS)
         assert "600 vertices need 2 pages" in (job.detail or "")
+        assert built.controller.count("write_page") == 0
+
+
+async def test_more_rings_than_the_first_pages_table_holds_are_refused_with_130(tmp_path: Path) -> None:
+    holes = tuple(np.array([[x, 1.0], [x, 2.0], [x + 1, 1.0]]) for x in range(1, 90, 2))
+    contour = Contour(RECTANGLE, holes)
+    async with rig(tmp_path, replace(SETTINGS, mailbox=MailboxFormat(payload_capacity=88))) as built:
+        built.plan.result = measured(millimetres=contour, pixels=contour)
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.TOO_MANY_POINTS)
+        assert "46 rings" in (job.detail or "")
 
 
 async def test_a_contour_without_millimetres_is_never_sent(tmp_path: Path) -> None:
@@ -313,7 +341,7 @@ async def resumed(built: Rig, prepare: Callable[[int], None]) -> Job:
 
 
 def sent_page(job_id: int):
-    from tests.service.test_transfer import page
+    from tests.service.transferring import page
 
     return page(job_id)
 

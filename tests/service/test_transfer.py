@@ -3,75 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-import time
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from drivers.controller.mailbox import Answer, ContourMessage, Page, ServiceBlock, encode_pages, withdrawal
-from service.link import Link, LinkSettings
+from drivers.controller.mailbox import Answer, ServiceBlock, withdrawal
 from service.reasons import Outcome, Reason
-from service.transfer import Settlement, Transfer, TransferCounter, TransferSettings
+from service.transfer import Settlement, TransferCounter, TransferSettings
 from tests.service.scripted_controller import ScriptedController
-
-JOB, SESSION = 7, 9
-QUICK = TransferSettings(ready_timeout_s=0.3, ack_timeout_s=0.1, max_repeats=3, poll_period_s=0.01)
-
-
-def page(job_id: int = JOB, session: int = SESSION) -> Page:
-    ring = np.array([[0, 0], [100_000, 0], [100_000, 50_000], [0, 50_000]])
-    message = ContourMessage(job_id, (ring,), 5000, 200, 60_000, 1, False, False, 30_000, session, 5)
-    (only,) = encode_pages(message, 1984, "big")
-    return only
-
-
-class Run:
-    """One transfer and what it made durable on its way."""
-
-    def __init__(
-        self, controller: ScriptedController, link: Link, settings: TransferSettings, lifetime_s: float
-    ) -> None:
-        self.controller, self.link = controller, link
-        self.durable: list[str] = []
-        self.transfer = Transfer(
-            link,
-            settings,
-            TransferCounter(100),
-            job_id=JOB,
-            session=SESSION,
-            pages=(page(),),
-            withdrawal=withdrawal(JOB, SESSION, "big"),
-            expires_at_s=time.monotonic() + lifetime_s,
-            before_sending=self._sending,
-            before_withdrawal=self._withdrawing,
-        )
-
-    async def _sending(self) -> None:
-        assert self.controller.count("write_page") == 0, "sent before it was durable"
-        self.durable.append("sent")
-
-    async def _withdrawing(self, reason: Reason) -> None:
-        self.durable.append(f"withdraw {reason.label}")
-
-    async def end(self, bound_s: float = 10.0) -> Settlement:
-        return await asyncio.wait_for(self.transfer.run(), bound_s)
-
-
-@asynccontextmanager
-async def transferring(
-    controller: ScriptedController, settings: TransferSettings = QUICK, lifetime_s: float = 5.0
-) -> AsyncIterator[Run]:
-    link = Link(controller, LinkSettings(handshake=settings.handshake, poll_period_s=0.01, heartbeat_timeout_s=0.3))
-    task = asyncio.ensure_future(link.run())
-    try:
-        yield Run(controller, link, settings, lifetime_s)
-    finally:
-        task.cancel()
-        with suppress(asyncio.CancelledError):
-            await task
+from tests.service.transferring import JOB, QUICK, SESSION, page, transferring
 
 
 async def test_a_page_is_cleared_written_read_back_and_committed_in_this_order() -> None:

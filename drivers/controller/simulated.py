@@ -3,58 +3,58 @@
 Written from the protocol's text with its own page assembly; of the codec it knows only where the blocks lie.
 
 What it does not model:
-- scans and requests are atomic to each other: a block of one request is never seen half written, so neither torn pages
-  nor a torn link block come about by themselves (a proxy that delays or drops requests brings about the rest);
-- pages are copied and checked within one scan, however long they are;
-- nothing is cut: the machine is busy only when `set_state` says so, and limits of travel are not known to it;
+- scans and requests are atomic to each other: what one request writes is never seen half written (a page of several
+  requests is, and `Pace` makes copies of it that are torn);
+- nothing is cut: the machine is busy only when it is told so, and limits of travel are not known to it;
 - retained memory outlives a killed process, not a power cut in the midst of a disk write;
-- on a serial line no connection is seen, so heartbeats are not judged there, and line errors do not happen.
+- on a serial line no connection is seen, so heartbeats are not judged there; bytes are paced by the port alone, frames
+  are told apart by their length and by 20 ms of silence, and parity, framing errors and echoes do not happen.
 """
 
 from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from pymodbus.constants import ExcCodes
-from pymodbus.exceptions import NoSuchIdException
-from pymodbus.pdu import ModbusPDU
-from pymodbus.server import ModbusSerialServer, ModbusTcpServer
-from pymodbus.simulator import DataType, SimData, SimDevice
-
-from drivers.controller.errors import ControllerError, ControllerUnavailable
+from drivers.controller.errors import ControllerError
 from drivers.controller.layout import REGISTERS, MailboxLayout
-from drivers.controller.library_log import cap_library_log
 from drivers.controller.simulated_contour import AcceptedContour
+from drivers.controller.simulated_faults import Fault, FaultPlan, targets_of
+from drivers.controller.simulated_frames import FramingName, Request
 from drivers.controller.simulated_memory import RetainedMemory
 from drivers.controller.simulated_program import (
     ControllerProgram,
     Judge,
+    Pace,
     TriggerNotPossible,
     judge_by_geometry,
 )
+from drivers.controller.simulated_server import RegisterServer
 from drivers.controller.simulated_verdict import Verdict
-from drivers.controller.simulated_watch import LONGEST_WRITE, ClientWatch
+from drivers.controller.simulated_watch import ClientWatch
+from drivers.controller.simulated_window import RegisterWindow
 
-__all__ = ["AcceptedContour", "SimulatedController", "TriggerNotPossible", "Verdict"]
+NO_SUCH_DEVICE = 11  # exception: gateway target device did not respond
 
-KNOWN_FUNCTIONS = (3, 6, 16)
-Server = ModbusTcpServer | ModbusSerialServer
+__all__ = ["AcceptedContour", "FaultPlan", "Pace", "SimulatedController", "TriggerNotPossible", "Verdict"]
 
 
 class SimulatedController:
     """A controller on a real socket (or, by `on_serial`, on a serial line), from `start` to `stop`.
 
     host, port: where it listens; port 0 takes a free one, told by `port`.
+    framing: "tcp" for Modbus TCP, "rtu" for RTU frames over TCP, as a serial server hands them on.
     scan_s: period of the program's scan.
     session_source: the session of each start; by default a retained counter, begun at random where there is none.
     memory_path: where last answer and session counter outlive the process; None: they live as long as this object.
     has_clock: False: `clock` stays 0 for ever.
     judge: 1 accepted, 4 geometry refused or 7 operator refused, for a contour that is otherwise in order.
+    faults: what befalls which requests.
+    pace: how many scans it takes for a page.
     on_accepted: gets each accepted contour once, after it is in memory. Killed between the two, the next start hands
         the contour on; killed right after it, that start hands it on again: who must not act twice keeps the job_id.
     """
@@ -64,42 +64,50 @@ class SimulatedController:
         host: str = "127.0.0.1",
         port: int = 0,
         *,
+        framing: FramingName = "tcp",
         device_id: int = 1,
         layout: MailboxLayout | None = None,
         scan_s: float = 0.01,
         session_source: Callable[[], int] | None = None,
         memory_path: Path | None = None,
         has_clock: bool = True,
+        clock_start_ms: int = 0,
         judge: Judge = judge_by_geometry,
+        faults: FaultPlan | None = None,
+        pace: Pace | None = None,
         on_accepted: Callable[[AcceptedContour], None] = lambda contour: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        cap_library_log()
         self.verdict = Verdict()
         self.judge = judge
+        self.faults = faults or FaultPlan()
+        self.pace = pace or Pace()
+        self.scan_s = scan_s
+        self._framing: FramingName = framing
         self._host = host
         self._port = port
         self._serial: tuple[str, int] | None = None
         self._device_id = device_id
         self._layout = layout or MailboxLayout()
-        self._scan_s = scan_s
         self._memory = RetainedMemory(memory_path)
         self._session_source = session_source or self._memory.count_session
         self._has_clock = has_clock
+        self._clock_start_ms = clock_start_ms
         self._on_accepted = on_accepted
         self._now = now
         self._registers = [0] * REGISTERS
         self._watch = ClientWatch(self._layout, self.verdict)
+        self._window = RegisterWindow(self._registers, self._layout, self._watch)
         self._program = self._new_program()
-        self._run_since = 0.0
+        self._run_since = self._began = 0.0
         self._halted = False
-        self._server: Server | None = None
+        self._server: RegisterServer | None = None
         self._scanning: asyncio.Task[None] | None = None
 
     @classmethod
     def on_serial(cls, port: str, baudrate: int = 115200, **options: Any) -> SimulatedController:
-        """The same on serial port `port`: Modbus RTU, 8N1. options: as of the class, but for host and port."""
-        controller = cls(**options)
+        """The same on serial port `port`: Modbus RTU, 8N1. options: as of the class, but for host, port and framing."""
+        controller = cls(framing="rtu", **options)
         controller._serial = (port, baudrate)
         return controller
 
@@ -117,24 +125,23 @@ class SimulatedController:
     @property
     def port(self) -> int:
         """The TCP port that it listens on."""
-        sockets = getattr(self._server.transport, "sockets", ()) if self._server is not None else ()
-        if not sockets:
+        port = self._server.port if self._server is not None else None
+        if port is None:
             raise ControllerError("the simulated controller does not listen on TCP now. Start it first")
-        return int(sockets[0].getsockname()[1])
+        return port
 
     async def start(self) -> None:
         """Listen and run the program; raise ControllerUnavailable where the address cannot be had."""
         if self._server is not None:
             raise ControllerError("the simulated controller runs already. Stop it first")
         self._hand_on(self._memory.undelivered)
-        server = self._new_server()
-        try:
-            await server.serve_forever(background=True)
-        except RuntimeError as error:  # the library turns every reason into this one
-            raise ControllerUnavailable(
-                f"cannot serve on {self._where()}. Check that it exists here, is free, and may be used"
-            ) from error
+        server = RegisterServer(self, self._framing, self.faults)
+        if self._serial is None:
+            await server.listen(self._host, self._port)
+        else:
+            server.open_line(*self._serial)
         self._server = server
+        self._began = self._now()
         self._run_since = self._now()
         self._scanning = asyncio.create_task(self._scan_for_ever(), name="simulated controller")
 
@@ -143,7 +150,7 @@ class SimulatedController:
         server, self._server = self._server, None
         scanning, self._scanning = self._scanning, None
         if server is not None:
-            await server.shutdown()  # type: ignore[no-untyped-call]
+            await server.stop()
         if scanning is not None:
             scanning.cancel()
             await asyncio.wait([scanning])
@@ -205,6 +212,8 @@ class SimulatedController:
             new_session=self._session_source,
             judge=self._judged,
             has_clock=self._has_clock,
+            clock_start_ms=self._clock_start_ms,
+            pace=self.pace,
         )
 
     def _judged(self, contour: AcceptedContour) -> int:
@@ -214,13 +223,13 @@ class SimulatedController:
         while True:
             if not self._halted:
                 self._scan()
-            await asyncio.sleep(self._scan_s)
+            await asyncio.sleep(self.scan_s)
 
     def _scan(self) -> None:
         now = self._now()
         program = self._program
         contour = program.scan(int((now - self._run_since) * 1000))
-        self._watch.tick(now)
+        self._watch.tick(now, *self._window.trigger)
         for _, answer in program.answered:
             self.verdict.answers[answer] += 1
         program.answered.clear()
@@ -233,80 +242,37 @@ class SimulatedController:
             self._on_accepted(contour)
             self._memory.delivered()
 
-    def _where(self) -> str:
-        return f"{self._host}:{self._port}" if self._serial is None else f"serial port {self._serial[0]}"
+    # --- what the server asks -----------------------------------------------------------------------------------
 
-    def _new_server(self) -> Server:
-        devices = [
-            _device(self._device_id, self._serve),
-            _device(0, _serve_nobody),  # every other device id
-        ]
-        if self._serial is None:
-            return ModbusTcpServer(
-                devices,
-                address=(self._host, self._port),
-                trace_pdu=self._look_at_request,
-                trace_connect=self._watch.connection,
-            )
-        port, baudrate = self._serial
-        return ModbusSerialServer(
-            devices,
-            port=port,
-            baudrate=baudrate,
-            ignore_missing_devices=True,  # other devices on the line answer for themselves
-            trace_pdu=self._look_at_request,
-        )
+    def answer(self, request: Request) -> bytes | None:
+        """The PDU of the reply to a request; None where it is for another device on a line."""
+        if request.unit != self._device_id:
+            return None if self._framing == "rtu" else bytes([request.pdu[0] | 0x80, NO_SUCH_DEVICE])
+        self.verdict.requests += 1
+        return self._window.answer(request.pdu, self._now())
 
-    def _look_at_request(self, sending: bool, pdu: ModbusPDU) -> ModbusPDU:
-        """The library's hook for each message; over-long writes never come as far as `_serve`."""
-        if not sending and pdu.function_code == 16 and pdu.count > LONGEST_WRITE:
-            self._watch.too_long(pdu.address, pdu.count)
-        return pdu
+    def answer_late(self, request: Request) -> None:
+        """Do a write that the line or the server kept back: none of the client's doing, so nobody judges it."""
+        self._window.store_late(request.pdu)
 
-    async def _serve(
-        self,
-        function_code: int,
-        start_address: int,
-        address: int,
-        count: int,
-        shown: list[int],
-        values: list[int] | list[bool] | None,
-    ) -> ExcCodes | None:
-        """The library's hook for each request, before it looks into its own store: ours is the one that counts."""
-        if function_code not in KNOWN_FUNCTIONS:
-            self._watch.foreign_function(function_code)
-            return ExcCodes.ILLEGAL_FUNCTION
-        if values is None:
-            if not any(start <= address and address + count <= end for start, end in self._readable()):
-                return ExcCodes.ILLEGAL_ADDRESS
-            offset = address - start_address
-            shown[offset : offset + count] = self._registers[address : address + count]
+    def strike(self, request: Request) -> Fault | None:
+        """The fault that befalls the request."""
+        if request.unit != self._device_id:
             return None
-        if not self._watch.write(function_code, address, values, self._registers, self._now()):
-            return ExcCodes.ILLEGAL_ADDRESS
-        self._registers[address : address + count] = values
-        return None
+        fault = self.faults.strike(targets_of(request.pdu, self._layout), self._now() - self._began)
+        if fault is not None:
+            self.verdict.faults[fault.name] += 1
+            self._watch.excuse()
+        return fault
 
-    def _readable(self) -> list[tuple[int, int]]:
-        """Ranges that one request may read: the blocks, joined where they touch."""
-        joined: list[tuple[int, int]] = []
-        for start, end in sorted(self._layout.blocks.values()):
-            if joined and joined[-1][1] == start:
-                joined[-1] = (joined[-1][0], end)
-            else:
-                joined.append((start, end))
-        return joined
+    def unanswered(self, request: Request) -> None:
+        """The request's reply never leaves."""
+        self._watch.unanswered(request.pdu[0], int.from_bytes(request.pdu[1:3], "big"))
 
+    def too_early(self, request: Request) -> None:
+        """The request came on a connection that owes a reply."""
+        self._watch.too_early(request.pdu[0])
 
-Action = Callable[[int, int, int, int, list[int], list[int] | list[bool] | None], Awaitable[ExcCodes | None]]
-
-
-def _device(device_id: int, action: Action) -> SimDevice:
-    store = SimData(0, count=REGISTERS, values=0, datatype=DataType.REGISTERS)
-    return SimDevice(device_id, simdata=[store], action=action)  # type: ignore[arg-type]
-
-
-async def _serve_nobody(
-    function_code: int, start: int, address: int, count: int, shown: list[int], values: list[int] | list[bool] | None
-) -> ExcCodes | None:
-    raise NoSuchIdException("no device of this id")
+    def connection(self, up: bool) -> None:
+        """A client came or went."""
+        self._watch.connection(up)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import IntEnum
 
 from drivers.controller.errors import ControllerError
@@ -41,11 +43,24 @@ class TriggerNotPossible(ControllerError):
     """The protocol does not let the controller request a measurement now."""
 
 
+@dataclass(frozen=True)
+class Pace:
+    """How many scans the program takes for a page, within what the protocol allows.
+
+    copy_scans: copying header and payload, a part a scan: what is written meanwhile makes a torn copy.
+    check_scans: from the copy to the answer. stepwise: the fields of an answer are written one a scan.
+    """
+
+    copy_scans: int = 1
+    check_scans: int = 0
+    stepwise: bool = False
+
+
 class ControllerProgram:
     """One run of the controller's program over its registers, from the start sequence on.
 
     registers: all holding registers, changed in place. state: `controller_state` from the next scan on.
-    judge: 1, 4 or 7 for a contour that is otherwise in order.
+    judge: 1, 4 or 7 for a contour that is otherwise in order. pace: see Pace; it may be changed between scans.
     """
 
     def __init__(
@@ -58,8 +73,11 @@ class ControllerProgram:
         new_session: Callable[[], int],
         judge: Judge,
         has_clock: bool = True,
+        clock_start_ms: int = 0,
+        pace: Pace | None = None,
     ) -> None:
         self.state = READY
+        self.pace = pace or Pace()
         self.answered: list[tuple[int, int]] = []
         self._registers = registers
         self._layout = layout
@@ -68,7 +86,11 @@ class ControllerProgram:
         self._new_session = new_session
         self._judge = judge
         self._has_clock = has_clock
+        self._clock_start_ms = clock_start_ms
         self._scans = 0
+        self._copied: list[int] = []
+        self._checks_left = 0
+        self._to_write: deque[dict[int, int]] = deque()
         self._session = 0
         self._clock = 0
         self._assembly = Assembly()
@@ -86,10 +108,13 @@ class ControllerProgram:
         self._registers[self._layout.link_address + offset] = value & 0xFFFF
 
     def _set32(self, offset: int, value: int) -> None:
-        high, low = value >> 16 & 0xFFFF, value & 0xFFFF
-        first, second = (high, low) if self._layout.word_order == "big" else (low, high)
+        first, second = self._words(value)
         self._set(offset, first)
         self._set(offset + 1, second)
+
+    def _words(self, value: int) -> tuple[int, int]:
+        high, low = value >> 16 & 0xFFFF, value & 0xFFFF
+        return (high, low) if self._layout.word_order == "big" else (low, high)
 
     @property
     def _last_job(self) -> int:
@@ -111,7 +136,7 @@ class ControllerProgram:
         self._set(1, self._link(1) + 1)
         self._set(0, self.state)
         if self._has_clock:
-            self._clock = run_ms % MODULUS
+            self._clock = (self._clock_start_ms + run_ms) % MODULUS
             self._set32(14, self._clock)
         self._look_at_service()
         return self._look_at_contour()
@@ -178,23 +203,51 @@ class ControllerProgram:
     # --- the contour block --------------------------------------------------------------------------------------
 
     def _look_at_contour(self) -> AcceptedContour | None:
-        start, end = self._layout.blocks["contour_address"]
-        transfer = self._registers[start]
-        if transfer in (0, self._link(6)):
+        if self._to_write:
+            self._write_answer()
             return None
-        copy = PageCopy(self._registers[start:end], self._layout.word_order)
+        block = self._copy()
+        if block is None:
+            return None
+        copy = PageCopy(block, self._layout.word_order)
         reply, contour = self._reply(copy)
         if reply in FINAL and copy.job_id > self._last_job and (contour or reply != Reply.ACCEPTED):
             self._memory.keep_answer(copy.job_id, reply, contour)
-            self._set(12, reply)
-            self._set32(10, copy.job_id)
+            first, second = self._words(copy.job_id)
+            self._to_write += [{12: reply}, {10: first, 11: second}]
             self._assembly.drop()
             if copy.trigger and copy.trigger == self._link(2):
                 self._trigger_open = False
-        self._set(7, reply)
-        self._set(6, transfer)
+        self._to_write += [{7: reply}, {6: copy.transfer}]
         self.answered.append((copy.job_id, reply))
+        self._write_answer()
         return contour
+
+    def _copy(self) -> list[int] | None:
+        """Header and payload as copied, once the last part of them was, and checked for long enough; else None."""
+        start, end = self._layout.blocks["contour_address"]
+        if not self._copied and self._registers[start] in (0, self._link(6)):
+            return None
+        if len(self._copied) < end - start:
+            part = -(-(end - start) // max(1, self.pace.copy_scans))
+            here = start + len(self._copied)
+            self._copied += self._registers[here : min(here + part, end)]
+            self._checks_left = self.pace.check_scans
+            if len(self._copied) < end - start:
+                return None
+        if self._checks_left > 0:
+            self._checks_left -= 1
+            return None
+        block, self._copied = self._copied, []
+        return block
+
+    def _write_answer(self) -> None:
+        """Write the next field of the answer, or all of them, in the protocol's order; a 32-bit one is never halved."""
+        while self._to_write:
+            for offset, value in self._to_write.popleft().items():
+                self._set(offset, value)
+            if self.pace.stepwise:
+                return
 
     def _reply(self, copy: PageCopy) -> tuple[int, AcceptedContour | None]:
         """The first answer that holds, in the protocol's order; with an acceptance of the last page the contour."""

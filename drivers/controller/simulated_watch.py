@@ -9,6 +9,7 @@ from drivers.controller.simulated_contour import HEADER, AcceptedContour, PageCo
 from drivers.controller.simulated_verdict import Verdict
 
 HEARTBEAT_LIMIT_S = 1.0
+OWNER_PAUSE_S = 3.0  # so long a foreign service watches before it takes over
 LONGEST_WRITE = 123
 TEST_VALUE = 16909060
 # Header offsets at which a request may begin or end: between values, and not within an x,y pair of the bounding box.
@@ -32,6 +33,13 @@ class ClientWatch:
         self._job = 0
         self._job_session = 0
         self._pages: dict[int, tuple[int, ...]] = {}
+        self._lost_write: str | None = None
+        self._transfer: int | None = None  # as the client wrote it: late writes of the line's are not its own
+        self._service: tuple[int, ...] | None = None
+        self._owner = 0
+        self._owner_at = 0.0
+        self._settled = 0
+        self._counters: tuple[int, set[int]] = (0, set())
 
     # --- connection and heartbeat -------------------------------------------------------------------------------
 
@@ -40,8 +48,13 @@ class ClientWatch:
         self._connections += 1 if up else -1
         self._beat = None
 
-    def tick(self, now: float) -> None:
+    def excuse(self) -> None:
+        """A fault was done to the client: the pause between its heartbeats starts anew."""
+        self._beat = None
+
+    def tick(self, now: float, session: int, trigger_counter: int) -> None:
         """Look for a heartbeat that stands still. A serial line shows no connections, so there it is not judged."""
+        self._issued(session, trigger_counter)
         if self._connections > 0 and self._beat is not None and now - self._beat_at > HEARTBEAT_LIMIT_S:
             self._gap(now - self._beat_at)
 
@@ -60,6 +73,16 @@ class ClientWatch:
 
     # --- requests -----------------------------------------------------------------------------------------------
 
+    def unanswered(self, function_code: int, address: int) -> None:
+        """A request's reply never leaves: of the contour block, only `transfer` = 0 may be written next."""
+        start, end = self._layout.blocks["contour_address"]
+        if function_code != 3 and start <= address < end:
+            self._lost_write = f"FC{function_code} at {address}"
+
+    def too_early(self, function_code: int) -> None:
+        """A request on a connection that owes a reply."""
+        self._verdict.note("too-early", f"FC{function_code} while the reply to the request before is outstanding")
+
     def too_long(self, address: int, count: int) -> None:
         """An FC16 beyond the standard's limit; it was refused."""
         self._verdict.note("request-too-long", f"{count} registers at {address}, {LONGEST_WRITE} at most")
@@ -74,18 +97,26 @@ class ClientWatch:
         service, service_end = self._layout.blocks["service_address"]
         contour, contour_end = self._layout.blocks["contour_address"]
         if service <= address and end <= service_end:
-            self._service_write(function_code, address, values, now)
+            self._service_write(function_code, address, values, held, now)
         elif contour <= address and end <= contour_end:
             self._contour_write(function_code, address - contour, values, held)
         else:
-            self._verdict.note("outside-blocks", f"FC{function_code} of {len(values)} registers at {address}")
+            self._verdict.note(
+                "outside-blocks", f"FC{function_code} of {len(values)} registers at {address}", address, values
+            )
             return False
         return True
 
-    def _service_write(self, function_code: int, address: int, values: Sequence[int], now: float) -> None:
+    def _service_write(
+        self, function_code: int, address: int, values: Sequence[int], held: Sequence[int], now: float
+    ) -> None:
         if function_code != 16 or len(values) != 16:
-            self._verdict.note("service-block-partial", f"FC{function_code} of {len(values)} registers at {address}")
+            text = f"FC{function_code} of {len(values)} registers at {address}"
+            self._verdict.note("service-block-partial", text, address, values)
             return
+        self._service = tuple(values)
+        self._trigger_acknowledged(values, held)
+        self._owned(values, now)
         self._heard_beat(values[2], now)
         test_value = u32(values, 8, self._layout.word_order)
         for name, seen, right in (
@@ -95,34 +126,64 @@ class ClientWatch:
             ("the reserved part", values[14:16], not any(values[14:16])),
         ):
             if not right:
-                self._verdict.note("service-block-content", f"{name} is {seen}")
+                self._verdict.note("service-block-content", f"{name} is {seen}", address, values)
+
+    def _trigger_acknowledged(self, values: Sequence[int], held: Sequence[int]) -> None:
+        link = self._layout.link_address
+        session, counter = held[link + 13], held[link + 2]
+        if session and values[10] == session and values[3] not in self._issued(session, counter):
+            text = f"trigger_ack {values[3]} of session {session}, whose trigger_counter is {counter}"
+            self._verdict.note("unknown-trigger-acknowledged", text, self._layout.service_address, values)
+
+    def _issued(self, session: int, counter: int) -> set[int]:
+        if self._counters[0] != session:
+            self._counters = (session, set())
+        self._counters[1].add(counter)
+        return self._counters[1]
+
+    def _owned(self, values: Sequence[int], now: float) -> None:
+        owner, job = values[11], u32(values, 6, self._layout.word_order)
+        settled = u32(values, 12, self._layout.word_order)
+        if owner != self._owner:
+            if self._owner and owner and now - self._owner_at < OWNER_PAUSE_S:
+                text = f"owner {owner} after {self._owner}, {now - self._owner_at:.1f} s later"
+                self._verdict.note("second-service", text, self._layout.service_address, values)
+        elif settled < self._settled or (owner and settled > job):
+            text = f"settled_job {settled} after {self._settled}, job_id {job}"
+            self._verdict.note("settled-went-down", text, self._layout.service_address, values)
+        self._owner, self._owner_at, self._settled = owner, now, settled
 
     def _contour_write(self, function_code: int, offset: int, values: Sequence[int], held: Sequence[int]) -> None:
         contour = self._layout.contour_address
-        transfer = held[contour]
+        transfer = held[contour] if self._transfer is None else self._transfer
+        if self._lost_write and (offset, function_code, values[0]) != (0, 6, 0):
+            text = f"FC{function_code} at {contour + offset}, after the unanswered {self._lost_write}"
+            self._verdict.note("went-on-after-lost-reply", text, contour + offset, values)
+        self._lost_write = None
         if offset == 0:
             if function_code == 6:
-                self._commit(values[0], held)
+                self._commit(values[0], transfer, held)
+                self._transfer = values[0]
             else:
-                self._verdict.note(
-                    "transfer-not-alone", f"FC{function_code} of {len(values)} registers from transfer on"
-                )
+                text = f"FC{function_code} of {len(values)} registers from transfer on"
+                self._verdict.note("transfer-not-alone", text, contour, values)
             return
         if function_code == 6:
-            self._verdict.note("page-by-single-registers", f"FC6 at offset {offset}")
+            self._verdict.note("page-by-single-registers", f"FC6 at offset {offset}", contour + offset, values)
         if transfer != 0:
-            self._verdict.note("written-while-valid", f"offset {offset} while transfer was {transfer}")
+            text = f"offset {offset} while transfer was {transfer}"
+            self._verdict.note("written-while-valid", text, contour + offset, values)
         self._cuts |= {offset, offset + len(values)}
 
-    def _commit(self, transfer: int, held: Sequence[int]) -> None:
+    def _commit(self, transfer: int, before: int, held: Sequence[int]) -> None:
         if transfer == 0:
             self._cuts = set()
             return
         layout = self._layout
         block = held[layout.contour_address : layout.blocks["contour_address"][1]]
         copy = PageCopy(block, layout.word_order)
-        if block[0] != 0:
-            self._verdict.note("commit-without-clearing", f"transfer {transfer} over {block[0]}")
+        if before != 0:
+            self._verdict.note("commit-without-clearing", f"transfer {transfer} over {before}")
         acknowledged = held[layout.link_address + 6]
         if transfer == self._last_transfer and copy.content != self._last_content:
             self._verdict.note("transfer-reused", f"transfer {transfer}, job {copy.job_id} page {copy.page}")
@@ -130,13 +191,15 @@ class ClientWatch:
             self._verdict.note("transfer-not-new", f"transfer {transfer}, ack_transfer {acknowledged}")
         self._last_transfer, self._last_content = transfer, copy.content
         split = sorted(cut for cut in self._cuts if not _may_be_cut(cut, copy))
-        if split and copy.job_id:  # job 0: the program has restarted and cleared the page in between
+        # A wrong CRC: the page is torn by what came late, or by a restart in between, and its values cannot be told.
+        if split and copy.payload_length <= layout.payload_capacity and copy.crc_is_right():
             self._verdict.note("value-split", f"requests begin or end at offsets {split} of job {copy.job_id}")
 
     # --- pages --------------------------------------------------------------------------------------------------
 
     def page(self, copy: PageCopy, service_block: Sequence[int], session: int) -> None:
         """Judge a page whose CRC is right; `service_block` as it stands now, `session` the controller's."""
+        service_block = self._service or service_block
         if copy.job_id == 0 or copy.job_id < self._highest_job:
             self._verdict.note("job-went-down", f"job {copy.job_id} after job {self._highest_job}")
         if copy.job_id != self._job:

@@ -178,7 +178,7 @@ def test_a_verdict_counts_on_but_keeps_a_bounded_number_of_texts() -> None:
         verdict.note("value-split", f"text {number}")
     written = json.loads(json.dumps(verdict.as_json()))
     assert written["violations"][0]["count"] == 1000
-    assert len(written["violations"][0]["texts"]) == 20
+    assert len(written["violations"][0]["seen"]) == 20
     assert not written["clean"]
 
 

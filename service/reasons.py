@@ -1,6 +1,7 @@
-"""Why a job was not accepted: name, code, outcome, a sentence, and what a person does next.
+"""Why a job was not accepted: name, code, outcome, what it means, and what a person does next, in each language.
 
-The one table behind registers, journal, serial replies, log and commands; codes and names are the protocol's.
+The one table behind registers, journal, serial replies, log, commands and docs/reasons.md
+(`python -m service.reasons_page docs/reasons.md`); codes and names are the protocol's.
 """
 
 from __future__ import annotations
@@ -16,6 +17,13 @@ class Outcome(StrEnum):
     WRITTEN = "written"
     REFUSED = "refused"
     FAILED = "failed"
+
+
+class Language(StrEnum):
+    """Languages that reasons are told in."""
+
+    ENGLISH = "en"
+    RUSSIAN = "ru"
 
 
 class Reason(IntEnum):
@@ -62,6 +70,10 @@ class Reason(IntEnum):
         refused = Reason.STALE_FRAME <= self <= Reason.SENTINEL_MOVED or self is Reason.CONTROLLER_REFUSED
         return Outcome.REFUSED if refused else Outcome.FAILED
 
+    def explained(self, language: Language = Language.ENGLISH) -> Explanation:
+        """What the reason means and what to do next."""
+        return _TABLE[self][0 if language is Language.ENGLISH else 1]
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -70,84 +82,209 @@ class Explanation:
     sentence: str
     next_action: str
 
+    def __str__(self) -> str:
+        return f"{self.sentence} {self.next_action}"
 
-EXPLANATIONS: dict[Reason, Explanation] = {
-    Reason.NO_FRAME: Explanation(
-        "The camera gave no usable picture.", "Check the camera's power and cable, or the file it reads."
+
+# English and Russian of each reason.
+_TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
+    Reason.NO_FRAME: (
+        Explanation("The camera gave no usable picture.", "Check the camera's power and cable, or the file it reads."),
+        Explanation("Камера не дала пригодного снимка.", "Проверьте питание и кабель камеры или файл снимка."),
     ),
-    Reason.STALE_FRAME: Explanation(
-        "The picture was exposed before the trigger.", "Trigger again; if it comes back, check the camera's driver."
+    Reason.STALE_FRAME: (
+        Explanation(
+            "The picture was exposed before the trigger.", "Trigger again; if it comes back, check the camera's driver."
+        ),
+        Explanation(
+            "Снимок сделан раньше команды на измерение.",
+            "Запустите измерение снова; если повторится, проверьте драйвер камеры.",
+        ),
     ),
-    Reason.IMAGE_QUALITY: Explanation(
-        "The picture is too blurred, too dark or too bright.", "Clean the lens, check focus, exposure and light."
+    Reason.IMAGE_QUALITY: (
+        Explanation(
+            "The picture is too blurred, too dark, too bright or too flat, or the light is not as it was taught.",
+            "Clean the lens, check focus, exposure and lamp; after a lasting change of light teach the table again.",
+        ),
+        Explanation(
+            "Снимок нерезкий, слишком тёмный, засвеченный или малоконтрастный, либо свет не тот, что при обучении.",
+            "Протрите объектив, проверьте фокус, выдержку и лампу; если свет изменили навсегда, обучите стол заново.",
+        ),
     ),
-    Reason.SCENE_MOVED: Explanation("The scene moved while it was measured.", "Keep hands away and trigger again."),
-    Reason.NO_BLOCK_FOUND: Explanation(
-        "No block was found in the picture.", "Check that a block lies on the table, the light, and the recipe."
+    Reason.SCENE_MOVED: (
+        Explanation(
+            "The scene moved: during the measurement, or the camera or the table since it was taught.",
+            "Keep hands away and trigger again; if camera or table were moved, calibrate and teach the table again.",
+        ),
+        Explanation(
+            "Картина сместилась: во время измерения или после обучения сдвинули камеру либо стол.",
+            "Уберите руки и запустите снова; если сдвинули камеру или стол, откалибруйте и обучите стол заново.",
+        ),
     ),
-    Reason.TOUCHES_BORDER: Explanation(
-        "The block's contour reaches the edge of the picture.", "Move the block to the middle of the camera's view."
+    Reason.NO_BLOCK_FOUND: (
+        Explanation(
+            "No block was found in the picture.", "Check that a block lies on the table, the light, and the recipe."
+        ),
+        Explanation(
+            "На снимке не найдена заготовка.", "Проверьте, лежит ли заготовка на столе, а также свет и рецепт."
+        ),
     ),
-    Reason.AREA_OUT_OF_LIMITS: Explanation(
-        "The contour's area is outside the recipe's limits.", "Check that the right block lies there, or the recipe."
+    Reason.TOUCHES_BORDER: (
+        Explanation(
+            "The block's contour reaches the edge of the picture or of the region of interest.",
+            "Move the block to the middle of the camera's view.",
+        ),
+        Explanation(
+            "Контур заготовки доходит до края снимка или рабочей области кадра.",
+            "Сдвиньте заготовку к середине поля зрения камеры.",
+        ),
     ),
-    Reason.METHODS_DISAGREE: Explanation(
-        "An independent estimate of the contour differs too much.", "Check light and table; look at the overlay."
+    Reason.AREA_OUT_OF_LIMITS: (
+        Explanation(
+            "The contour's area is outside the recipe's limits.",
+            "Check that the right block lies there, or the recipe.",
+        ),
+        Explanation(
+            "Площадь контура вне пределов рецепта.", "Проверьте, та ли заготовка лежит на столе и тот ли выбран рецепт."
+        ),
     ),
-    Reason.UNCERTAINTY_TOO_LARGE: Explanation(
-        "The contour is less certain than the recipe allows.", "Check light, focus and the block's edge."
+    Reason.METHODS_DISAGREE: (
+        Explanation(
+            "An independent estimate of the contour differs too much.",
+            "Remove what lies against the block, check light and table, and look at the overlay.",
+        ),
+        Explanation(
+            "Независимая оценка контура слишком отличается.",
+            "Уберите посторонние предметы у заготовки, проверьте свет и стол, посмотрите контур на снимке.",
+        ),
     ),
-    Reason.OUTSIDE_WORK_AREA: Explanation(
-        "The contour leaves the machine's work area.", "Move the block into the work area."
+    Reason.UNCERTAINTY_TOO_LARGE: (
+        Explanation("The contour is less certain than the recipe allows.", "Check light, focus and the block's edge."),
+        Explanation("Погрешность контура больше, чем допускает рецепт.", "Проверьте свет, фокус и кромку заготовки."),
     ),
-    Reason.SEVERAL_BLOCKS: Explanation(
-        "More than one block lies on the table.", "Leave one block on the table, or use a recipe for several."
+    Reason.OUTSIDE_WORK_AREA: (
+        Explanation("The contour leaves the machine's work area.", "Move the block into the work area."),
+        Explanation("Контур выходит за рабочую зону станка.", "Переложите заготовку в рабочую зону."),
     ),
-    Reason.BUSY: Explanation("A job is being executed.", "Wait for it to end and trigger again."),
-    Reason.NOT_READY: Explanation(
-        "The service or the controller is not ready.", "See the service's state and its reason."
+    Reason.SEVERAL_BLOCKS: (
+        Explanation(
+            "More than one block lies on the table.",
+            "Leave one block on the table, or use a recipe with pieces: largest.",
+        ),
+        Explanation(
+            "На столе больше одной заготовки.",
+            "Оставьте на столе одну заготовку или выберите рецепт с pieces: largest.",
+        ),
     ),
-    Reason.UNKNOWN_RECIPE: Explanation(
-        "The trigger names a recipe that the configuration does not have.", "Add the recipe, or correct its number."
+    Reason.BUSY: (
+        Explanation("A job is being executed.", "Wait for it to end and trigger again."),
+        Explanation("Выполняется другое задание.", "Дождитесь его конца и запустите измерение снова."),
     ),
-    Reason.TOO_MANY_POINTS: Explanation(
-        "The contour has more vertices than the recipe or the mailbox holds.",
-        "Raise tolerance_mm, max_vertices or payload_capacity.",
+    Reason.NOT_READY: (
+        Explanation("The service or the controller is not ready.", "See the service's state and its reason."),
+        Explanation("Служба или станок не готовы.", "Посмотрите состояние службы и причину."),
     ),
-    Reason.SELF_INTERSECTING: Explanation(
-        "The contour crosses itself or its holes.", "Look at the overlay; check light and method."
+    Reason.UNKNOWN_RECIPE: (
+        Explanation(
+            "The trigger names a recipe that the configuration does not have.", "Add the recipe, or correct its number."
+        ),
+        Explanation("Запрошенного рецепта нет в настройках.", "Добавьте рецепт или исправьте его номер."),
     ),
-    Reason.CALIBRATION_MISSING: Explanation(
-        "There is no calibration file, so pixels cannot become millimetres.", "Calibrate, and name the file."
+    Reason.TOO_MANY_POINTS: (
+        Explanation(
+            "The contour has more vertices than the recipe or the mailbox holds.",
+            "Raise tolerance_mm, max_vertices or payload_capacity.",
+        ),
+        Explanation(
+            "В контуре больше вершин, чем допускает рецепт или вмещают регистры.",
+            "Увеличьте tolerance_mm, max_vertices или payload_capacity.",
+        ),
     ),
-    Reason.CALIBRATION_MISMATCH: Explanation(
-        "The calibration does not fit the camera or the picture.", "Use the file made for this camera and resolution."
+    Reason.SELF_INTERSECTING: (
+        Explanation("The contour crosses itself or its holes.", "Look at the overlay; check light and method."),
+        Explanation(
+            "Контур пересекает сам себя или свои отверстия.", "Посмотрите контур на снимке; проверьте свет и метод."
+        ),
     ),
-    Reason.SENTINEL_MOVED: Explanation(
-        "A fixed mark is not where the calibration saw it.", "Check that the camera was not moved; calibrate again."
+    Reason.CALIBRATION_MISSING: (
+        Explanation(
+            "There is no calibration file, so pixels cannot become millimetres.", "Calibrate, and name the file."
+        ),
+        Explanation(
+            "Нет файла калибровки: пиксели не перевести в миллиметры.",
+            "Откалибруйте камеру и укажите файл в настройках.",
+        ),
     ),
-    Reason.CONTROLLER_TIMEOUT: Explanation(
-        "The controller did not answer in time; the job was withdrawn.", "Check the controller's program."
+    Reason.CALIBRATION_MISMATCH: (
+        Explanation(
+            "The calibration does not fit the camera or the picture.",
+            "Use the file made for this camera and resolution.",
+        ),
+        Explanation(
+            "Калибровка не подходит к камере или снимку.", "Возьмите файл, сделанный для этой камеры и её разрешения."
+        ),
     ),
-    Reason.CONTROLLER_REFUSED: Explanation(
-        "The controller refused the contour.", "See its answer at the controller or in the journal."
+    Reason.SENTINEL_MOVED: (
+        Explanation(
+            "A fixed mark is not where the calibration saw it.",
+            "Check that the camera was not moved; calibrate again.",
+        ),
+        Explanation(
+            "Контрольная метка не там, где была при калибровке.",
+            "Проверьте, не сдвинута ли камера; откалибруйте заново.",
+        ),
     ),
-    Reason.CONTROLLER_LOST: Explanation(
-        "The connection to the controller was lost.", "Check the controller's power, cable and address."
+    Reason.CONTROLLER_TIMEOUT: (
+        Explanation("The controller did not answer in time; the job was withdrawn.", "Check the controller's program."),
+        Explanation("Контроллер станка не ответил вовремя; задание отозвано.", "Проверьте программу контроллера."),
     ),
-    Reason.CONTROLLER_RESTARTED: Explanation(
-        "The controller's program restarted during the job.", "Trigger again; check whether it had accepted before."
+    Reason.CONTROLLER_REFUSED: (
+        Explanation("The controller refused the contour.", "See its answer at the controller or in the journal."),
+        Explanation("Контроллер станка отклонил контур.", "Посмотрите его ответ на станке или в журнале."),
     ),
-    Reason.SERVICE_RESTARTED: Explanation("The service restarted during the job.", "Trigger again."),
-    Reason.OTHER_SERVICE: Explanation(
-        "Another service writes to this controller.", "Stop one of the two; one controller has one service."
+    Reason.CONTROLLER_LOST: (
+        Explanation("The connection to the controller was lost.", "Check the controller's power, cable and address."),
+        Explanation("Потеряна связь с контроллером станка.", "Проверьте питание, кабель и адрес контроллера."),
     ),
-    Reason.EXPIRED: Explanation(
-        "The contour became too old before the controller took it.", "Check why the controller was not ready."
+    Reason.CONTROLLER_RESTARTED: (
+        Explanation(
+            "The controller's program restarted during the job.", "Trigger again; check whether it had accepted before."
+        ),
+        Explanation(
+            "Программа контроллера перезапустилась во время задания.",
+            "Запустите измерение снова; проверьте, не принял ли станок контур раньше.",
+        ),
     ),
-    Reason.STORAGE_FULL: Explanation("The disk is full.", "Free space on the state and archive disk."),
-    Reason.ABORTED: Explanation("The job was ended by a halt or shutdown.", "Trigger again when the service is Ready."),
-    Reason.INTERNAL_ERROR: Explanation(
-        "The service met an error of its own.", "Keep the log and the picture, and report them."
+    Reason.SERVICE_RESTARTED: (
+        Explanation("The service restarted during the job.", "Trigger again."),
+        Explanation("Служба перезапустилась во время задания.", "Запустите измерение снова."),
+    ),
+    Reason.OTHER_SERVICE: (
+        Explanation(
+            "Another service writes to this controller.", "Stop one of the two; one controller has one service."
+        ),
+        Explanation(
+            "В этот контроллер пишет другая служба.", "Остановите одну из двух: у контроллера может быть одна служба."
+        ),
+    ),
+    Reason.EXPIRED: (
+        Explanation(
+            "The contour became too old before the controller took it.", "Check why the controller was not ready."
+        ),
+        Explanation("Контур устарел раньше, чем станок его принял.", "Проверьте, почему станок был не готов."),
+    ),
+    Reason.STORAGE_FULL: (
+        Explanation("The disk is full.", "Free space on the state and archive disk."),
+        Explanation("Диск заполнен.", "Освободите место на диске журнала и архива."),
+    ),
+    Reason.ABORTED: (
+        Explanation("The job was ended by a halt or shutdown.", "Trigger again when the service is Ready."),
+        Explanation(
+            "Задание прервано остановкой службы.", "Запустите измерение, когда служба будет в состоянии Ready."
+        ),
+    ),
+    Reason.INTERNAL_ERROR: (
+        Explanation("The service met an error of its own.", "Keep the log and the picture, and report them."),
+        Explanation("Внутренняя ошибка службы.", "Сохраните журнал и снимок и сообщите разработчику."),
     ),
 }

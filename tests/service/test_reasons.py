@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from service.reasons import EXPLANATIONS, Outcome, Reason
+from contour.acceptance import Refusal
+from service.cli.main import main
+from service.reasons import Language, Outcome, Reason
+from service.reasons_page import page
 
+ROOT = Path(__file__).parents[2]
 # written from the protocol's table
 PROTOCOL = {
     100: "no_frame", 101: "stale_frame", 102: "image_quality", 103: "scene_moved", 110: "no_block_found",
@@ -28,8 +34,44 @@ def test_outcome_is_refused_for_101_to_142_and_151_and_failed_for_the_others(cod
     assert Reason(code).outcome is (Outcome.REFUSED if refused else Outcome.FAILED)
 
 
-def test_each_reason_tells_what_it_means_and_what_to_do_next() -> None:
-    assert set(EXPLANATIONS) == set(Reason)
-    for explanation in EXPLANATIONS.values():
-        assert explanation.sentence.endswith(".")
-        assert explanation.next_action.endswith(".")
+@pytest.mark.parametrize("language", list(Language))
+def test_each_reason_tells_what_it_means_and_what_to_do_next(language: Language) -> None:
+    texts = []
+    for reason in Reason:
+        told = reason.explained(language)
+        assert told.sentence.endswith(".")
+        assert told.next_action.endswith(".")
+        texts.append(told.sentence)
+    assert len(set(texts)) == len(texts)
+
+
+def test_russian_is_russian_and_english_is_not() -> None:
+    for reason in Reason:
+        letters = [letter for letter in str(reason.explained(Language.RUSSIAN)) if letter.isalpha()]
+        assert sum("а" <= letter.lower() <= "я" or letter.lower() == "ё" for letter in letters) > 0.5 * len(letters)
+        assert str(reason.explained(Language.ENGLISH)).isascii()
+
+
+def test_what_the_core_refuses_for_stands_in_the_table_under_the_same_name() -> None:
+    assert {int(refusal): refusal.reason for refusal in Refusal}.items() <= PROTOCOL.items()
+
+
+def test_the_docs_page_is_fresh() -> None:
+    fresh = "python -m service.reasons_page docs/reasons.md"
+    assert (ROOT / "docs" / "reasons.md").read_text(encoding="utf-8") == page(), f"write it anew: {fresh}"
+
+
+def test_the_command_prints_all_reasons_or_those_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reasons"]) == 0
+    printed = capsys.readouterr().out
+    for code, name in PROTOCOL.items():
+        assert f"{code} {name} (" in printed
+    assert main(["reasons", "--language", "ru", "touches_border", "121"]) == 0
+    printed = capsys.readouterr().out
+    assert [line.split()[0] for line in printed.splitlines() if not line.startswith(" ")] == ["111", "121"]
+    assert Reason.TOUCHES_BORDER.explained(Language.RUSSIAN).next_action in printed
+
+
+def test_a_reason_that_there_is_not_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reasons", "999"]) == 2
+    assert "999: there is no such reason" in capsys.readouterr().err

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 
 from drivers.controller.pages import HEADER_FIELDS, HEADER_REGISTERS, REGISTERS_PER_POINT
 
-LONGEST_WRITE = 123  # registers in one FC16: MODBUS Application Protocol V1.1b3, 6.12
-LONGEST_READ = 125  # registers in one FC3: 6.3
 PAYLOAD_OFFSET = 1 + HEADER_REGISTERS
 _HEADER_STARTS = [field.offset for field in HEADER_FIELDS if field.name not in ("min_y", "max_y")]
 

@@ -1,24 +1,17 @@
-"""The controller over Modbus TCP: one attempt a call. Reconnecting, repeating and waiting are the caller's."""
+"""The controller over Modbus TCP, RTU, or RTU over TCP: one attempt a call. All policy is the caller's."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Sequence
+import secrets
+import struct
+from collections.abc import Sequence
 
-from pymodbus.client import AsyncModbusTcpClient
-from pymodbus.exceptions import ModbusException, ModbusIOException
-from pymodbus.pdu import ModbusPDU
-
-from drivers.controller.chunks import LONGEST_READ, LONGEST_WRITE, PAYLOAD_OFFSET, page_starts, spans
-from drivers.controller.errors import (
-    ControllerError,
-    ControllerNonsense,
-    ControllerRefused,
-    ControllerTimeout,
-    ControllerUnavailable,
-    MailboxError,
-)
+from drivers.controller.chunks import PAYLOAD_OFFSET, page_starts, spans
+from drivers.controller.connection import Connection
+from drivers.controller.errors import ControllerNonsense, ControllerUnavailable, MailboxError
 from drivers.controller.library_log import cap_library_log
+from drivers.controller.line_check import check_line
 from drivers.controller.mailbox import (
     BLOCK_REGISTERS,
     HEADER_REGISTERS,
@@ -30,143 +23,187 @@ from drivers.controller.mailbox import (
     decode_service,
     encode_service,
 )
-from drivers.controller.replies import is_complete_tcp
+from drivers.controller.requests import (
+    LONGEST_READ,
+    LONGEST_WRITE,
+    Request,
+    read_registers,
+    registers_of,
+    stream_of,
+    write_register,
+    write_registers,
+)
+from drivers.controller.serial_line import Rs485, SerialLine
+from drivers.controller.wires import RtuOverTcpWire, RtuWire, TcpWire, Wire
 
-__all__ = ["MailboxLayout", "ModbusTcpController"]
+__all__ = [
+    "MailboxLayout",
+    "ModbusController",
+    "ModbusRtuController",
+    "ModbusRtuOverTcpController",
+    "ModbusTcpController",
+    "Rs485",
+    "SerialLine",
+]
 
-Send = Callable[[AsyncModbusTcpClient], Awaitable[ModbusPDU]]
-
-EXCEPTION_NAMES = {
-    1: "illegal function",
-    2: "illegal data address",
-    3: "illegal data value",
-    4: "server device failure",
-    5: "acknowledge: it goes on working at it",
-    6: "server device busy",
-    8: "memory parity error",
-    10: "gateway path unavailable",
-    11: "gateway target device did not respond",
-}
-NEXT_STEPS = {
-    1: "The controller must know function codes 3, 6 and 16",
-    2: "Check link_address, service_address, contour_address and payload_capacity",
-    3: "Check payload_capacity, and the controller's limit of registers in one request",
-    10: "Check the gateway and device_id",
-    11: "Check the gateway, the line behind it, and device_id",
-}
-MAY_BE_DONE_LATER = (5, 11)  # these say that the request went on its way, not that it was refused
+LATE_REPLIES = 4  # that one `connect` gets out of the way
 
 
-class Connection:
-    """One TCP connection: requests one after the other, and the first fault ends it for good."""
+class ModbusController:
+    """The Controller role over `wire`; see `Controller` for what is raised."""
 
-    def __init__(self, host: str, port: int, timeout_s: float) -> None:
-        self.name = f"{host}:{port}"
-        self.fault: ControllerUnavailable | None = None
+    def __init__(
+        self, wire: Wire, device_id: int = 1, layout: MailboxLayout | None = None, timeout_s: float = 1.0
+    ) -> None:
+        cap_library_log()
+        wire.frames(device_id)  # MailboxError: a device id that none can have
+        self._wire = wire
+        self._device_id = device_id
+        self._layout = layout or MailboxLayout()
         self._timeout_s = timeout_s
-        self._sent = b""
-        self._pending = False
-        self._client = AsyncModbusTcpClient(
-            host,
-            port=port,
-            timeout=timeout_s,
-            retries=0,  # the library re-sends writes, also on a new connection
-            reconnect_delay=0,
-            trace_packet=self._watch,
-            trace_connect=self._told_of_connection,
+        self._connecting = asyncio.Lock()
+        self._connection: Connection | None = None
+        self._opening: Connection | None = None
+        self._closings = 0
+        self._barriers = secrets.randbelow(1000)  # another place in their row than that of a process just killed
+
+    def __str__(self) -> str:
+        return f"{self._wire.name} device {self._device_id}"
+
+    @property
+    def connected(self) -> bool:
+        """True while requests can be tried."""
+        return self._connection is not None and self._connection.fault is None
+
+    async def connect(self) -> None:
+        """Open a new connection, closing an old one first; raise ControllerUnavailable.
+
+        On a serial line it returns when no reply to an earlier request can come any more.
+        """
+        async with self._connecting:  # two at once would leak a socket
+            self._drop("replaced by a new connection")
+            closings = self._closings
+            self._connection = await self._checked(closings)
+
+    async def close(self) -> None:
+        """Close the connection; never raises."""
+        self._closings += 1
+        self._drop("closed by this side")
+
+    async def run(self, requests: Sequence[Request]) -> list[bytes]:
+        """The PDUs of the replies to requests that the caller made: for commissioning."""
+        return await self._held().run(requests)
+
+    async def read_link(self) -> LinkBlock:
+        """The controller's block, one FC3 of 16 registers."""
+        registers = await self._read_block(self._layout.link_address)
+        return decode_link(registers, self._layout.word_order)
+
+    async def read_service(self) -> ServiceBlock:
+        """The service's own block as the controller holds it, one FC3 of 16 registers."""
+        registers = await self._read_block(self._layout.service_address)
+        return decode_service(registers, self._layout.word_order)
+
+    async def write_service(self, block: ServiceBlock) -> None:
+        """Write the service's block whole, one FC16."""
+        registers = encode_service(block, self._layout.word_order)
+        await self._held().run([write_registers(self._layout.service_address, stream_of(registers))])
+
+    async def write_transfer(self, transfer: int) -> None:
+        """Write the commit register alone, FC6."""
+        if not 0 <= transfer <= 0xFFFF:
+            raise MailboxError(f"transfer is {transfer}, expected 0 to 65535")
+        await self._held().run([write_register(self._layout.contour_address, transfer)])
+
+    async def write_page(self, page: Page) -> None:
+        """Write payload and header without the commit register, in as few FC16 as the limit allows."""
+        stream = self._stream(page)
+        first = self._layout.contour_address
+        await self._held().run(
+            [
+                write_registers(first + offset, stream[2 * (offset - 1) : 2 * (offset - 1 + count)])
+                for offset, count in spans(page_starts(page.header, len(page.payload)), LONGEST_WRITE)
+            ]
         )
 
-    async def open(self) -> None:
-        """Connect; raise ControllerUnavailable."""
-        next_step = "Check that the controller is on, the cable, host and port"
+    async def read_page(self, payload_length: int) -> Page:
+        """Read header without the commit register and `payload_length` registers of payload back."""
+        self._check_payload_length(payload_length)
+        connection = self._held()
+        first = self._layout.contour_address
+        (reply,) = await connection.run([read_registers(first + 1, HEADER_REGISTERS)])
+        header = registers_of(reply)
+        starts = [start for start in page_starts(header, payload_length) if start >= PAYLOAD_OFFSET]
+        reads = [read_registers(first + offset, count) for offset, count in spans(starts, LONGEST_READ)]
+        replies = await connection.run(reads) if reads else []
+        return Page(header, tuple(register for reply in replies for register in registers_of(reply)))
+
+    # --- connection ---------------------------------------------------------------------------------------------
+
+    async def _checked(self, closings: int) -> Connection:
+        """A new connection on which no late reply can come."""
+        for left in reversed(range(LATE_REPLIES)):
+            connection = Connection(
+                self._wire, await self._wire.open(self._timeout_s), self._device_id, self._timeout_s
+            )
+            self._opening = connection
+            try:
+                self._check_still_wanted(closings)
+                if self._wire.serial:
+                    self._barriers += 1
+                    await check_line(connection, self._layout.contour_address, self._barriers, self._timeout_s)
+                return connection
+            except ControllerNonsense:
+                if not left:
+                    raise
+            except BaseException:
+                connection.end(ControllerUnavailable(f"{self._wire.name}: not connected"))
+                raise
+            finally:
+                self._opening = None
+        raise AssertionError("unreachable: the last late reply is raised")
+
+    def _check_still_wanted(self, closings: int) -> None:
+        if closings != self._closings:
+            raise ControllerUnavailable(f"{self._wire.name}: closed while connecting")
+
+    def _held(self) -> Connection:
+        if self._connection is None:
+            raise ControllerUnavailable(f"{self._wire.name}: not connected. Connect first")
+        return self._connection
+
+    def _drop(self, why: str) -> None:
+        for connection in (self._connection, self._opening):
+            if connection is not None:
+                connection.end(ControllerUnavailable(f"{connection.name}: {why}"))
+        self._connection = None
+
+    # --- registers ----------------------------------------------------------------------------------------------
+
+    async def _read_block(self, address: int) -> tuple[int, ...]:
+        (reply,) = await self._held().run([read_registers(address, BLOCK_REGISTERS)])
+        return registers_of(reply)
+
+    def _stream(self, page: Page) -> bytes:
+        """The page's registers from offset 1 on, as they go on the wire."""
+        if len(page.header) != HEADER_REGISTERS:
+            raise MailboxError(f"the page's header has {len(page.header)} registers, expected {HEADER_REGISTERS}")
+        self._check_payload_length(len(page.payload))
         try:
-            async with asyncio.timeout(self._timeout_s):
-                # What the client's own connect() awaits; that one turns the reason into a log line.
-                await self._client.ctx.call_create()
-        except TimeoutError as error:
-            raise ControllerUnavailable(f"{self.name}: no connection in {self._timeout_s:g} s. {next_step}") from error
-        except (OSError, UnicodeError) as error:
-            raise ControllerUnavailable(f"{self.name}: no connection: {error}. {next_step}") from error
+            return stream_of(page.header) + stream_of(page.payload)
+        except struct.error as error:
+            raise MailboxError(
+                f"the page holds what is no register of 16 bits ({error}). Was it stored or changed by another program?"
+            ) from error
 
-    def end(self, fault: ControllerUnavailable) -> None:
-        """Close, and let the pending request fail with `fault`; the first fault stays."""
-        if self.fault is not None:
-            return
-        self.fault = fault
-        self._client.close()
-        waiting = self._client.ctx.response_future
-        if self._pending and not waiting.done():  # the library lets it wait out its whole time
-            waiting.set_exception(fault)
-
-    async def execute(self, send: Send, what: str) -> ModbusPDU:
-        """The reply to one request, known to match it; raise ControllerRefused or ControllerUnavailable."""
-        if self.fault is not None:
-            raise type(self.fault)(str(self.fault))
-        self._pending = True
-        try:
-            reply = await self._uncancelled(send)
-        except asyncio.CancelledError:
-            self.end(ControllerUnavailable(f"{self.name}: {what} was cancelled on its way, its reply may still come"))
-            raise
-        except ModbusIOException as error:
-            raise self._ended(ControllerTimeout(self._no_reply(what))) from error
-        except (ModbusException, OSError) as error:
-            raise self._ended(ControllerUnavailable(f"{self.name}: {what} failed: {error}")) from error
-        finally:
-            self._pending = False
-        if reply.isError():
-            raise self._refusal(reply.exception_code, what)
-        return reply
-
-    async def _uncancelled(self, send: Send) -> ModbusPDU:
-        """The reply; asyncio.CancelledError even where Python 3.11's wait_for prefers a reply of the same moment."""
-        task = asyncio.current_task()
-        before = task.cancelling() if task else 0
-        reply = await send(self._client)
-        if task and task.cancelling() > before:
-            raise asyncio.CancelledError
-        return reply
-
-    def _ended(self, fault: ControllerUnavailable) -> ControllerUnavailable:
-        self.end(fault)
-        return fault
-
-    def _no_reply(self, what: str) -> str:
-        return (
-            f"{self.name}: no reply to {what} in {self._timeout_s:g} s. "
-            "Check device_id, whether the controller runs, and timeout_s"
-        )
-
-    def _refusal(self, code: int, what: str) -> ControllerError:
-        name = EXCEPTION_NAMES.get(code, "not a code of the standard")
-        text = f"{self.name} answered {what} with exception {code} ({name})"
-        if code in NEXT_STEPS:
-            text += f". {NEXT_STEPS[code]}"
-        if code in MAY_BE_DONE_LATER:
-            return self._ended(ControllerTimeout(text))
-        return ControllerRefused(text, code)
-
-    def _watch(self, sending: bool, data: bytes) -> bytes:
-        """The library's hook for each packet: `data` is what is sent, or all that came since."""
-        if sending:
-            self._sent = data
-            return data
-        try:
-            if is_complete_tcp(self._sent, data):
-                self._sent = b""
-        except ControllerNonsense as error:
-            self.end(ControllerNonsense(f"{self.name}: {error}. Check what listens there, and for a second client"))
-            return b""
-        return data
-
-    def _told_of_connection(self, up: bool) -> None:
-        """The library's hook for a connection made, or lost through the other side."""
-        if not up:
-            self.end(ControllerUnavailable(f"{self.name}: the controller closed the connection"))
+    def _check_payload_length(self, payload_length: int) -> None:
+        capacity = self._layout.payload_capacity
+        if not 0 <= payload_length <= capacity:
+            raise MailboxError(f"a payload of {payload_length} registers, payload_capacity is {capacity}")
 
 
-class ModbusTcpController:
-    """The Controller role over Modbus TCP; see `Controller` for what is raised."""
+class ModbusTcpController(ModbusController):
+    """Over Modbus TCP."""
 
     def __init__(
         self,
@@ -176,139 +213,28 @@ class ModbusTcpController:
         layout: MailboxLayout | None = None,
         timeout_s: float = 1.0,
     ) -> None:
-        if not 1 <= device_id <= 255:
-            raise MailboxError(
-                f"device_id is {device_id}, expected 1 to 255 (0 is a broadcast, which is never answered)"
-            )
-        cap_library_log()
-        self._host = host
-        self._port = port
-        self._device_id = device_id
-        self._layout = layout or MailboxLayout()
-        self._timeout_s = timeout_s
-        self._turn = asyncio.Lock()
-        self._connection: Connection | None = None
-        self._closings = 0
-
-    def __str__(self) -> str:
-        return f"{self._host}:{self._port} device {self._device_id}"
-
-    @property
-    def connected(self) -> bool:
-        """True while requests can be tried."""
-        return self._connection is not None and self._connection.fault is None
-
-    async def connect(self) -> None:
-        """Open a new connection, closing an old one first; raise ControllerUnavailable."""
-        async with self._turn:  # two at once would leak a socket
-            self._drop("replaced by a new connection")
-            closings = self._closings
-            connection = Connection(self._host, self._port, self._timeout_s)
-            await connection.open()
-            if closings != self._closings:
-                connection.end(ControllerUnavailable("closed"))
-                raise ControllerUnavailable(f"{self._host}:{self._port}: closed while connecting")
-            self._connection = connection
-
-    async def close(self) -> None:
-        """Close the connection; never raises."""
-        self._closings += 1
-        self._drop("closed by this side")
-        await asyncio.sleep(0)  # the socket closes in the loop's next round
-
-    async def read_link(self) -> LinkBlock:
-        """The controller's block, one FC3 of 16 registers."""
-        registers = await self._read(self._held(), self._layout.link_address, BLOCK_REGISTERS)
-        return decode_link(registers, self._layout.word_order)
-
-    async def read_service(self) -> ServiceBlock:
-        """The service's own block as the controller holds it, one FC3 of 16 registers."""
-        registers = await self._read(self._held(), self._layout.service_address, BLOCK_REGISTERS)
-        return decode_service(registers, self._layout.word_order)
-
-    async def write_service(self, block: ServiceBlock) -> None:
-        """Write the service's block whole, one FC16."""
-        registers = encode_service(block, self._layout.word_order)
-        await self._write(self._held(), self._layout.service_address, registers)
-
-    async def write_transfer(self, transfer: int) -> None:
-        """Write the commit register alone, FC6."""
-        if not 0 <= transfer <= 0xFFFF:
-            raise MailboxError(f"transfer is {transfer}, expected 0 to 65535")
-        address = self._layout.contour_address
-        await self._execute(
-            self._held(),
-            lambda client: client.write_register(address, transfer, device_id=self._device_id),
-            f"FC6 of register {_people(address, 1)}",
-        )
-
-    async def write_page(self, page: Page) -> None:
-        """Write payload and header without the commit register, in as few FC16 as the limit allows."""
-        self._check_page(page)
-        connection = self._held()
-        registers = (*page.header, *page.payload)
-        for offset, count in spans(page_starts(page.header, len(page.payload)), LONGEST_WRITE):
-            await self._write(
-                connection, self._layout.contour_address + offset, registers[offset - 1 : offset - 1 + count]
-            )
-
-    async def read_page(self, payload_length: int) -> Page:
-        """Read header without the commit register and `payload_length` registers of payload back."""
-        self._check_payload_length(payload_length)
-        connection = self._held()
-        contour = self._layout.contour_address
-        header = await self._read(connection, contour + 1, HEADER_REGISTERS)
-        payload: list[int] = []
-        starts = [start for start in page_starts(header, payload_length) if start >= PAYLOAD_OFFSET]
-        for offset, count in spans(starts, LONGEST_READ):
-            payload += await self._read(connection, contour + offset, count)
-        return Page(tuple(header), tuple(payload))
-
-    async def _read(self, connection: Connection, address: int, count: int) -> list[int]:
-        reply = await self._execute(
-            connection,
-            lambda client: client.read_holding_registers(address, count=count, device_id=self._device_id),
-            f"FC3 of registers {_people(address, count)}",
-        )
-        return list(reply.registers)
-
-    async def _write(self, connection: Connection, address: int, registers: Sequence[int]) -> None:
-        await self._execute(
-            connection,
-            lambda client: client.write_registers(address, list(registers), device_id=self._device_id),
-            f"FC16 of registers {_people(address, len(registers))}",
-        )
-
-    async def _execute(self, connection: Connection, send: Send, what: str) -> ModbusPDU:
-        """One request in its turn; never on another connection than the one its caller began on."""
-        async with self._turn:
-            return await connection.execute(send, what)
-
-    def _held(self) -> Connection:
-        if self._connection is None:
-            raise ControllerUnavailable(f"{self._host}:{self._port}: not connected. Connect first")
-        return self._connection
-
-    def _drop(self, why: str) -> None:
-        connection, self._connection = self._connection, None
-        if connection is not None:
-            connection.end(ControllerUnavailable(f"{connection.name}: {why}"))
-
-    def _check_page(self, page: Page) -> None:
-        if len(page.header) != HEADER_REGISTERS:
-            raise MailboxError(f"the page's header has {len(page.header)} registers, expected {HEADER_REGISTERS}")
-        self._check_payload_length(len(page.payload))
-        if not all(0 <= register <= 0xFFFF for register in (*page.header, *page.payload)):
-            raise MailboxError("the page holds a register beyond 16 bits. Was it stored or changed by another program?")
-
-    def _check_payload_length(self, payload_length: int) -> None:
-        capacity = self._layout.payload_capacity
-        if not 0 <= payload_length <= capacity:
-            raise MailboxError(f"a payload of {payload_length} registers, payload_capacity is {capacity}")
+        super().__init__(TcpWire(host, port), device_id, layout, timeout_s)
 
 
-def _people(address: int, count: int) -> str:
-    """Registers by PDU address, with the 4xxxxx form that PLC programmers use beside it."""
-    if count == 1:
-        return f"{address} ({400001 + address})"
-    return f"{address} to {address + count - 1} ({400001 + address} to {400000 + address + count})"
+class ModbusRtuController(ModbusController):
+    """Over Modbus RTU on a serial port of this machine; timeout_s counts from when the request has gone out."""
+
+    def __init__(
+        self, line: SerialLine, device_id: int = 1, layout: MailboxLayout | None = None, timeout_s: float = 1.0
+    ) -> None:
+        super().__init__(RtuWire(line), device_id, layout, timeout_s)
+
+
+class ModbusRtuOverTcpController(ModbusController):
+    """Over RTU frames through a TCP serial server; baudrate is that of the line behind it."""
+
+    def __init__(
+        self,
+        host: str,
+        port: int = 4001,
+        device_id: int = 1,
+        layout: MailboxLayout | None = None,
+        timeout_s: float = 1.0,
+        baudrate: int = 9600,
+    ) -> None:
+        super().__init__(RtuOverTcpWire(host, port, baudrate), device_id, layout, timeout_s)

@@ -9,61 +9,161 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller import ControllerNonsense
-from drivers.controller.replies import is_complete_tcp
-from tests.drivers.controller.misbehaving_server import exception_reply, right_reply
+from drivers.controller.frames import Frames, RtuFrames, TcpFrames
+from drivers.controller.requests import (
+    Request,
+    read_registers,
+    registers_of,
+    stream_of,
+    write_register,
+    write_registers,
+)
+from tests.drivers.controller.rtu_frames import crc16
 
 U16 = st.integers(0, 0xFFFF)
+DEVICE = 7
 
 
 @st.composite
-def requests(draw: st.DrawFn) -> bytes:
+def requests(draw: st.DrawFn) -> Request:
     """Any request of the three kinds that the driver sends."""
     function_code = draw(st.sampled_from([3, 6, 16]))
-    address = draw(U16)
     if function_code == 3:
-        pdu = struct.pack(">BHH", 3, address, draw(st.integers(1, 125)))
-    elif function_code == 6:
-        pdu = struct.pack(">BHH", 6, address, draw(U16))
-    else:
-        count = draw(st.integers(1, 123))
-        pdu = struct.pack(">BHHB", 16, address, count, 2 * count) + bytes(2 * count)
-    return struct.pack(">HHHB", draw(U16), 0, len(pdu) + 1, draw(st.integers(1, 255))) + pdu
+        return read_registers(draw(U16), draw(st.integers(1, 125)))
+    if function_code == 6:
+        return write_register(draw(U16), draw(U16))
+    return write_registers(draw(U16), draw(st.binary(min_size=1, max_size=123)) * 2)
 
 
-@given(requests(), st.data())
+def right_pdu(request: Request) -> bytes:
+    """The reply's PDU as the standard asks for it, from the request's bytes."""
+    if request.pdu[0] == 3:
+        count = int.from_bytes(request.pdu[3:5], "big")
+        return bytes([3, 2 * count]) + stream_of([(number * 257) & 0xFFFF for number in range(count)])
+    return request.pdu[:5]
+
+
+class Tcp:
+    """A conversation over TCP: the driver's frames, and the server's."""
+
+    def __init__(self, earlier: int = 0) -> None:
+        self.frames: Frames = TcpFrames(DEVICE)
+        for _ in range(earlier):
+            self.frames.request(read_registers(0, 1))
+
+    def ask(self, request: Request) -> None:
+        self.head = self.frames.request(request)[:4]
+
+    def frame(self, pdu: bytes) -> bytes:
+        return self.head + struct.pack(">HB", len(pdu) + 1, DEVICE) + pdu
+
+    @staticmethod
+    def content(pdu: bytes) -> range:
+        return range(9, 7 + len(pdu)) if pdu[0] == 3 else range(0)
+
+
+class Rtu:
+    """A conversation over RTU."""
+
+    def __init__(self) -> None:
+        self.frames: Frames = RtuFrames(DEVICE)
+
+    def ask(self, request: Request) -> None:
+        sent = self.frames.request(request)
+        assert sent == bytes([DEVICE]) + request.pdu + crc16(bytes([DEVICE]) + request.pdu)
+
+    @staticmethod
+    def frame(pdu: bytes) -> bytes:
+        return bytes([DEVICE]) + pdu + crc16(bytes([DEVICE]) + pdu)
+
+    @staticmethod
+    def content(pdu: bytes) -> range:
+        return range(0)
+
+
+WAYS = pytest.mark.parametrize("way", [Tcp, Rtu])
+
+
+@WAYS
+@given(request=requests(), data=st.data())
 def test_every_beginning_of_the_right_reply_is_waited_with_and_the_whole_is_taken(
-    request: bytes, data: st.DataObject
+    way: type[Tcp | Rtu], request: Request, data: st.DataObject
 ) -> None:
-    reply = data.draw(st.sampled_from([right_reply(request), exception_reply(request, 2)]))
-    assert not any(is_complete_tcp(request, reply[:length]) for length in range(len(reply)))
-    assert is_complete_tcp(request, reply)
+    talk = way()
+    talk.ask(request)
+    pdu = data.draw(st.sampled_from([right_pdu(request), bytes([request.pdu[0] | 0x80, 2])]))
+    frame = talk.frame(pdu)
+    assert all(talk.frames.reply(frame[:length]) is None for length in range(len(frame)))
+    assert talk.frames.reply(frame) == pdu
 
 
-@given(requests(), st.data())
-def test_a_reply_with_one_bit_wrong_is_never_taken_unless_it_is_content(request: bytes, data: st.DataObject) -> None:
-    reply = bytearray(right_reply(request))
-    content = range(9, len(reply)) if request[7] == 3 else range(0)
-    position = data.draw(st.integers(0, len(reply) - 1).filter(lambda at: at not in content))
-    reply[position] ^= 1 << data.draw(st.integers(0, 7))
+@WAYS
+@given(request=requests(), data=st.data())
+def test_a_reply_with_one_bit_wrong_is_never_taken_unless_only_its_content_could_tell(
+    way: type[Tcp | Rtu], request: Request, data: st.DataObject
+) -> None:
+    talk = way()
+    talk.ask(request)
+    frame = bytearray(talk.frame(right_pdu(request)))
+    content = talk.content(right_pdu(request))
+    position = data.draw(st.integers(0, len(frame) - 1).filter(lambda at: at not in content))
+    frame[position] ^= 1 << data.draw(st.integers(0, 7))
     with pytest.raises(ControllerNonsense, match="the reply's"):
-        is_complete_tcp(request, bytes(reply))
+        talk.frames.reply(bytes(frame))
 
 
-@given(requests(), st.binary(min_size=1, max_size=300))
-def test_bytes_after_the_reply_are_never_taken(request: bytes, surplus: bytes) -> None:
+@WAYS
+@given(request=requests(), surplus=st.binary(min_size=1, max_size=300))
+def test_bytes_after_the_reply_are_never_taken(way: type[Tcp | Rtu], request: Request, surplus: bytes) -> None:
+    talk = way()
+    talk.ask(request)
     with pytest.raises(ControllerNonsense, match="number of bytes"):
-        is_complete_tcp(request, right_reply(request) + surplus)
+        talk.frames.reply(talk.frame(right_pdu(request)) + surplus)
 
 
-@given(requests(), st.binary(max_size=300))
-def test_garbage_is_waited_with_or_refused_and_nothing_else_happens(request: bytes, garbage: bytes) -> None:
+@WAYS
+@given(request=requests(), garbage=st.binary(max_size=300))
+def test_garbage_is_waited_with_or_refused_and_nothing_else_happens(
+    way: type[Tcp | Rtu], request: Request, garbage: bytes
+) -> None:
+    talk = way()
+    talk.ask(request)
     try:
-        complete = is_complete_tcp(request, garbage)
+        assert talk.frames.reply(garbage) is None
     except ControllerNonsense:
         return
-    assert not complete or garbage[:2] == request[:2]
 
 
-def test_bytes_without_a_request_are_nonsense() -> None:
-    with pytest.raises(ControllerNonsense, match="3 bytes came though no request was pending"):
-        is_complete_tcp(b"", b"abc")
+@WAYS
+@given(asked=requests(), other=requests())
+def test_the_right_reply_to_another_request_is_taken_only_where_it_reads_the_same(
+    way: type[Tcp | Rtu], asked: Request, other: Request
+) -> None:
+    talk = way()
+    talk.ask(asked)
+    try:
+        taken = talk.frames.reply(talk.frame(right_pdu(other)))
+    except ControllerNonsense:
+        assert right_pdu(other)[: len(asked.reply_head)] != asked.reply_head
+    else:
+        assert taken is None or taken == right_pdu(other)
+
+
+def test_a_transaction_is_never_0_and_begins_again_after_65535() -> None:
+    talk = Tcp(earlier=65534)
+    request = read_registers(0, 1)
+    talk.ask(request)
+    assert talk.head == b"\xff\xff\0\0"
+    talk.ask(request)
+    assert talk.head == b"\0\1\0\0"
+
+
+@given(st.lists(U16, min_size=1, max_size=125))
+def test_registers_are_read_as_they_were_sent(registers: list[int]) -> None:
+    assert list(registers_of(bytes([3, 2 * len(registers)]) + stream_of(registers))) == registers
+
+
+def test_requests_are_told_to_people_by_both_numberings() -> None:
+    assert str(read_registers(0, 16)) == "FC3 of registers 0 to 15 (400001 to 400016)"
+    assert str(write_register(32, 5)) == "FC6 of register 32 (400033)"
+    assert str(write_registers(33, bytes(4))) == "FC16 of registers 33 to 34 (400034 to 400035)"

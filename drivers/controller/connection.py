@@ -1,0 +1,238 @@
+"""One connection to the controller: requests one after the other, and the first fault ends it for good."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from drivers.controller.byte_channel import ByteChannel
+from drivers.controller.errors import (
+    ControllerError,
+    ControllerNonsense,
+    ControllerRefused,
+    ControllerTimeout,
+    ControllerUnavailable,
+)
+from drivers.controller.requests import EXCEPTION, Request
+from drivers.controller.wires import Descriptor, Wire
+
+EXCEPTION_NAMES = {
+    1: "illegal function",
+    2: "illegal data address",
+    3: "illegal data value",
+    4: "server device failure",
+    5: "acknowledge: it goes on working at it",
+    6: "server device busy",
+    8: "memory parity error",
+    10: "gateway path unavailable",
+    11: "gateway target device did not respond",
+}
+NEXT_STEPS = {
+    1: "The controller must know function codes 3, 6 and 16",
+    2: "Check link_address, service_address, contour_address and payload_capacity",
+    3: "Check payload_capacity, and the controller's limit of registers in one request",
+    10: "Check the gateway and device_id",
+    11: "Check the gateway, the line behind it, and device_id",
+}
+MAY_BE_DONE_LATER = (5, 11)  # these say that the request went on its way, not that it was refused
+
+
+@dataclass(eq=False)
+class _Exchange:
+    """Requests of one caller, in order; `done` gets their replies' PDUs."""
+
+    requests: Sequence[Request]
+    done: asyncio.Future[list[bytes]]
+    replies: list[bytes] = field(default_factory=list)
+
+    @property
+    def request(self) -> Request:
+        """The next one, or the one under way."""
+        return self.requests[len(self.replies)]
+
+
+class Connection:
+    """An open wire, from here to its first fault.
+
+    Callers take turns, one request each, so that a heartbeat never waits for a whole page. A caller's next request goes
+    out from within the arrival of the reply to the one before: a page costs one wake-up of its task, not 17.
+    """
+
+    def __init__(self, wire: Wire, descriptor: Descriptor, device_id: int, timeout_s: float) -> None:
+        self.name = wire.name
+        self.fault: ControllerUnavailable | None = None
+        self._wire = wire
+        self._pace = wire.pace
+        self._frames = wire.frames(device_id)
+        self._timeout_s = timeout_s
+        self._loop = asyncio.get_running_loop()
+        self._turns: deque[_Exchange] = deque()
+        self._under_way: _Exchange | None = None
+        self._received = b""
+        self._echo = b""
+        self._deadline = 0.0
+        self._silent_from = 0.0
+        self._alarm: asyncio.TimerHandle | None = None
+        self._rest: asyncio.TimerHandle | None = None
+        self._listening = False
+        self._channel = ByteChannel(*descriptor, self._receive, self._lost)
+
+    def end(self, fault: ControllerUnavailable) -> None:
+        """Close, and let all requests fail with `fault`; the first fault stays."""
+        if self.fault is not None:
+            return
+        self.fault = fault
+        self._channel.close()
+        for timer in (self._alarm, self._rest):
+            if timer is not None:
+                timer.cancel()
+        for exchange in (self._under_way, *self._turns):
+            if exchange is not None and not exchange.done.done():
+                exchange.done.set_exception(_again(fault))
+        self._under_way = None
+        self._turns.clear()
+
+    async def run(self, requests: Sequence[Request]) -> list[bytes]:
+        """The PDUs of the replies, known to match; the first refusal ends the row.
+
+        Raises ControllerRefused, ControllerUnavailable. Cancelled while one is under way, the connection ends.
+        """
+        if self.fault is not None:
+            raise _again(self.fault)
+        exchange = _Exchange(requests, self._loop.create_future())
+        self._turns.append(exchange)
+        self._send_next()
+        try:
+            return await exchange.done
+        except asyncio.CancelledError:
+            if exchange is self._under_way:
+                what = f"{exchange.request} was cancelled on its way, its reply may still come"
+                self.end(ControllerUnavailable(f"{self.name}: {what}"))
+            elif exchange in self._turns:
+                self._turns.remove(exchange)
+            raise
+
+    async def wait_out(self, silence_s: float, longest_s: float) -> None:
+        """Return when nothing has come for `silence_s`; what comes is dropped. Raises ControllerUnavailable."""
+        self._listening = True
+        begun = self._loop.time()
+        self._silent_from = max(self._silent_from, begun)
+        while (left := self._silent_from + silence_s - self._loop.time()) > 0:
+            if self._loop.time() - begun > longest_s:
+                self.end(
+                    ControllerUnavailable(
+                        f"{self.name}: something talks all the time, expected {silence_s:g} s of silence within "
+                        f"{longest_s:g} s. Check baud rate, parity, termination and bias, and for a second client"
+                    )
+                )
+            if self.fault is not None:
+                raise _again(self.fault)
+            await asyncio.sleep(left)
+        self._listening = False
+
+    # --- sending ------------------------------------------------------------------------------------------------
+
+    def _send_next(self) -> None:
+        """Send the request whose turn it is, once the line has been silent; nothing while one is under way."""
+        if self._under_way is not None or not self._turns or self.fault is not None:
+            return
+        now = self._loop.time()
+        if now < self._silent_from + self._pace.silence_s:
+            if self._rest is None:
+                self._rest = self._loop.call_at(self._silent_from + self._pace.silence_s, self._rested)
+            return
+        exchange = self._under_way = self._turns.popleft()
+        request = exchange.request
+        data = self._frames.request(request)
+        self._deadline = now + self._timeout_s + self._pace.byte_s * self._frames.wire_length(request)
+        if self._alarm is None:
+            self._alarm = self._loop.call_at(self._deadline, self._look_at_deadline)
+        if self._pace.echo:
+            self._echo = data
+        self._channel.write(data)
+
+    def _rested(self) -> None:
+        self._rest = None
+        self._send_next()
+
+    def _look_at_deadline(self) -> None:
+        """One timer serves all requests: setting and cancelling one each would cost more than the request."""
+        self._alarm = None
+        if self._under_way is None:
+            return
+        if self._loop.time() < self._deadline:
+            self._alarm = self._loop.call_at(self._deadline, self._look_at_deadline)
+            return
+        text = f"{self.name}: no reply to {self._under_way.request} in {self._timeout_s:g} s"
+        if self._received:
+            text += f", {len(self._received)} bytes of one"
+        self.end(ControllerTimeout(f"{text}. {self._wire.missing}"))
+
+    # --- receiving ----------------------------------------------------------------------------------------------
+
+    def _receive(self, data: bytes) -> None:
+        if self._pace.silence_s:
+            self._silent_from = self._loop.time()
+        if self._listening:
+            return
+        try:
+            if self._echo:
+                data = self._without_echo(data)
+                if not data:
+                    return
+            self._take(data)
+        except ControllerNonsense as error:
+            self.end(ControllerNonsense(f"{self.name}: {error}. {self._wire.mismatch}"))
+
+    def _take(self, data: bytes) -> None:
+        exchange = self._under_way
+        if exchange is None:
+            raise ControllerNonsense(f"{len(data)} bytes came though no request was pending")
+        self._received += data
+        reply = self._frames.reply(self._received)
+        if reply is None:
+            return
+        self._received = b""
+        self._under_way = None
+        if reply[0] & EXCEPTION:
+            self._refuse(exchange, reply[1])
+        else:
+            exchange.replies.append(reply)
+            if len(exchange.replies) < len(exchange.requests) and not exchange.done.done():
+                self._turns.append(exchange)
+            elif not exchange.done.done():
+                exchange.done.set_result(exchange.replies)
+        self._send_next()
+
+    def _refuse(self, exchange: _Exchange, code: int) -> None:
+        refusal = self._refusal(code, exchange.request)
+        if not exchange.done.done():
+            exchange.done.set_exception(refusal)
+        if isinstance(refusal, ControllerUnavailable):
+            self.end(refusal)
+
+    def _without_echo(self, data: bytes) -> bytes:
+        """What is left of `data` when our own bytes are taken off."""
+        own = self._echo[: len(data)]
+        if not data.startswith(own):
+            raise ControllerNonsense("what was sent did not come back as it was sent, so two talked at once")
+        self._echo = self._echo[len(own) :]
+        return data[len(own) :]
+
+    def _lost(self, reason: str) -> None:
+        """The channel's word that the other end has gone."""
+        self.end(ControllerUnavailable(f"{self.name}: {self._wire.lost(reason)}"))
+
+    def _refusal(self, code: int, request: Request) -> ControllerError:
+        name = EXCEPTION_NAMES.get(code, "not a code of the standard")
+        text = f"{self.name} answered {request} with exception {code} ({name})"
+        if code in NEXT_STEPS:
+            text += f". {NEXT_STEPS[code]}"
+        return ControllerTimeout(text) if code in MAY_BE_DONE_LATER else ControllerRefused(text, code)
+
+
+def _again(fault: ControllerUnavailable) -> ControllerUnavailable:
+    """The fault anew: one exception object must not be raised in several tasks."""
+    return type(fault)(str(fault))

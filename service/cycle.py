@@ -52,12 +52,16 @@ class MailboxFormat:
 
 @dataclass(frozen=True)
 class CycleSettings:
-    """Bounds of one job. valid_for_s 0 = no limit by the controller's clock; job_timeout_s bounds it then."""
+    """Bounds of one job. valid_for_s 0 = no limit by the controller's clock; job_timeout_s bounds it then.
+
+    observe: the pages are made and not sent.
+    """
 
     default_recipe: int = 1
     camera_timeout_s: float = 5.0
     valid_for_s: float = 30.0
     job_timeout_s: float = 120.0
+    observe: bool = False
     mailbox: MailboxFormat = field(default_factory=MailboxFormat)
     transfer: TransferSettings = field(default_factory=TransferSettings)
 
@@ -164,6 +168,8 @@ class Cycle:
             raise _Stop(Reason.TOO_MANY_POINTS, str(error)) from error
         except MailboxError as error:  # what passed the checks in float64 degenerates in whole micrometres
             raise _Stop(Reason.SELF_INTERSECTING, str(error)) from error
+        if self._settings.observe:
+            return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
         transfer = self._transfer(self._link, job, stamp.session, pages, stamped_at + self._lifetime_s)
         before = self._now()
         try:

@@ -141,7 +141,7 @@ class Daemon:
 
     def _report_link(self, link: Link) -> None:
         fault = link.fault()
-        found = None if fault is None else Fault(Reason.CONTROLLER_LOST, fault, starting=link.starting)
+        found = None if fault is None else Fault(link.fault_reason, fault, starting=link.starting)
         self._parts.health.report("controller", found)
         self._parts.executor.wake()
 

@@ -6,8 +6,9 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ParamSpec, Protocol
 
+from drivers.controller.mailbox import TEST_VALUE, ServiceBlock
 from service.health import Fault, Health, journal_fault
 from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
@@ -15,6 +16,8 @@ from service.reasons import Outcome, Reason
 from service.state import State
 
 log = logging.getLogger("combtrace.jobs")
+
+P = ParamSpec("P")
 
 JOURNAL_PAUSE_S = 1.0
 COUNTER_VALUES = 65535  # a trigger counter runs 1…65535; 0 means none yet
@@ -83,7 +86,11 @@ class Executor:
         self._told: set[str] = set()
         self.settled_job = 0
         self._last_pair = journal.last_controller_trigger()
+        self._found = False
+        self._observing_since: tuple[int, int] | None = None
         self._restore_published()
+        if link is not None:
+            link.on_found = self._go_on_after
 
     def _restore_published(self) -> None:
         """What the service block said before the restart: it is true still."""
@@ -99,6 +106,42 @@ class Executor:
             reject_reason=int(settled.reason) if settled and settled.reason else 0,
             owner=self._journal.owner,
         )
+
+    async def _go_on_after(self, block: ServiceBlock) -> None:
+        """Go on where a service of another journal ended: its last trigger is not taken again, its job is settled.
+
+        So it is with our own former life too, where its journal was lost.
+        """
+        assert self._link is not None
+        if (block.protocol_version, block.test_value) != (ServiceBlock().protocol_version, TEST_VALUE):
+            return  # whatever stands there, it is no service's
+        pair = (block.session_ack, block.trigger_ack)
+        session = self._link.view.session if self._link.view else 0
+        in_flight = session if block.job_id > block.settled_job and session else None
+        log.warning("job numbers go on above %d, which another journal's service gave here", block.job_id)
+        await self._until_done(self._journal.adopt, block.job_id, pair, in_flight)
+        self._last_pair = self._journal.last_controller_trigger()
+        taken = self._journal.last_taken()
+        if taken is None or taken.job_id <= block.job_id:
+            self.settled_job = max(self.settled_job, block.settled_job)
+            self._link.publish(job_id=block.job_id, settled_job=self.settled_job, reject_reason=block.reject_reason)
+        self._link.publish(trigger_ack=self._last_pair[1], session_ack=self._last_pair[0])
+        if in_flight is not None:
+            self._report_in_flight(block.job_id)
+            self._found = True
+            self._wake.set()
+
+    async def _until_done(self, write: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
+        while True:
+            try:
+                await asyncio.to_thread(write, *args, **kwargs)
+            except JournalError as error:
+                self._tell(f"journal: {error}")
+                self._health.report("journal", journal_fault(error))
+                await asyncio.sleep(JOURNAL_PAUSE_S)
+            else:
+                self._health.report("journal", None)
+                return
 
     @property
     def missed(self) -> int:
@@ -174,6 +217,9 @@ class Executor:
         await self._settle_in_flight()
         while True:
             self._wake.clear()
+            if self._found:
+                self._found = False
+                await self._settle_in_flight()
             if self._submitted is not None:
                 await self._execute_submitted(self._submitted)
                 continue
@@ -193,13 +239,16 @@ class Executor:
 
     async def _settle_in_flight(self) -> None:
         for job in await self._unsettled():
+            if self._submitted is not None and job.job_id == self._submitted.job.job_id:
+                continue
             log.warning("job %d was in flight when the service ended", job.job_id)
-            self._health.report(
-                "in-flight",
-                Fault(Reason.SERVICE_RESTARTED, f"job {job.job_id} of before the restart is not settled yet"),
-            )
+            self._report_in_flight(job.job_id)
             await self._finish(await self._runner.resume(job))
         self._health.report("in-flight", None)
+
+    def _report_in_flight(self, job_id: int) -> None:
+        text = f"job {job_id} of before the restart is not settled yet"
+        self._health.report("in-flight", Fault(Reason.SERVICE_RESTARTED, text))
 
     async def _unsettled(self) -> tuple[Job, ...]:
         """Jobs of before the start without an end; until they are known, no trigger is taken."""
@@ -218,9 +267,12 @@ class Executor:
         if self._health.state is not State.READY or self._taking:
             return None
         view = self._link.view
-        if view.session == 0 or view.trigger_counter == 0 or self._link.fault() is not None:
+        if view.session == 0 or self._link.fault() is not None:
             return None
-        if (view.session, view.trigger_counter) == self._last_pair:
+        pair = (view.session, view.trigger_counter)
+        if self._link.settings.observe and self._observing_since is None:
+            self._observing_since = self._last_pair = pair  # asked before we looked: the other process has done it
+        if view.trigger_counter == 0 or pair == self._last_pair:
             return None
         return TriggerStamp("controller", view.recipe, view.block_thickness, view.session, view.trigger_counter)
 
@@ -256,6 +308,7 @@ class Executor:
         if done and job.report.get("vertices"):
             area = job.report.get("area_mm2")
             text = f": {job.report['vertices']} vertices" + (f", {area:.0f} mm²" if area else "")
+            text += f" ({job.detail})" if job.detail else ""
         log.log(logging.INFO if done else logging.WARNING, "job %d %s%s", job.job_id, job.outcome, text)
         self.settled_job = job.job_id
         if self._link is not None:

@@ -25,6 +25,7 @@ from service.reasons import Outcome, Reason
 SCHEMA_VERSION = 1
 HEADER_REGISTERS = 31
 PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
+LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
 UNSETTLED = "outcome IS NULL"
 
 SCHEMA = """
@@ -57,6 +58,10 @@ class JournalError(Exception):
 
 class JournalFull(JournalError):
     """The disk that holds the journal is full."""
+
+
+class JournalDamaged(JournalError):
+    """The file is there, may be read and written, and is no sound journal."""
 
 
 class JournalConflict(Exception):
@@ -105,8 +110,16 @@ class Job:
 class Journal:
     """Jobs in one SQLite file. Methods block for a commit (milliseconds) and may be called from any thread."""
 
-    def __init__(self, path: Path, *, now: Callable[[], datetime] = lambda: datetime.now(UTC)) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        first_job: int = 1,
+        now: Callable[[], datetime] = lambda: datetime.now(UTC),
+    ) -> None:
+        """first_job: the lowest number that a new journal gives; one that is there already keeps its own."""
         self._path = path
+        self._first_job = first_job
         self._now = now
         self._lock = threading.Lock()
         with self._translated():
@@ -126,6 +139,7 @@ class Journal:
         if version == 0:
             self._db.executescript(
                 f"BEGIN IMMEDIATE; {SCHEMA} INSERT INTO meta VALUES ('owner', '{1 + secrets.randbelow(0xFFFF)}');"
+                f" INSERT INTO meta VALUES ('first_job', '{self._first_job}');"
                 f" PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;"
             )
         elif version != SCHEMA_VERSION:
@@ -135,7 +149,7 @@ class Journal:
             )
         check = self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
         if check != "ok":
-            raise JournalError(f"{self._path}: the journal is damaged ({check}). Move it away and start again.")
+            raise JournalDamaged(f"{self._path}: the journal is damaged ({check}). Move it away and start again.")
 
     @contextmanager
     def _translated(self) -> Iterator[None]:
@@ -148,7 +162,9 @@ class Journal:
                 ) from error
             raise JournalError(f"{self._path}: cannot use the journal: {error}") from error
         except (sqlite3.Error, OSError) as error:
-            raise JournalError(
+            code = getattr(error, "sqlite_errorcode", None)
+            kind = JournalDamaged if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB) else JournalError
+            raise kind(
                 f"{self._path}: cannot use the journal: {error}. Check the path, or move the file away."
             ) from error
 
@@ -185,7 +201,11 @@ class Journal:
         taken_at = self._stamp()
         with self._transaction() as db:
             highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
-            job_id = max(highest, above) + 1
+            job_id = max(highest, above, self._number("adopted_job")) + 1
+            if job_id == 1:  # nothing is known of any job of before
+                job_id = self._number("first_job") or 1
+            if job_id > LARGEST_JOB:
+                raise JournalError(f"{self._path}: job {highest} was the last that a register can hold. Move it away")
             db.execute(
                 "INSERT INTO jobs (job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe,"
                 " thickness_um) VALUES (?, ?, ?, ?, ?, ?, ?)",
@@ -200,6 +220,31 @@ class Journal:
                 ),
             )
         return Job(job_id, taken_at, trigger)
+
+    def adopt(self, job_id: int, pair: tuple[int, int], in_flight_in: int | None) -> None:
+        """Go on after a service whose journal is not this one, from what its block at the controller says.
+
+        job_id: the last job it took; ours are above. pair: session and trigger_counter it took last.
+        in_flight_in: the session in which to take the job back, where it had not ended; it becomes a job of ours.
+        """
+        with self._transaction() as db:
+            highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
+            values = {"adopted_job": max(job_id, self._number("adopted_job"))}
+            if pair[1]:
+                values |= {"adopted_above": highest, "adopted_session": pair[0], "adopted_counter": pair[1]}
+            for key, value in values.items():
+                db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, str(value)))
+            if in_flight_in is not None and job_id > highest:
+                db.execute(
+                    "INSERT INTO jobs (job_id, taken_at, trigger_kind, recipe, thickness_um, session, withdraw_reason)"
+                    " VALUES (?, ?, 'found', 0, 0, ?, ?)",
+                    (job_id, self._stamp(), in_flight_in, int(Reason.SERVICE_RESTARTED)),
+                )
+
+    def _number(self, key: str) -> int:
+        """A number of `meta`, 0 where it is not there; within a transaction or the lock."""
+        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        return int(row[0]) if row else 0
 
     def store_pages(self, job_id: int, session: int, pages: tuple[Page, ...]) -> None:
         """Make the pages durable, before the first request of theirs is sent."""
@@ -251,11 +296,14 @@ class Journal:
 
     def last_controller_trigger(self) -> tuple[int, int]:
         """(session, trigger_counter) last taken from the controller; (0, 0) where there was none."""
-        row = self._one(
-            "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL"
-            " ORDER BY job_id DESC LIMIT 1"
-        )
-        return (int(row[0]), int(row[1])) if row else (0, 0)
+        with self._lock, self._translated():
+            row = self._db.execute(
+                "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL AND job_id > ?"
+                " ORDER BY job_id DESC LIMIT 1",
+                (self._number("adopted_above"),),
+            ).fetchone()
+            row = row or (self._number("adopted_session"), self._number("adopted_counter"))
+        return int(row[0]), int(row[1])
 
     def _one(self, query: str) -> Any:
         with self._lock, self._translated():

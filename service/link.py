@@ -8,13 +8,15 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 from drivers.controller import Controller, ControllerError, ControllerUnavailable
 from drivers.controller.mailbox import LinkBlock, ServiceBlock
+from service.ownership import Ownership
+from service.reasons import Reason
 
 log = logging.getLogger("combtrace.link")
 
@@ -23,6 +25,7 @@ HEARTBEAT_PERIOD_S = 0.4  # the protocol wants a change at least once a second
 CLOCK_TOLERANCE_MS = 1000  # protocol: a clock reading counts only if it fits the one before within 1 s
 READS_FOR_TWO_ALIKE = 20
 CLOCK_MODULUS = 1 << 32
+LARGEST_JOB = (1 << 32) - 1
 
 
 class LinkUnsteady(ControllerError):
@@ -31,11 +34,20 @@ class LinkUnsteady(ControllerError):
 
 @dataclass(frozen=True)
 class LinkSettings:
-    """How the link is kept. `handshake` False is a controller that cannot answer: its block is not read."""
+    """How the link is kept.
+
+    handshake: False is a controller that cannot answer: its block is not read.
+    observe: nothing is ever written.
+    """
 
     handshake: bool = True
     poll_period_s: float = 0.05
     heartbeat_timeout_s: float = 3.0
+    observe: bool = False
+
+
+async def _nothing(_block: ServiceBlock) -> None:
+    return
 
 
 @dataclass(frozen=True)
@@ -55,6 +67,7 @@ class Link:
     """Keeps one connection to the controller, reads its block, writes ours.
 
     view: the controller's block as two reads in a row showed it, None while there is none to act on.
+    on_found: told of the service block that another service, which runs no more, left behind; before it is overwritten.
     """
 
     def __init__(
@@ -69,6 +82,8 @@ class Link:
         self.settings = settings
         self.view: LinkBlock | None = None
         self.on_look = on_look
+        self.on_found: Callable[[ServiceBlock], Awaitable[None]] = _nothing
+        self.ownership = Ownership(0, now=now)
         self._now = now
         self._up = asyncio.Event()
         self._wake = asyncio.Event()
@@ -94,6 +109,7 @@ class Link:
         self._beat: int | None = None
         self._clock: tuple[int, int, float] | None = None  # session, clock in ms, when it was read
         self._clock_fits = False
+        self.ownership.disconnected()
 
     # --- what it says -------------------------------------------------------------------------------------------
 
@@ -113,12 +129,22 @@ class Link:
     def _fault(self) -> str | None:
         if not self._up.is_set() or self._trouble is not None:
             return self._trouble or "the connection was lost. It is being opened again"
-        if not self.settings.handshake:
-            return None
+        owned = None if self.settings.observe else self.ownership.fault()
+        if owned is not None or not self.settings.handshake:
+            return owned
         view = self.view
         if view is None or view.session == 0:
             return self._unsteady or "the controller's program is starting (session 0)"
-        return self._beat_fault() or self._echo_fault(view) or self._clock_fault()
+        if view.last_job >= LARGEST_JOB:
+            return f"last_job is {view.last_job}: no higher job number is left. Correct it at the controller"
+        echo_fault = None if self.settings.observe else self._echo_fault(view)  # it echoes what we never wrote
+        return self._beat_fault() or echo_fault or self._clock_fault()
+
+    @property
+    def fault_reason(self) -> Reason:
+        """The code that goes with `fault`."""
+        other = self._trouble is None and self.ownership.foreign
+        return Reason.OTHER_SERVICE if other else Reason.CONTROLLER_LOST
 
     def _beat_fault(self) -> str | None:
         silent_s = self._now() - (self._connected_at if self._beat_at is None else self._beat_at)
@@ -156,7 +182,7 @@ class Link:
     def controller_not_ready(self) -> str | None:
         """Why the controller would not take a contour at this moment; None where it would."""
         fault = self.fault()
-        if fault is not None or not self.settings.handshake:
+        if fault is not None or not self.settings.handshake or self.settings.observe:
             return fault
         assert self.view is not None
         states = {0: "not ready", 2: "busy", 3: "in fault"}
@@ -226,6 +252,7 @@ class Link:
     def publish(self, **changes: Any) -> None:
         """Change fields of the service block; it is written at once, whole."""
         block = replace(self._block, **changes)
+        self.ownership.owner = block.owner
         if block != self._block:
             self._block = block
             self._dirty = True
@@ -247,6 +274,26 @@ class Link:
         except TimeoutError:
             return False
         return True
+
+    async def owner_stands(self) -> bool:
+        """True where `owner`, read now, is ours or nobody's; a foreign one must show in two reads in a row."""
+        for _ in range(2):
+            if not self.ownership.is_foreign(await self.controller.read_service()):
+                return True
+        return False
+
+    async def _keep_service(self) -> None:
+        """Write the service block where a change, the heartbeat or the ownership asks for it, and where it is ours."""
+        due = self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S or not self.ownership.decided
+        if self.settings.observe or self.ownership.conflict or not due:
+            return
+        found = await self.controller.read_service()
+        if not self.ownership.saw(found):
+            return
+        if self.ownership.is_foreign(found):
+            await self.on_found(found)
+        await self._write_service()
+        self.on_look()
 
     async def _write_service(self) -> None:
         self._block = replace(self._block, service_heartbeat=(self._block.service_heartbeat + 1) & 0xFFFF)
@@ -316,9 +363,7 @@ class Link:
             if self.settings.handshake:
                 with suppress(LinkUnsteady):  # told by `fault`; our heartbeat goes on
                     await self.look()
-            if self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S:
-                await self._write_service()
-                self.on_look()
+            await self._keep_service()
             self._serves()
             await self._pause()
 

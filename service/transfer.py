@@ -145,9 +145,12 @@ class Transfer:
     async def _look(self) -> LinkBlock:
         """The controller's block; raise _Ended where it settles the job."""
         view = await self._link.look()
+        self._check_owner()
         if view.session == 0:
             return view
         if view.last_job == self._job_id and view.last_result != 0:
+            if view.last_result == Answer.ACCEPTED and not await self._surely_ours():
+                return view
             self._end_by(view.last_result)
         if view.session != self._session:
             raise _Ended(
@@ -164,6 +167,24 @@ class Transfer:
                 )
             )
         return view
+
+    def _check_owner(self) -> None:
+        """Raise _Ended where another service writes to this controller: nothing more is sent, not even a withdrawal."""
+        ownership = self._link.ownership
+        if ownership.lost:
+            raise _Ended(Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, ownership.fault()))
+
+    async def _surely_ours(self) -> bool:
+        """Whether `owner` lets the job be called accepted, False while it is being watched; raise _Ended by another's.
+
+        Two services may use the same number, and then `last_job` may speak of the other's contour.
+        """
+        if not self._link.ownership.ours:
+            return False
+        if await self._link.owner_stands():
+            return True
+        detail = "another service's number stands in `owner`: whose contour was accepted is not known"
+        raise _Ended(Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, detail))
 
     def _end_by(self, last_result: int) -> NoReturn:
         if last_result == Answer.ACCEPTED:
@@ -241,9 +262,11 @@ class Transfer:
 
     async def _attempt(self, page: Page) -> Answer | None:
         """Steps 2 to 7 for one page: the controller's answer, None where there was none."""
-        controller = self._link.controller
+        controller, ownership = self._link.controller, self._link.ownership
+        ownership.check()
         await controller.write_transfer(0)
         await self._about_to_send()
+        ownership.check()
         await controller.write_page(page)
         if self._settings.readback and await controller.read_page(len(page.payload)) != page:
             self._told("read-back differs from what was written: check contour_address and payload_capacity")
@@ -252,6 +275,7 @@ class Transfer:
             return None
         view = self._link.view or await self._look()
         transfer = self._counter.next(view.ack_transfer)
+        ownership.check()
         try:
             await controller.write_transfer(transfer)
         except ControllerUnavailable as error:  # it may have been done: go on with step 7
@@ -320,7 +344,9 @@ class Transfer:
         transfer = self._counter.next(0)
         in_vain = 0
         while in_vain < self._settings.max_repeats and self._now() < self._expires_at_s:
+            self._check_owner()
             try:
+                self._link.ownership.check()
                 await controller.write_transfer(0)
                 await self._about_to_send()
                 await controller.write_page(page)

@@ -60,7 +60,7 @@ class ScriptedController:
     async def read_link(self) -> LinkBlock:
         self._meet("read_link")
         beat = int(time.monotonic() * 50) & 0xFFFF if self.beating else 0
-        clock = round((time.monotonic() - self.started_at) * 1000) + 1000 if self.clock_runs else 0
+        clock = int((time.monotonic() - self.started_at) * 1000) + 1000 if self.clock_runs else 0
         return replace(self.link, controller_heartbeat=beat, clock=clock)
 
     async def read_service(self) -> ServiceBlock:
@@ -138,7 +138,7 @@ class ScriptedController:
         if not self._connected or not self.reachable:
             self._connected = False
             raise ControllerUnavailable("not connected")
-        if name != "read_link":
+        if name not in ("read_link", "read_service"):
             self.requests.append((name, value))
         faults = self.faults.get(name)
         fault = faults.pop(0) if faults else ""

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox import LinkBlock
+from drivers.controller.mailbox import LinkBlock, ServiceBlock
 from service.executor import Executor, TriggerRefused, missed_between
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
@@ -71,6 +71,7 @@ class Bench:
         self.link._beat_at = 0.0
         self.link._up.set()
         self.link._trouble = None
+        self.link.ownership.saw(ServiceBlock())
         self.executor.wake()
 
 

@@ -107,6 +107,8 @@ def _release(port: serial.Serial) -> None:
 def _reason(error: BaseException) -> str:
     """What went wrong, in words, without pyserial's nested numbers."""
     number = getattr(error, "errno", None)
+    if number is None and isinstance(error.__context__, termios.error):
+        number = error.__context__.args[0]
     if number in (errno.EAGAIN, errno.EBUSY):
         return "in use by another program"
     return {

@@ -129,7 +129,7 @@ async def test_wireshark_reads_a_transfer_as_the_protocol_tells_it(tmp_path: Pat
                 await asyncio.sleep(0.01)
         await controller.close()
     assert simulated.verdict.accepted == 1
-    assert simulated.verdict.clean, simulated.verdict
+    assert set(simulated.verdict.counts) <= {"heartbeat-stalled"}, simulated.verdict  # this client has none
 
     assert tshark_reads(file, port, "_ws.malformed || _ws.short || modbus.exception_code", "frame.number") == []
     frames = frames_in(file, port)

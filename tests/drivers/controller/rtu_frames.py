@@ -11,3 +11,8 @@ def crc16(data: bytes) -> bytes:
         for _ in range(8):
             crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
     return crc.to_bytes(2, "little")
+
+
+def frame(body: bytes) -> bytes:
+    """Device id and PDU with their CRC behind them."""
+    return body + crc16(body)

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test bench accuracy check format clean
+.PHONY: install demo test test-camera bench accuracy check format clean
 
 install: $(STAMP)
 
@@ -18,6 +18,11 @@ demo: install
 
 test: install
 	$(BIN)/python -m pytest
+
+# A real kernel's camera: the tests run in a virtual machine that this boots (QEMU and kernel from Debian's packages).
+test-camera: install
+	$(BIN)/python tests/camera_guest/guest.py --timeout 900 -- env COMBTRACE_CAMERA_GUEST=1 \
+		$(BIN)/python -m pytest tests/camera_guest tests/contracts/test_camera_contract.py -p no:cacheprovider
 
 bench: install
 	$(BIN)/python -m benchmarks.bench

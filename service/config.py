@@ -88,6 +88,13 @@ class V4l2Camera(Model):
         default_factory=dict, description="Controls to write at each open, by their names."
     )
     timeout_s: Seconds = Field(5.0, description="Longest wait for a frame, s.")
+    input: int | None = Field(None, ge=0, le=255, description="Input of a capture card by its number; none = as it is.")
+    exposure_ms: float | None = Field(
+        None,
+        ge=0,
+        le=60_000,
+        description="Exposure time where the camera does not tell it, ms; none = one frame period is assumed.",
+    )
 
 
 class Calibration(Model):

@@ -45,7 +45,7 @@ TYPES = {
     "string": "text",
     "boolean": "true, false",
 }
-NOT_YET = {config.V4l2Camera, config.ModbusRtu, config.ModbusRtuOverTcp}
+NOT_YET = {config.ModbusRtu, config.ModbusRtuOverTcp}
 
 
 def reference() -> str:

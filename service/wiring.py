@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from contour.calibration import Calibration
 from drivers.camera import Camera
 from drivers.camera.files import FileCamera
+from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.controller import Controller
 from drivers.controller.mailbox import MailboxLayout
 from drivers.controller.modbus import ModbusTcpController
@@ -19,6 +20,7 @@ from drivers.trigger.serial import SerialLineTrigger
 from service.calibration_file import CalibrationFileError, load_calibration
 from service.config import Config, ControllerTrigger, FilesCamera, IntervalTrigger, ModbusTcp, NoController
 from service.config import SerialTrigger as SerialTriggerSettings
+from service.config import V4l2Camera as V4l2CameraSettings
 from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation
 from service.daemon import Parts
 from service.executor import Executor
@@ -95,10 +97,27 @@ def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:
 
 
 def make_camera(config: Config) -> Camera:
-    """The camera; raise WiringError for a kind that this version cannot drive."""
-    if isinstance(config.camera, FilesCamera):
-        return FileCamera(config.camera.path, loop=config.camera.loop)
-    raise WiringError(f"camera.kind {config.camera.kind!r} is not built in yet, expected 'files'. Use a file camera")
+    """The camera's driver, not yet opened."""
+    settings = config.camera
+    if isinstance(settings, FilesCamera):
+        return FileCamera(settings.path, loop=settings.loop)
+    return V4l2Camera(
+        V4l2Settings(
+            device=str(settings.device),
+            width=settings.width,
+            height=settings.height,
+            pixel_format=settings.pixel_format,
+            frame_rate=settings.frame_rate,
+            controls=settings.controls,
+            input=settings.input,
+            exposure_s=None if settings.exposure_ms is None else settings.exposure_ms / 1000,
+        )
+    )
+
+
+def camera_timeout_s(config: Config) -> float:
+    """The longest wait for a frame, seconds."""
+    return config.camera.timeout_s if isinstance(config.camera, V4l2CameraSettings) else CycleSettings.camera_timeout_s
 
 
 def make_controller(config: Config) -> Controller | None:
@@ -122,8 +141,9 @@ def cycle_settings(config: Config) -> CycleSettings:
     """The bounds of a job."""
     settings = config.controller
     if isinstance(settings, NoController):
-        return CycleSettings(default_recipe=config.default_recipe)
+        return CycleSettings(default_recipe=config.default_recipe, camera_timeout_s=camera_timeout_s(config))
     return CycleSettings(
+        camera_timeout_s=camera_timeout_s(config),
         default_recipe=config.default_recipe,
         valid_for_s=settings.valid_for_s,
         job_timeout_s=settings.job_timeout_s,

@@ -17,6 +17,10 @@ class CameraUnavailable(CameraError):
     """The device or the source is not there, or has gone; opening again later may help."""
 
 
+class CameraRefused(CameraUnavailable):
+    """The device is there and does not do what was asked of it: a setting, a format. Waiting does not help."""
+
+
 class CameraTimeout(CameraError):
     """No frame exposed after the asked time arrived within the time-out."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 
 import cv2
@@ -11,6 +12,7 @@ import pytest
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame
 from drivers.camera.files import FileCamera
 from drivers.camera.simulated import SimulatedCamera
+from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 
 
 def picture(number):
@@ -29,11 +31,17 @@ def single_file_camera(tmp_path):
     return FileCamera(tmp_path / "only.png", loop=True)
 
 
+def vivid_camera(_tmp_path):
+    return V4l2Camera(V4l2Settings("/dev/video0", 640, 360, frame_rate=30.0, input=0, exposure_s=0.0))
+
+
 CAMERAS = {
     "folder": folder_camera,
     "single file": single_file_camera,
     "simulated": lambda _tmp_path: SimulatedCamera(picture),
 }
+if os.environ.get("COMBTRACE_CAMERA_GUEST"):
+    CAMERAS["v4l2"] = vivid_camera
 
 
 @pytest.fixture(params=CAMERAS.values(), ids=CAMERAS.keys())

@@ -1,0 +1,77 @@
+"""A driver's buffer -> grey or BGR pixels, in one pass over it."""
+
+from __future__ import annotations
+
+import mmap
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera import FrameUnusable
+from drivers.camera.decode import decode_picture
+
+if TYPE_CHECKING:
+    from drivers.camera.v4l2.formats import PictureFormat
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a pixel format lies in memory: bytes a pixel of a row, rows over the picture's height (a fraction), and
+    OpenCV's conversion to BGR; None = already grey or BGR. bytes_per_pixel 0 = compressed."""
+
+    bytes_per_pixel: int
+    rows: tuple[int, int] = (1, 1)
+    conversion: int | None = None
+
+
+LAYOUTS = {
+    "GREY": Layout(1),
+    "YUYV": Layout(2, conversion=cv2.COLOR_YUV2BGR_YUYV),
+    "UYVY": Layout(2, conversion=cv2.COLOR_YUV2BGR_UYVY),
+    "NV12": Layout(1, (3, 2), cv2.COLOR_YUV2BGR_NV12),
+    "BGR3": Layout(3),
+    "RGB3": Layout(3, conversion=cv2.COLOR_RGB2BGR),
+    "MJPG": Layout(0),
+    "JPEG": Layout(0),
+}
+
+
+def bytes_needed(layout: PictureFormat) -> int:
+    """Bytes that a whole frame fills at least; 1 for a compressed one, whose decoding tells."""
+    kind = LAYOUTS[layout.code]
+    if kind.bytes_per_pixel == 0:
+        return 1
+    rows = layout.height * kind.rows[0] // kind.rows[1]
+    return _stride(layout, kind) * (rows - 1) + layout.width * kind.bytes_per_pixel
+
+
+def to_pixels(memory: mmap.mmap, bytes_used: int, layout: PictureFormat, source: str) -> NDArray[np.uint8]:
+    """Pixels of their own memory, (H, W) grey or (H, W, 3) BGR, uint8; raise FrameUnusable for a damaged JPEG.
+
+    One copy is made, the conversion itself. What follows a JPEG's end in its buffer is ignored.
+    """
+    kind = LAYOUTS[layout.code]
+    if kind.bytes_per_pixel == 0:
+        pixels = decode_picture(memory[:bytes_used], source)
+        if pixels.shape[:2] != (layout.height, layout.width):
+            seen = f"{source}: a JPEG of {pixels.shape[1]} x {pixels.shape[0]} pixels"
+            raise FrameUnusable(f"{seen}; expected {layout.width} x {layout.height}. The next frame is tried.")
+        return pixels
+    rows = layout.height * kind.rows[0] // kind.rows[1]
+    strides = (_stride(layout, kind), kind.bytes_per_pixel, 1)
+    view: NDArray[np.uint8] = np.ndarray(
+        (rows, layout.width, kind.bytes_per_pixel), np.uint8, buffer=memory, strides=strides
+    )
+    if kind.bytes_per_pixel == 1:
+        view = view[:, :, 0]
+    if kind.conversion is None:
+        return view.copy()
+    return np.asarray(cv2.cvtColor(view, kind.conversion), dtype=np.uint8)
+
+
+def _stride(layout: PictureFormat, kind: Layout) -> int:
+    """Bytes from row to row: the driver's, or, where it tells none, rows without a gap."""
+    return max(layout.bytes_per_line, layout.width * kind.bytes_per_pixel)

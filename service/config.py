@@ -69,8 +69,22 @@ class FilesCamera(Model):
     """Pictures from files: for tests, demonstrations, and replays."""
 
     kind: Literal["files"]
-    path: FilePath = Field(description="A picture, or a folder whose pictures are taken in the order of their names.")
+    path: FilePath = Field(
+        description="A picture or video, or a folder whose pictures and videos are taken in the order of their names."
+    )
     loop: bool = Field(True, description="Begin again after the last picture.")
+    watch: bool = Field(False, description="Wait for files that other software writes; needs loop: false.")
+    move_to: FilePath | None = Field(
+        None, description="Folder that files are moved to once they were read; needs loop: false. none = they stay."
+    )
+    timeout_s: Seconds = Field(5.0, description="Longest wait for a watched-for file, s.")
+
+    @model_validator(mode="after")
+    def _a_loop_keeps_its_files(self) -> Self:
+        if self.loop and (self.watch or self.move_to is not None):
+            key = "watch" if self.watch else "move_to"
+            raise ValueError(f"{key} is set and loop is true: files are taken once or again and again. Set loop: false")
+        return self
 
 
 class V4l2Camera(Model):

@@ -17,6 +17,7 @@ LARGEST_FILE = 1_000_000
 SAMPLES = Path(__file__).parent / "samples"
 PATH_KEYS = (
     ("camera", "path"),
+    ("camera", "move_to"),
     ("calibration", "file"),
     ("service", "state_dir"),
     ("journal", "path"),
@@ -195,7 +196,8 @@ def _resolved(config: Config, folder: Path) -> Config:
     """The same with relative paths counted from the file's folder."""
     updates: dict[str, Any] = {}
     for section, key in PATH_KEYS:
-        model = getattr(config, section)
-        if model is not None and hasattr(model, key):
-            updates[section] = model.model_copy(update={key: folder / getattr(model, key)})
+        model = updates.get(section, getattr(config, section))
+        value = getattr(model, key, None)
+        if value is not None:
+            updates[section] = model.model_copy(update={key: folder / value})
     return config.model_copy(update=updates)

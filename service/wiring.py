@@ -20,7 +20,6 @@ from drivers.trigger.serial import SerialLineTrigger
 from service.calibration_file import CalibrationFileError, load_calibration
 from service.config import Config, ControllerTrigger, FilesCamera, IntervalTrigger, ModbusTcp, NoController
 from service.config import SerialTrigger as SerialTriggerSettings
-from service.config import V4l2Camera as V4l2CameraSettings
 from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation
 from service.daemon import Parts
 from service.executor import Executor
@@ -100,7 +99,7 @@ def make_camera(config: Config) -> Camera:
     """The camera's driver, not yet opened."""
     settings = config.camera
     if isinstance(settings, FilesCamera):
-        return FileCamera(settings.path, loop=settings.loop)
+        return FileCamera(settings.path, loop=settings.loop, watch=settings.watch, move_to=settings.move_to)
     return V4l2Camera(
         V4l2Settings(
             device=str(settings.device),
@@ -113,11 +112,6 @@ def make_camera(config: Config) -> Camera:
             exposure_s=None if settings.exposure_ms is None else settings.exposure_ms / 1000,
         )
     )
-
-
-def camera_timeout_s(config: Config) -> float:
-    """The longest wait for a frame, seconds."""
-    return config.camera.timeout_s if isinstance(config.camera, V4l2CameraSettings) else CycleSettings.camera_timeout_s
 
 
 def make_controller(config: Config) -> Controller | None:
@@ -141,9 +135,9 @@ def cycle_settings(config: Config) -> CycleSettings:
     """The bounds of a job."""
     settings = config.controller
     if isinstance(settings, NoController):
-        return CycleSettings(default_recipe=config.default_recipe, camera_timeout_s=camera_timeout_s(config))
+        return CycleSettings(default_recipe=config.default_recipe, camera_timeout_s=config.camera.timeout_s)
     return CycleSettings(
-        camera_timeout_s=camera_timeout_s(config),
+        camera_timeout_s=config.camera.timeout_s,
         default_recipe=config.default_recipe,
         valid_for_s=settings.valid_for_s,
         job_timeout_s=settings.job_timeout_s,

@@ -90,6 +90,17 @@ def test_relative_paths_count_from_the_files_folder(tmp_path: Path, monkeypatch:
     assert config.journal.path == tmp_path / "var" / "journal.sqlite"
 
 
+def test_both_paths_of_a_file_camera_count_from_the_files_folder(tmp_path: Path) -> None:
+    config = load(tmp_path, SMALL.replace("path: in", "path: in, loop: false, watch: true, move_to: done"))
+    assert (config.camera.path, config.camera.move_to) == (tmp_path / "in", tmp_path / "done")
+
+
+@pytest.mark.parametrize("option", ["watch: true", "move_to: done"])
+def test_files_are_not_taken_once_and_again(tmp_path: Path, option: str) -> None:
+    with pytest.raises(ConfigError, match="Set loop: false"):
+        load(tmp_path, SMALL.replace("path: in", f"path: in, loop: true, {option}"))
+
+
 def test_absolute_paths_stay(tmp_path: Path) -> None:
     assert load(tmp_path, SMALL.replace("path: in", "path: /srv/in")).camera.path == Path("/srv/in")
 

@@ -121,14 +121,22 @@ def make_controller(config: Config) -> Controller | None:
         return None
     if not isinstance(settings, ModbusTcp):
         raise WiringError(f"controller.kind {settings.kind!r} is not built in yet, expected 'modbus-tcp' or 'none'")
-    layout = MailboxLayout(
+    layout = mailbox_layout(config)
+    return ModbusTcpController(settings.host, settings.port, settings.device_id, layout, timeout_s=settings.timeout_s)
+
+
+def mailbox_layout(config: Config) -> MailboxLayout | None:
+    """Where the mailbox lies in the controller's registers, None for `kind: none`."""
+    settings = config.controller
+    if isinstance(settings, NoController):
+        return None
+    return MailboxLayout(
         settings.link_address,
         settings.service_address,
         settings.contour_address,
         settings.payload_capacity,
         settings.word_order,
     )
-    return ModbusTcpController(settings.host, settings.port, settings.device_id, layout, timeout_s=settings.timeout_s)
 
 
 def cycle_settings(config: Config) -> CycleSettings:

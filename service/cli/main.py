@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from service.cli.errors import EXIT_UNUSABLE, UserError
 
-COMMANDS = ("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema", "reasons")
+COMMANDS = ("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema", "reasons", "register-map")
 
 DESCRIPTION = """\
 NAME

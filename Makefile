@@ -30,6 +30,10 @@ bench: install
 accuracy: install
 	$(BIN)/python -m benchmarks.bench --random 300 --first 920000 --write
 
+# Hours of campaigns under faults and kills; resumes where it was broken off. Options: make soak SOAK='--fresh --workers 4'
+soak: install
+	$(BIN)/python -m tests.soak $(SOAK)
+
 check: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

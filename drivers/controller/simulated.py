@@ -185,7 +185,9 @@ class SimulatedController:
 
     def request_measurement(self, recipe: int = 0, thickness_um: int = 0, *, force: bool = False) -> int:
         """Trigger a measurement and return the new `trigger_counter`; see ControllerProgram.request_measurement."""
-        return self._program.request_measurement(recipe, thickness_um, force=force)
+        counter = self._program.request_measurement(recipe, thickness_um, force=force)
+        self.verdict.tell("trigger", session=self._program.session, trigger=counter, recipe=recipe)
+        return counter
 
     @property
     def can_request(self) -> bool:
@@ -228,10 +230,23 @@ class SimulatedController:
     def _scan(self) -> None:
         now = self._now()
         program = self._program
+        session = program.session
         contour = program.scan(int((now - self._run_since) * 1000))
+        if program.session != session:
+            self.verdict.tell("session", session=program.session)
         self._watch.tick(now, *self._window.trigger)
-        for _, answer in program.answered:
+        for copy, answer in program.answered:
             self.verdict.answers[answer] += 1
+            self.verdict.tell(
+                "answer",
+                job=copy.job_id,
+                page=copy.page,
+                layout=copy.layout,
+                answer=int(answer),
+                session=program.session,
+                trigger=copy.trigger,
+                whole=contour is not None,
+            )
         program.answered.clear()
         if contour is not None:
             self.verdict.accepted += 1
@@ -262,6 +277,7 @@ class SimulatedController:
         fault = self.faults.strike(targets_of(request.pdu, self._layout), self._now() - self._began)
         if fault is not None:
             self.verdict.faults[fault.name] += 1
+            self.verdict.tell("fault", kind=fault.name, request=request.pdu[:5].hex(" "))
             self._watch.excuse()
         return fault
 

@@ -78,7 +78,7 @@ class ControllerProgram:
     ) -> None:
         self.state = READY
         self.pace = pace or Pace()
-        self.answered: list[tuple[int, int]] = []
+        self.answered: list[tuple[PageCopy, int]] = []
         self._registers = registers
         self._layout = layout
         self._memory = memory
@@ -165,6 +165,11 @@ class ControllerProgram:
     # --- triggers -----------------------------------------------------------------------------------------------
 
     @property
+    def session(self) -> int:
+        """This run's session, 0 while the program starts."""
+        return self._session
+
+    @property
     def trigger_open(self) -> bool:
         """True from a request for a measurement until its contour got a final answer, or there will be none."""
         return self._trigger_open
@@ -219,7 +224,7 @@ class ControllerProgram:
             if copy.trigger and copy.trigger == self._link(2):
                 self._trigger_open = False
         self._to_write += [{7: reply}, {6: copy.transfer}]
-        self.answered.append((copy.job_id, reply))
+        self.answered.append((copy, reply))
         self._write_answer()
         return contour
 

@@ -6,6 +6,7 @@ import asyncio
 import os
 import socket
 import struct
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
@@ -43,6 +44,50 @@ class Device(Protocol):
         """A client came or went."""
 
 
+class Outlet:
+    """Where replies leave. On a serial line, or a serial server's, they leave in order, to whoever listens by then.
+
+    late: hold a frame back, and on a line all that follow it, for so long.
+    """
+
+    def __init__(self, in_order: bool, later: Callable[[float, Callable[[], None]], None]) -> None:
+        self._in_order = in_order
+        self._later = later
+        self._held: deque[bytes] = deque()
+        self._listener: Callable[[bytes], None] = lambda _frame: None
+
+    def listen(self, send: Callable[[bytes], None]) -> None:
+        """From here on replies go to `send`."""
+        self._listener = send
+
+    def send(self, frame: bytes) -> None:
+        """Send a frame, behind those that are held back."""
+        if self._held:
+            self._held.append(frame)
+        else:
+            self._listener(frame)
+
+    def late(self, seconds: float, frame: bytes, sent: Callable[[], None]) -> None:
+        """Send a frame so much later; `sent` is called then."""
+
+        def release() -> None:
+            sent()
+            if not self._in_order:
+                self._listener(frame)
+                return
+            held, self._held = self._held, deque()
+            for waiting in held:
+                self._listener(waiting)
+
+        if self._held:  # it waits behind another late one as it is
+            self._held.append(frame)
+            sent()
+            return
+        if self._in_order:
+            self._held.append(frame)
+        self._later(seconds, release)
+
+
 class Exchange:
     """Requests of one connection or line: done in order, befallen by faults, answered through `send`."""
 
@@ -53,7 +98,7 @@ class Exchange:
         faults: FaultPlan,
         later: Callable[[float, Callable[[], None]], None],
         *,
-        send: Callable[[bytes], None],
+        outlet: Outlet,
         reset: Callable[[], None] | None,
     ) -> None:
         self._device = device
@@ -61,7 +106,8 @@ class Exchange:
         self._framing = new_framing(framing)
         self._faults = faults
         self._later = later
-        self._send = send
+        self._outlet = outlet
+        self._send = outlet.send
         self._reset = reset
         self._dead = False
         self._waiting = 0  # requests whose reply has not left
@@ -134,11 +180,10 @@ class Exchange:
             self._later(fault.delay_s, lambda: self._send(frame))
         else:
             self._waiting += 1
-            self._later(fault.delay_s, lambda: self._send_late(frame))
+            self._outlet.late(fault.delay_s, frame, self._sent_late)
 
-    def _send_late(self, frame: bytes) -> None:
+    def _sent_late(self) -> None:
         self._waiting -= 1
-        self._send(frame)
 
     def _refuse(self, fault: Fault, request: Request) -> None:
         self._send(self._framing.frame(request, bytes([request.pdu[0] | 0x80, fault.code])))
@@ -170,6 +215,7 @@ class RegisterServer:
         self._clients: set[asyncio.Task[None]] = set()
         self._server: asyncio.Server | None = None
         self._line: SerialEnd | None = None
+        self._outlet = Outlet(True, self._later)  # of all connections where there is a line behind them
 
     @property
     def port(self) -> int | None:
@@ -213,7 +259,9 @@ class RegisterServer:
     # --- inside -------------------------------------------------------------------------------------------------
 
     def _exchange(self, send: Callable[[bytes], None], reset: Callable[[], None] | None) -> Exchange:
-        return Exchange(self._device, self._framing, self._faults, self._later, send=send, reset=reset)
+        outlet = self._outlet if self._framing == "rtu" else Outlet(False, self._later)
+        outlet.listen(send)
+        return Exchange(self._device, self._framing, self._faults, self._later, outlet=outlet, reset=reset)
 
     def _later(self, seconds: float, act: Callable[[], None]) -> None:
         def run() -> None:

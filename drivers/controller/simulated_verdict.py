@@ -63,6 +63,7 @@ class Verdict:
     """Violations by kind (the keys of KINDS), answers given, and the longest pause between two heartbeats.
 
     A lost or late reply is no violation; what a client does about it may be. faults: what was done to the client.
+    on_event: gets each thing of note as it happens; see `tell`.
     """
 
     counts: Counter[str] = field(default_factory=Counter)
@@ -73,6 +74,7 @@ class Verdict:
     longest_heartbeat_gap_s: float = 0.0
     faults: Counter[str] = field(default_factory=Counter)
     now: Callable[[], datetime] = _utc
+    on_event: Callable[[dict[str, object]], None] | None = None
 
     @property
     def clean(self) -> bool:
@@ -92,6 +94,12 @@ class Verdict:
         kept = self.seen.setdefault(kind, [])
         if len(kept) < KEPT:
             kept.append(Violation(self.now(), text, address, tuple(values)))
+        self.tell("violation", kind=kind, text=text)
+
+    def tell(self, event: str, **values: object) -> None:
+        """Hand on what happened: session, trigger, acknowledged, answer, fault or violation, with its numbers."""
+        if self.on_event is not None:
+            self.on_event({"at": self.now().isoformat(timespec="milliseconds"), "event": event, **values})
 
     def as_json(self) -> dict[str, object]:
         """The verdict's file: `clean`, violations with rule, count, times, texts and registers, answers, contours."""

@@ -36,9 +36,11 @@ class ClientWatch:
         self._lost_write: str | None = None
         self._transfer: int | None = None  # as the client wrote it: late writes of the line's are not its own
         self._service: tuple[int, ...] | None = None
+        self._page: dict[int, int] = {}  # offsets and values that the client wrote since it cleared `transfer`
         self._owner = 0
         self._owner_at = 0.0
         self._settled = 0
+        self._acknowledged = (0, 0)
         self._counters: tuple[int, set[int]] = (0, set())
 
     # --- connection and heartbeat -------------------------------------------------------------------------------
@@ -134,6 +136,11 @@ class ClientWatch:
         if session and values[10] == session and values[3] not in self._issued(session, counter):
             text = f"trigger_ack {values[3]} of session {session}, whose trigger_counter is {counter}"
             self._verdict.note("unknown-trigger-acknowledged", text, self._layout.service_address, values)
+        acknowledged = (session, values[3])
+        if session and values[10] == session and values[3] and acknowledged != self._acknowledged:
+            self._acknowledged = acknowledged
+            job = u32(values, 6, self._layout.word_order)
+            self._verdict.tell("acknowledged", session=session, trigger=values[3], job=job)
 
     def _issued(self, session: int, counter: int) -> set[int]:
         if self._counters[0] != session:
@@ -174,10 +181,11 @@ class ClientWatch:
             text = f"offset {offset} while transfer was {transfer}"
             self._verdict.note("written-while-valid", text, contour + offset, values)
         self._cuts |= {offset, offset + len(values)}
+        self._page |= dict(enumerate(values, start=offset))
 
     def _commit(self, transfer: int, before: int, held: Sequence[int]) -> None:
         if transfer == 0:
-            self._cuts = set()
+            self._cuts, self._page = set(), {}
             return
         layout = self._layout
         block = held[layout.contour_address : layout.blocks["contour_address"][1]]
@@ -185,21 +193,27 @@ class ClientWatch:
         if before != 0:
             self._verdict.note("commit-without-clearing", f"transfer {transfer} over {before}")
         acknowledged = held[layout.link_address + 6]
-        if transfer == self._last_transfer and copy.content != self._last_content:
+        own = self._is_own(copy)
+        if own and transfer == self._last_transfer and copy.content != self._last_content:
             self._verdict.note("transfer-reused", f"transfer {transfer}, job {copy.job_id} page {copy.page}")
         elif copy.session != 0 and transfer in (self._last_transfer, acknowledged):
             self._verdict.note("transfer-not-new", f"transfer {transfer}, ack_transfer {acknowledged}")
         self._last_transfer, self._last_content = transfer, copy.content
         split = sorted(cut for cut in self._cuts if not _may_be_cut(cut, copy))
-        # A wrong CRC: the page is torn by what came late, or by a restart in between, and its values cannot be told.
-        if split and copy.payload_length <= layout.payload_capacity and copy.crc_is_right():
+        if split and own and copy.job_id:  # job 0: the program has restarted and cleared the page in between
             self._verdict.note("value-split", f"requests begin or end at offsets {split} of job {copy.job_id}")
+
+    def _is_own(self, copy: PageCopy) -> bool:
+        """True where the page is as the client wrote it, not spoilt by late writes and restarts."""
+        return all(copy.registers[offset] == value for offset, value in self._page.items())
 
     # --- pages --------------------------------------------------------------------------------------------------
 
     def page(self, copy: PageCopy, service_block: Sequence[int], session: int) -> None:
         """Judge a page whose CRC is right; `service_block` as it stands now, `session` the controller's."""
         service_block = self._service or service_block
+        if not self._is_own(copy) or (self._last_transfer and copy.transfer != self._last_transfer):
+            return
         if copy.job_id == 0 or copy.job_id < self._highest_job:
             self._verdict.note("job-went-down", f"job {copy.job_id} after job {self._highest_job}")
         if copy.job_id != self._job:

@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--baudrate", type=int, default=115200, metavar="BAUD", help="of --rtu; default 115200")
     parser.add_argument("--log", type=Path, metavar="FILE", help="append accepted contours as JSON Lines")
     parser.add_argument("--verdict", type=Path, metavar="FILE", help="write what the client did against the protocol")
+    parser.add_argument("--events", type=Path, metavar="FILE", help="append what happens, as it happens, as JSON Lines")
     parser.add_argument("--memory", type=Path, metavar="FILE", help="retained memory that outlives a restart")
     parser.add_argument("--scan-ms", type=float, default=10.0, metavar="MS", help="period of the program; default 10")
     parser.add_argument("--word-order", choices=("big", "little"), default="big", help="default big (ABCD)")
@@ -58,9 +59,11 @@ async def _serve(args: argparse.Namespace) -> int:
     stop = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    log = _open_log(args.log)
+    log, events = _open_log("--log", args.log), _open_log("--events", args.events)
     try:
         controller = _build(args, log)
+        if events is not None:
+            controller.verdict.on_event = lambda event: _write_line(events, event)
         await controller.start()
         where = f"{args.tcp.rpartition(':')[0]}:{controller.port}" if args.tcp else args.rtu
         print(f"simulated controller on {where}", flush=True)
@@ -71,8 +74,9 @@ async def _serve(args: argparse.Namespace) -> int:
     except ControllerError as error:
         raise UserError(str(error)) from error
     finally:
-        if log is not None:
-            log.close()
+        for file in (log, events):
+            if file is not None:
+                file.close()
     if args.verdict is not None:
         _write_verdict(args.verdict, controller)
     print(controller.verdict, flush=True)
@@ -91,8 +95,7 @@ def _build(args: argparse.Namespace, log: TextIO | None) -> SimulatedController:
         points = sum(len(ring) for ring in contour.rings)
         print(f"job {contour.job_id} accepted: {points} vertices, {contour.area_mm2} mm²", flush=True)
         if log is not None:
-            log.write(json.dumps(contour.as_json()) + "\n")
-            log.flush()
+            _write_line(log, contour.as_json())
             os.fsync(log.fileno())
 
     options = {
@@ -133,13 +136,18 @@ async def _trigger(controller: SimulatedController, period_s: float, recipe: int
             print(f"trigger {controller.request_measurement(recipe)}", flush=True)
 
 
-def _open_log(path: Path | None) -> TextIO | None:
+def _write_line(file: TextIO, line: dict[str, object]) -> None:
+    file.write(json.dumps(line) + "\n")
+    file.flush()
+
+
+def _open_log(option: str, path: Path | None) -> TextIO | None:
     if path is None:
         return None
     try:
         return path.open("a", encoding="utf-8")
     except OSError as error:
-        raise UserError(f"--log {path}: cannot be written: {error.strerror}. Name another file") from error
+        raise UserError(f"{option} {path}: cannot be written: {error.strerror}. Name another file") from error
 
 
 def _last_logged(path: Path | None) -> int | None:

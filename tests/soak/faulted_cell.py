@@ -1,0 +1,414 @@
+"""Service and controller in one process, every request at risk, both restarted at random, until enough jobs ended."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import random
+import time
+import tty
+from collections import Counter
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from contour.geometry import Contour, area
+from drivers.camera import CameraUnavailable
+from drivers.camera.simulated import SimulatedCamera
+from drivers.controller.layout import MailboxLayout
+from drivers.controller.simulated import (
+    AcceptedContour,
+    FaultPlan,
+    Pace,
+    SimulatedController,
+    TriggerNotPossible,
+)
+from drivers.controller.simulated_faults import Fault
+from service import wiring
+from service.config import Config
+from service.cycle import Observation
+from service.daemon import Daemon
+from service.executor import TriggerRefused
+from service.journal import TriggerStamp
+from service.measure import Measurement
+from service.state import State
+from tests.soak.promises import Evidence, Findings, Taken, judge, micrometres
+from tests.system.processes import jobs
+
+Transport = Literal["tcp", "rtu-over-tcp", "rtu"]
+
+VALID_FOR_S = 0.8
+TIMEOUT_S = 0.08
+LINE_FAULTS = ("lost-request", "lost-reply", "garbled-request", "garbled-reply", "foreign-reply")
+CONNECTION_FAULTS = ("reset-before", "reset-after", "half-open")
+LATE = (0.02, 0.1, 0.3, 0.9)  # below and above the time-out, and past a reconnection
+EXCEPTIONS = (2, 3, 4, 5, 6)
+CALIBRATION = """version: 1
+kind: simple
+image_width: 8
+image_height: 6
+mm_per_pixel: 1
+plane_height_mm: 0
+origin_px: [0, 0]
+rotation_deg: 0
+"""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """One campaign: how many jobs, over what, and under which faults. risk: chance of a fault, of one write."""
+
+    seed: int
+    jobs: int
+    transport: Transport = "tcp"
+    risk: float = 0.06
+    has_clock: bool = True
+    forgetful: bool = False
+    word_order: Literal["big", "little"] = "big"
+    payload_capacity: int = 1984
+    slow_program: bool = False
+
+    def __str__(self) -> str:
+        words = [f"seed {self.seed}", self.transport, f"risk {self.risk:g}", f"word order {self.word_order}"]
+        words += [f"{self.payload_capacity} registers"]
+        words += ["no clock"] * (not self.has_clock) + ["forgetful"] * self.forgetful + ["slow"] * self.slow_program
+        return ", ".join(words)
+
+
+@dataclass
+class Outcome:
+    """What a campaign came to."""
+
+    findings: Findings
+    outcomes: Counter[str]
+    faults: Counter[str]
+    restarts: Counter[str]
+    accepted: int
+    acknowledged: int
+    pages: int
+    seconds: float
+
+
+def fault_rules(risk: float) -> list[Fault]:
+    """Every kind of fault; a read is struck a twentieth as often as a write, for most requests only look."""
+    rules = [Fault(kind, on="write", chance=risk / 12) for kind in LINE_FAULTS]  # type: ignore[arg-type]
+    rules += [Fault(kind, on="write", chance=risk / 12) for kind in CONNECTION_FAULTS]  # type: ignore[arg-type]
+    rules += [Fault("exception", on="write", chance=risk / 30, code=code, delay_s=0.1) for code in EXCEPTIONS]
+    for delay_s in LATE:
+        rules += [Fault("late-write", on="write", chance=risk / 20, delay_s=delay_s)]
+        rules += [Fault("late-reply", on="write", chance=risk / 40, delay_s=delay_s)]
+        rules += [Fault("repeated-reply", on="any", chance=risk / 200, delay_s=delay_s)]
+        rules += [Fault("late-reply", on="read", chance=risk / 400, delay_s=delay_s)]
+    rules += [Fault("exception", on="read", chance=risk / 400, code=code) for code in EXCEPTIONS]
+    rules += [Fault(kind, on="read", chance=risk / 100) for kind in (*LINE_FAULTS, *CONNECTION_FAULTS)]  # type: ignore[arg-type]
+    # The commit and what comes just before it: where a mistake would cost most.
+    rules += [Fault(kind, on="commit", chance=risk / 6) for kind in ("lost-reply", "reset-after")]  # type: ignore[arg-type]
+    rules += [Fault("late-write", on="clear", chance=risk / 12, delay_s=0.15)]
+    return rules
+
+
+class RandomContours:
+    """Stands in for the measurer: another contour each time, with or without a hole."""
+
+    def __init__(self, chance: random.Random, most_vertices: int) -> None:
+        self._chance = chance
+        self._most = most_vertices
+
+    def measure(self, *_: object, **__: object) -> Measurement:
+        exterior = self._ring(self._chance.randint(3, self._most), 50, 100)
+        holes = (self._ring(self._chance.randint(3, 6), 5, 15)[::-1],) if self._chance.random() < 0.3 else ()
+        contour = Contour(exterior, holes)
+        return Measurement("find-contours", pixels=contour, millimetres=contour, area_mm2=area(contour))
+
+    def _ring(self, vertices: int, least_mm: float, most_mm: float) -> np.ndarray:
+        """A star-shaped ring about the origin, counter-clockwise, in whole micrometres."""
+        turns = [number + self._chance.uniform(-0.3, 0.3) for number in range(vertices)]
+        angles = np.array(turns) * 2 * np.pi / vertices
+        radii = np.array([self._chance.uniform(least_mm, most_mm) for _ in range(vertices)])
+        return np.round(np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1), 3)
+
+
+class FaultedCell:
+    """Both sides, what befalls them, and what the controller took."""
+
+    def __init__(self, folder: Path, terms: Terms) -> None:
+        self.chance = random.Random(terms.seed)
+        self.folder = folder
+        self.terms = terms
+        self.layout = MailboxLayout(payload_capacity=terms.payload_capacity, word_order=terms.word_order)
+        self.faults = FaultPlan(fault_rules(terms.risk), terms.seed)
+        self.taken: list[Taken] = []
+        self.events: list[dict[str, Any]] = []
+        self.exposed: dict[int, float] = {}
+        self.measured: dict[int, Any] = {}
+        self.restarts: Counter[str] = Counter()
+        self.findings_of_life = Findings()
+
+    # --- the parts ----------------------------------------------------------------------------------------------
+
+    def judge(self, _contour: AcceptedContour) -> int:
+        return self.chance.choices((1, 4, 7), (8, 1, 1))[0]
+
+    def note_accepted(self, contour: AcceptedContour) -> None:
+        session, trigger = self.controller.registers(13, 1)[0], self.controller.registers(2, 1)[0]
+        self.taken.append(Taken(contour.job_id, micrometres(contour.rings), time.monotonic(), session, trigger))
+
+    def note_seen(self, seen: Observation) -> None:
+        assert seen.measurement.millimetres is not None
+        self.exposed[seen.job.job_id] = seen.frame.exposed_at_s
+        rings = [ring.tolist() for ring in seen.measurement.millimetres.rings]
+        self.measured[seen.job.job_id] = micrometres(rings)
+
+    def picture(self, _number: int) -> np.ndarray:
+        if self.faults.enabled and self.chance.random() < 0.01:
+            raise CameraUnavailable("unplugged")
+        return np.zeros((6, 8), np.uint8)
+
+    def new_controller(self) -> SimulatedController:
+        terms = self.terms
+        options: dict[str, Any] = {
+            "layout": self.layout,
+            "scan_s": 0.002,
+            "memory_path": self.folder / "memory.json",
+            "has_clock": terms.has_clock,
+            "clock_start_ms": 2**32 - 3000,  # it wraps while the campaign runs
+            "judge": self.judge,
+            "faults": self.faults,
+            "on_accepted": self.note_accepted,
+        }
+        if terms.slow_program:
+            options["pace"] = Pace(copy_scans=4, check_scans=3, stepwise=True)
+        if terms.transport == "rtu":
+            return SimulatedController.on_serial(self.far_port, **options)
+        return SimulatedController(port=self.port, framing="tcp" if terms.transport == "tcp" else "rtu", **options)
+
+    async def start_controller(self) -> None:
+        before = getattr(self, "controller", None)
+        self.controller = self.new_controller()
+        if before is not None:  # one verdict, and one client to judge, over all starts
+            self.controller.verdict = before.verdict
+            self.controller._watch._verdict = before.verdict
+        self.controller.verdict.on_event = self.events.append
+        await self.controller.start()
+        if self.terms.transport != "rtu":
+            self.port = self.controller.port
+
+    def config(self) -> Config:
+        terms = self.terms
+        wires: dict[str, Any] = {
+            "tcp": {"kind": "modbus-tcp", "port": self.port},
+            "rtu-over-tcp": {"kind": "modbus-rtu-over-tcp", "port": self.port},
+            "rtu": {"kind": "modbus-rtu", "port": self.near_port, "baudrate": 115200},
+        }[terms.transport]
+        return Config.model_validate(
+            {
+                "camera": {"kind": "files", "path": str(self.folder)},
+                "calibration": {"file": str(self.folder / "calibration.yaml")},
+                "controller": {
+                    **wires,
+                    "timeout_s": TIMEOUT_S,
+                    "poll_period_s": 0.005,
+                    "heartbeat_timeout_s": 1.0,
+                    "ready_timeout_s": 0.4,
+                    "ack_timeout_s": 0.15,
+                    "valid_for_s": VALID_FOR_S,
+                    "job_timeout_s": VALID_FOR_S,
+                    "word_order": terms.word_order,
+                    "payload_capacity": terms.payload_capacity,
+                },
+                "triggers": [{"kind": "controller"}],
+                "service": {"state_dir": str(self.folder)},
+                "journal": {"path": str(self.folder / "journal.sqlite")},
+                "archive": {"path": str(self.folder / "archive")},
+            }
+        )
+
+    def start_service(self) -> None:
+        """A daemon as wired for the shop floor, but for its camera and its measurer."""
+        parts = wiring.build(self.config(), observe=self.note_seen)
+        cycle: Any = parts.executor._runner
+        cycle._measurer = RandomContours(self.chance, 4 if self.terms.payload_capacity < 64 else 40)
+        cycle._camera = parts.camera = SimulatedCamera(self.picture)
+        cycle._abort = lambda _job: None  # it is killed, not stopped: nobody tidies up
+        self.parts = parts
+        self.running = asyncio.ensure_future(Daemon(parts).run())
+
+    # --- what befalls them --------------------------------------------------------------------------------------
+
+    async def ask(self) -> None:
+        """The machine's person: triggers from the controller, and now and then one of another kind."""
+        while True:
+            await asyncio.sleep(self.chance.uniform(0, 0.02))
+            if self.chance.random() < 0.1:
+                with suppress(TriggerRefused):
+                    await self.parts.executor.submit(TriggerStamp("serial"))
+            with suppress(TriggerNotPossible):
+                self.controller.request_measurement(force=self.chance.random() < 0.01)
+
+    async def machine(self) -> None:
+        """The machine is busy at times, and its program slow."""
+        while True:
+            await asyncio.sleep(self.chance.uniform(0.3, 3.0))
+            self.controller.set_state(self.chance.choice((0, 2, 3)))
+            await asyncio.sleep(self.chance.uniform(0, 0.2))
+            self.controller.set_state(1)
+            if self.chance.random() < 0.3:
+                self.controller.scan_s = 0.06
+                await asyncio.sleep(self.chance.uniform(0, 0.4))
+                self.controller.scan_s = 0.002
+
+    async def in_the_midst_of_a_transfer(self) -> None:
+        for _ in range(200):
+            if self.parts.health.job is not None and self.chance.random() < 0.1:
+                break
+            await asyncio.sleep(0.001)
+        await asyncio.sleep(self.chance.uniform(0, 0.015))
+
+    async def restart_service(self) -> None:
+        await self.in_the_midst_of_a_transfer()
+        self.restarts["service"] += 1
+        await self.end_service()
+        self.start_service()
+
+    async def end_service(self) -> None:
+        self.running.cancel()
+        with suppress(asyncio.CancelledError):
+            await self.running
+
+    async def restart_program(self) -> None:
+        await self.in_the_midst_of_a_transfer()
+        keep = self.chance.random() < 0.5
+        self.restarts["controller, registers kept" if keep else "controller, registers lost"] += 1
+        self.controller.restart(keep_registers=keep)
+
+    async def power_off(self) -> None:
+        await self.in_the_midst_of_a_transfer()
+        self.restarts["controller, switched off and on"] += 1
+        await self.controller.stop()
+        await asyncio.sleep(self.chance.uniform(0, 0.3))
+        await self.start_controller()
+
+    async def forget(self) -> None:
+        await self.in_the_midst_of_a_transfer()
+        self.restarts["controller, memory lost"] += 1
+        self.controller.restart(forget=True, keep_registers=self.chance.random() < 0.3)
+
+    # --- a campaign ---------------------------------------------------------------------------------------------
+
+    async def run(self, bound_s: float) -> Outcome:
+        """Jobs until there are enough, rest, judgement; what does not come in time is a finding."""
+        started = time.monotonic()
+        self.port, self.near_port, self.far_port = 0, "", ""
+        (self.folder / "calibration.yaml").write_text(CALIBRATION)
+        async with crossed_line() as (self.near_port, self.far_port):
+            await self.start_controller()
+            self.start_service()
+            people = [asyncio.ensure_future(self.ask()), asyncio.ensure_future(self.machine())]
+            try:
+                await self._until_enough(started + bound_s)
+            finally:
+                for person in people:
+                    person.cancel()
+                await asyncio.wait(people)
+            await self._rest()
+            await self.end_service()
+            await self.controller.stop()
+        rows = jobs(self.folder / "journal.sqlite")
+        evidence = Evidence(
+            jobs=rows,
+            taken=self.taken,
+            events=self.events,
+            measured=self.measured,
+            exposed=self.exposed,
+            valid_for_s=VALID_FOR_S if self.terms.has_clock else None,
+            verdict_kinds=self.controller.verdict.counts,
+            memory_lost=self.terms.forgetful,
+        )
+        findings = judge(evidence)
+        for text in self.findings_of_life.texts:
+            findings.add("ended", text)
+        for kind, texts in self.controller.verdict.texts.items():
+            findings.texts += [f"  {kind}: {text}" for text in texts[:3] if kind != "heartbeat-stalled"]
+        return Outcome(
+            findings,
+            Counter(str(row["outcome"]) for row in rows),
+            self.faults.struck,
+            self.restarts,
+            len(self.taken),
+            sum(event["event"] == "acknowledged" for event in self.events),
+            sum(event["event"] == "answer" and event["layout"] == 1 for event in self.events),
+            time.monotonic() - started,
+        )
+
+    async def _until_enough(self, give_up_at: float) -> None:
+        events: list[Callable[[], Awaitable[None]]] = [self.restart_service, self.restart_program, self.power_off]
+        events += [self.forget] * self.terms.forgetful
+        while self._ended() < self.terms.jobs:
+            await asyncio.sleep(self.chance.uniform(0.3, 3.0) + (0 if self.terms.has_clock else 1.2))
+            await self.chance.choice(events)()
+            if self.running.done():
+                self._end_of_service()
+                return
+            if time.monotonic() >= give_up_at:
+                self.findings_of_life.add("ended", f"{self._ended()} of {self.terms.jobs} jobs in the time given")
+                return
+
+    def _ended(self) -> int:
+        return sum(row["outcome"] is not None for row in jobs(self.folder / "journal.sqlite"))
+
+    def _end_of_service(self) -> None:
+        self.findings_of_life.add("ended", f"the service ended: {self.running!r}")
+
+    async def _rest(self) -> None:
+        """Without faults, until all is settled and the service is ready again."""
+        self.faults.enabled = False
+        self.controller.set_state(1)
+        self.controller.scan_s = 0.002
+        try:
+            async with asyncio.timeout(30):
+                while not self._at_rest():
+                    if self.running.done():
+                        self._end_of_service()
+                        return
+                    await asyncio.sleep(0.02)
+        except TimeoutError:
+            fault = self.parts.health.first()
+            why = fault.text if fault else "a job or trigger stays open"
+            self.findings_of_life.add("ended", f"no rest within 30 s: {self.parts.health.state.label}: {why}")
+
+    def _at_rest(self) -> bool:
+        return (
+            self.parts.health.state is State.READY
+            and not self.parts.journal.unsettled()
+            and not self.controller.trigger_open
+            and self.parts.executor._pending() is None
+        )
+
+
+@asynccontextmanager
+async def crossed_line() -> AsyncIterator[tuple[str, str]]:
+    """Two serial ports, crossed: what is written to one is read from the other."""
+    loop = asyncio.get_running_loop()
+    ends = [os.openpty(), os.openpty()]
+    for master, slave in ends:
+        tty.setraw(slave)
+        os.set_blocking(master, False)
+
+    def carry(source: int, target: int) -> None:
+        with suppress(BlockingIOError):
+            os.write(target, os.read(source, 4096))
+
+    (one, one_slave), (other, other_slave) = ends
+    loop.add_reader(one, carry, one, other)
+    loop.add_reader(other, carry, other, one)
+    try:
+        yield os.ttyname(one_slave), os.ttyname(other_slave)
+    finally:
+        for master, slave in ends:
+            loop.remove_reader(master)
+            os.close(master)
+            os.close(slave)

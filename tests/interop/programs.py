@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
+import re
+import socket
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +16,9 @@ from pathlib import Path
 from tests.real_parts import missing, need_program
 
 HERE = Path(__file__).parent
-LIBMODBUS_INSTALL = "apt-get install gcc pkg-config libmodbus-dev"
+LIBMODBUS_INSTALL = "apt-get install gcc libc6-dev pkg-config libmodbus-dev"
+NODE_INSTALL = "apt-get install nodejs npm"
+MODBUS_SERIAL = "modbus-serial@8"
 
 
 @functools.cache
@@ -25,21 +31,47 @@ def compiled(name: str) -> Path:
     )
     if flags.returncode:
         missing(f"libmodbus is not here. Install it: {LIBMODBUS_INSTALL}")
-    folder = tempfile.TemporaryDirectory(prefix="combtrace-interop-")
-    _folders.append(folder)
-    program = Path(folder.name) / name
+    program = _folder() / name
     command = ["gcc", "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(program)]
     subprocess.run([*command, str(HERE / f"{name}.c"), *flags.stdout.split()], check=True)
     return program
+
+
+@functools.cache
+def node_modules() -> Path:
+    """The folder of npm packages, with modbus-serial in it; installed once a run."""
+    npm = need_program("npm", NODE_INSTALL)
+    folder = _folder()
+    command = [
+        npm,
+        "install",
+        "--prefix",
+        str(folder),
+        "--omit=optional",
+        "--ignore-scripts",
+        "--no-audit",
+        "--no-fund",
+    ]
+    done = subprocess.run([*command, MODBUS_SERIAL], capture_output=True, text=True, timeout=120, check=False)
+    if done.returncode:
+        missing(f"npm cannot install {MODBUS_SERIAL}: {done.stderr.strip()[-300:]}")
+    return folder / "node_modules"
+
+
+def _folder() -> Path:
+    folder = tempfile.TemporaryDirectory(prefix="combtrace-interop-")
+    _folders.append(folder)
+    return Path(folder.name)
 
 
 _folders: list[tempfile.TemporaryDirectory[str]] = []  # each is removed when the interpreter ends
 
 
 @contextlib.contextmanager
-def running(*command: str | Path) -> Iterator[tuple[subprocess.Popen[str], int]]:
+def running(*command: str | Path, **environment: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """The process, and the number after "ready" on its first line; killed at the end."""
-    process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True)
+    words = [str(word) for word in command]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env={**os.environ, **environment})
     with process:
         try:
             assert process.stdout is not None
@@ -65,3 +97,38 @@ def libmodbus_rtu(
     line = (device, str(registers), str(baudrate), parity, str(stop_bits))
     with running(compiled("libmodbus_server"), "rtu", *line) as (process, _):
         yield process
+
+
+@contextlib.contextmanager
+def pymodbustcp(registers: int = 10_000) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A pyModbusTCP server on loopback, and its port."""
+    with running(sys.executable, HERE / "pymodbustcp_server.py", "0", str(registers)) as started:
+        yield started
+
+
+@contextlib.contextmanager
+def modbus_serial(registers: int = 10_000) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A server of npm's modbus-serial on loopback, and its port."""
+    node = need_program("node", NODE_INSTALL)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    script = HERE / "modbus_serial_server.js"
+    with running(node, script, str(port), str(registers), NODE_PATH=str(node_modules())) as started:
+        yield started
+
+
+TCP_SERVERS = {"libmodbus": libmodbus_tcp, "pyModbusTCP": pymodbustcp, "modbus-serial": modbus_serial}
+
+
+def mbpoll_reads(address: int, count: int, *where: str) -> list[int]:
+    """Holding registers as mbpoll reads them; where: its device or host, and options of the line."""
+    mbpoll = need_program("mbpoll", "apt-get install mbpoll")
+    registers: list[int] = []
+    while len(registers) < count:
+        options = ["-0", "-1", "-q", "-t", "4:hex", "-r", str(address + len(registers))]
+        options += ["-c", str(min(125, count - len(registers)))]
+        said = subprocess.run([mbpoll, *options, *where], capture_output=True, text=True, timeout=30, check=False)
+        assert said.returncode == 0, said.stdout + said.stderr
+        registers += [int(value, 16) for value in re.findall(r"^\[\d+\]:\s+0x(\w{4})", said.stdout, re.MULTILINE)]
+    return registers

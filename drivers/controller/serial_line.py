@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 import termios
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -113,6 +114,6 @@ def _reason(error: BaseException) -> str:
         return "in use by another program"
     return {
         errno.ENOENT: "there is no such port",
-        errno.EACCES: "permission denied",
         errno.ENOTTY: "no serial port, or one that cannot do this",
-    }.get(number or 0, str(error))
+        errno.EINVAL: "the port cannot do this baud rate, parity or stop bits",
+    }.get(number or 0) or (os.strerror(number) if number else str(error))

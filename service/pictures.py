@@ -20,8 +20,13 @@ def write_overlay(path: Path, picture: NDArray[np.uint8], measurement: Measureme
     """Write the picture with the contour over it; the format follows the ending. Raise PictureFileError."""
     refused = bool(measurement.findings)
     drawn = draw_overlay(picture, measurement.pixels, caption=caption(measurement), refused=refused)
+    write_picture(path, drawn)
+
+
+def write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:
+    """Write the picture, grey or BGR; the format follows the ending, PNG without one. Raise PictureFileError."""
     try:
-        done, data = cv2.imencode(path.suffix or ".png", drawn)
+        done, data = cv2.imencode(path.suffix or ".png", pixels)
         if not done:
             raise PictureFileError(f"{path}: could not be encoded. Use .png or .jpg")
         path.write_bytes(data.tobytes())

@@ -9,7 +9,10 @@ from collections.abc import Sequence
 
 from service.cli.errors import EXIT_UNUSABLE, UserError
 
-COMMANDS = ("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema", "reasons", "register-map")
+COMMANDS = (
+    *("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema"),
+    *("reasons", "register-map", "cameras", "grab", "focus"),
+)
 
 DESCRIPTION = """\
 NAME

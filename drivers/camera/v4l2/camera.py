@@ -135,7 +135,7 @@ class V4l2Camera:
         identity = identify(device)
         select_input(device, settings.input)
         picture = set_format(device, settings.width, settings.height, settings.pixel_format)
-        period_s = set_frame_rate(device, settings.frame_rate)
+        period_s = set_frame_rate(device, settings.frame_rate, settings.pixel_format)
         controls = apply_controls(device, settings.controls)
         told_s = exposure_s(device)
         return Opened(identity, picture, period_s, settings.exposure_s if told_s is None else told_s, controls)

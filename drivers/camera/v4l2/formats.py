@@ -81,7 +81,7 @@ def set_format(device: Device, width: int, height: int, code: str) -> PictureFor
     if given != (width, height, code):
         raise CameraRefused(
             f"{device.path}: asked for {width} x {height} {code}, the driver gives {given[0]} x {given[1]} {given[2]}; "
-            f"expected what was asked. There is: {offered(device)}. Correct camera.width, height and pixel_format."
+            f"expected what was asked. There is: {offered(device, code)}. Correct camera.width, height, pixel_format."
         )
     if pix.field != v4l2.FIELD_NONE:
         raise CameraRefused(
@@ -91,7 +91,7 @@ def set_format(device: Device, width: int, height: int, code: str) -> PictureFor
     return PictureFormat(code, width, height, pix.bytesperline, pix.sizeimage)
 
 
-def set_frame_rate(device: Device, frame_rate: float | None) -> float | None:
+def set_frame_rate(device: Device, frame_rate: float | None, code: str) -> float | None:
     """The frame period, seconds, None where the driver does not tell; raise CameraRefused for a rate it changes."""
     request = v4l2.StreamParameters(type=v4l2.BUF_TYPE_VIDEO_CAPTURE)
     known = device.answers(v4l2.G_PARM, request)
@@ -108,19 +108,17 @@ def set_frame_rate(device: Device, frame_rate: float | None) -> float | None:
     if frame_rate is not None and abs(period_s * frame_rate - 1) > RATE_TOLERANCE:
         raise CameraRefused(
             f"{device.path}: asked for {frame_rate:g} frames a second, the driver gives {1 / period_s:.4g}; expected "
-            f"what was asked. There is: {offered(device)}. Correct camera.frame_rate."
+            f"what was asked. There is: {offered(device, code)}. Correct camera.frame_rate."
         )
     return period_s
 
 
-def offered(device: Device) -> str:
-    """What the device offers, in one line for an error: formats that can be read here, with sizes and rates."""
-    parts = []
-    for entry in list_formats(device):
-        if entry.usable:
-            sizes = ", ".join(_size_text(size) for size in entry.sizes)
-            parts.append(f"{entry.code} {sizes}".strip())
-    return "; ".join(parts) or "no format that can be read here"
+def offered(device: Device, code: str) -> str:
+    """What the device offers, in one line for an error: the sizes and rates of a format, or which formats there are."""
+    usable = {entry.code: entry for entry in list_formats(device) if entry.usable}
+    if code in usable:
+        return f"{code} in " + ", ".join(_size_text(size) for size in usable[code].sizes)
+    return ", ".join(usable) or "no format that can be read here"
 
 
 def _size_text(size: SizeInfo) -> str:

@@ -1,0 +1,48 @@
+"""Figures of a picture that a person reads while a camera is set up: sharpness, lightness, clipping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+DARKEST, BRIGHTEST = 2, 253  # noise moves clipped pixels by a level or two
+
+
+@dataclass(frozen=True)
+class PictureFigures:
+    """sharpness: gradient energy over contrast, % a pixel; independent of gain and light, to be compared for one scene
+    only. mean: grey level, 0 to 255. dark_share, bright_share: pixels at the ends of the range, 0 to 1."""
+
+    sharpness: float
+    mean: float
+    dark_share: float
+    bright_share: float
+
+    def __str__(self) -> str:
+        return (
+            f"sharpness {self.sharpness:.1f} %, mean grey {self.mean:.0f}, "
+            f"{self.dark_share:.1%} black, {self.bright_share:.1%} white"
+        )
+
+
+def picture_figures(pixels: NDArray[np.uint8]) -> PictureFigures:
+    """Figures of a picture, shape (H, W) grey or (H, W, 3) BGR, uint8.
+
+    Sharpness is the root mean square of the Sobel gradient over the standard deviation of the grey levels (Tenenbaum's
+    measure, made independent of contrast); 0 for a picture of one grey.
+    """
+    grey = pixels if pixels.ndim == 2 else np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+    mean, deviation = (float(value[0, 0]) for value in cv2.meanStdDev(grey))
+    across = cv2.Sobel(grey, cv2.CV_32F, 1, 0, scale=1 / 8)
+    down = cv2.Sobel(grey, cv2.CV_32F, 0, 1, scale=1 / 8)
+    energy = float(cv2.mean(cv2.multiply(across, across))[0] + cv2.mean(cv2.multiply(down, down))[0])
+    total = grey.size
+    return PictureFigures(
+        sharpness=100 * float(np.sqrt(energy)) / deviation if deviation > 0 else 0.0,
+        mean=mean,
+        dark_share=float(np.count_nonzero(grey <= DARKEST)) / total,
+        bright_share=float(np.count_nonzero(grey >= BRIGHTEST)) / total,
+    )

@@ -4,6 +4,8 @@ ContourError
 ├── PictureError        the array is no usable picture (shape, dtype, empty)
 ├── ParameterError      a method's or renderer's parameter is out of its range
 ├── NoBlockFound        the picture was usable, but no block could be traced in it
+├── BoardNotSeen        the picture shows no calibration board that could be used
+├── CalibrationFailed   views or points from which no calibration can be had
 └── CalibrationError    a calibration that contradicts itself, or does not fit the picture
 """
 
@@ -26,3 +28,11 @@ class NoBlockFound(ContourError):
 
 class CalibrationError(ContourError):
     """The calibration contradicts itself, or does not fit the picture."""
+
+
+class BoardNotSeen(ContourError):
+    """The picture shows no calibration board that could be used; the message says what was seen instead."""
+
+
+class CalibrationFailed(ContourError):
+    """No calibration can be had from these views or points; the message says why, and what to do."""

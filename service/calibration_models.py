@@ -272,7 +272,7 @@ def _uncertainty_data(sure: PositionUncertainty) -> dict[str, Any]:
     planes = zip(sure.heights_mm, sure.figures_mm, sure.map_mm, strict=True)
     return {
         "planes": [
-            {"height_mm": float(height), "figure_mm": float(figure), "map": _matrix_data(plane)}
+            {"height_mm": float(height), "figure_mm": round(float(figure), 5), "map": _matrix_data(plane.round(5))}
             for height, figure, plane in planes
         ]
     }

@@ -10,8 +10,11 @@ from collections.abc import Sequence
 from service.cli.errors import EXIT_UNUSABLE, UserError
 
 COMMANDS = (
-    *("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema"),
-    *("reasons", "register-map", "cameras", "grab", "focus"),
+COMMANDS = (
+    *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
+    *("calibrate",),
+    *("schema", "reasons", "register-map"),
+)
 )
 
 DESCRIPTION = """\

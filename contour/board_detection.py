@@ -24,7 +24,7 @@ _LAYOUT_SHARE = 0.1
 """Markers lie on their plane to 3 px or a tenth of their side: lenses bend a board by less, another board by more."""
 
 _MARKER_RATIO, _MARKER_BLUR_PX = 0.03, 1.0
-"""A marker's corners are found to about half a pixel, inwards; what is more is another board, or a wrong --marker-mm."""
+"""A marker's corners are found to about half a pixel, inwards: more is another board, or a wrong --marker-mm."""
 
 _SPACING_TO_HALVE_PX = 60.0
 """Squares wider than 30 px are still 15 px wide at half the size, where a second board is searched in a quarter."""

@@ -10,11 +10,9 @@ from collections.abc import Sequence
 from service.cli.errors import EXIT_UNUSABLE, UserError
 
 COMMANDS = (
-COMMANDS = (
     *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
     *("calibrate",),
     *("schema", "reasons", "register-map"),
-)
 )
 
 DESCRIPTION = """\

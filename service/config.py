@@ -144,6 +144,9 @@ class ModbusController(Model):
     handshake: Literal["full", "none"] = Field(
         "full", description="none: a controller that cannot answer; jobs end as written, never as accepted."
     )
+    mode: Literal["send", "observe"] = Field(
+        "send", description="observe: make every contour and write nothing, to run beside an old process."
+    )
     readback: bool = Field(True, description="Read each page back before it is committed.")
     link_address: Register = Field(
         0, description="First register of the block that the controller writes (PDU address)."
@@ -202,14 +205,27 @@ class ModbusTcp(ModbusController):
     port: Port = Field(502, description="TCP port.")
 
 
+class Rs485(Model):
+    """A transceiver that the kernel's driver switches between sending and receiving by RTS."""
+
+    rts_level_for_tx: bool = Field(True, description="Level of RTS while sending.")
+    rts_level_for_rx: bool = Field(False, description="Level of RTS while receiving.")
+    delay_before_tx_s: float = Field(0, ge=0, le=1, description="From RTS to the first character, s.")
+    delay_before_rx_s: float = Field(0, ge=0, le=1, description="From the last character to RTS, s.")
+
+
 class ModbusRtu(ModbusController):
     """A controller over Modbus RTU on a serial port."""
 
     kind: Literal["modbus-rtu"]
-    port: str = Field(min_length=1, description="Serial port.")
+    port: str = Field(min_length=1, description="Serial port; one below /dev/serial/by-id keeps its name.")
     baudrate: int = Field(115_200, ge=300, le=4_000_000, description="Baud rate.")
     parity: Literal["N", "E", "O"] = Field("N", description="Parity.")
     stop_bits: Literal[1, 2] = Field(1, description="Stop bits.")
+    rs485: Rs485 | None = Field(
+        None, description="Keys below; none = RS-232, or a converter that switches its transceiver itself."
+    )
+    echo: bool = Field(False, description="What is sent comes back, as on two wires with a receiver that stays on.")
 
 
 class ModbusRtuOverTcp(ModbusController):
@@ -218,6 +234,9 @@ class ModbusRtuOverTcp(ModbusController):
     kind: Literal["modbus-rtu-over-tcp"]
     host: str = Field("127.0.0.1", min_length=1, description="Host name or address of the serial server.")
     port: Port = Field(4001, description="TCP port.")
+    baudrate: int = Field(
+        9600, ge=300, le=4_000_000, description="Baud rate of the line behind the serial server: silence and time-outs."
+    )
 
 
 class IntervalTrigger(Model):

@@ -31,6 +31,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`camera`", (config.FilesCamera, config.V4l2Camera)),
     ("`calibration`", (config.Calibration,)),
     ("`controller`", (config.ModbusTcp, config.ModbusRtu, config.ModbusRtuOverTcp, config.NoController)),
+    ("`controller.rs485`", (config.Rs485,)),
     ("`triggers`", (config.IntervalTrigger, config.ControllerTrigger, config.SerialTrigger)),
     ("`recipes`", (config.Recipe,)),
     ("`service`", (config.Service,)),
@@ -45,7 +46,6 @@ TYPES = {
     "string": "text",
     "boolean": "true, false",
 }
-NOT_YET = {config.ModbusRtu, config.ModbusRtuOverTcp}
 
 
 def reference() -> str:
@@ -64,8 +64,7 @@ def _section(title: str, models: tuple[type[BaseModel], ...]) -> str:
         kind = model.model_fields.get("kind")
         if kind is not None:
             text += f"\n### kind: {_choices(kind)}\n"
-        text += f"\n{(model.__doc__ or '').strip()}"
-        text += " Read and checked; the driver is not built in yet.\n" if model in NOT_YET else "\n"
+        text += f"\n{(model.__doc__ or '').strip()}\n"
         rows = list(_rows(model))
         if rows:
             text += "\n| key | value | default | meaning |\n|---|---|---|---|\n" + "".join(rows)

@@ -16,7 +16,7 @@ from service.executor import Executor, Ticket, TriggerRefused
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
-from service.lock import Lock
+from service.lock import Held
 from service.reasons import Reason
 from service.state import State
 
@@ -39,7 +39,7 @@ class Parts:
     executor: Executor
     link: Link | None
     pool: ThreadPoolExecutor
-    lock: Lock
+    lock: Held
     triggers: list[Callable[[], Awaitable[None]]] = field(default_factory=list)
     serial_pool: ThreadPoolExecutor | None = None
 

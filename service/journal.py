@@ -26,6 +26,10 @@ SCHEMA_VERSION = 1
 HEADER_REGISTERS = 31
 PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
 LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
+RESTORED = (
+    "job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
+    " withdraw_reason"
+)
 UNSETTLED = "outcome IS NULL"
 
 SCHEMA = """
@@ -205,7 +209,9 @@ class Journal:
             if job_id == 1:  # nothing is known of any job of before
                 job_id = self._number("first_job") or 1
             if job_id > LARGEST_JOB:
-                raise JournalError(f"{self._path}: job {highest} was the last that a register can hold. Move it away")
+                raise JournalError(
+                    f"{self._path}: {job_id - 1} was the last number that a register can hold. Move it away"
+                )
             db.execute(
                 "INSERT INTO jobs (job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe,"
                 " thickness_um) VALUES (?, ?, ?, ?, ?, ?, ?)",
@@ -240,6 +246,14 @@ class Journal:
                     " VALUES (?, ?, 'found', 0, 0, ?, ?)",
                     (job_id, self._stamp(), in_flight_in, int(Reason.SERVICE_RESTARTED)),
                 )
+
+    def restore(self, rows: list[tuple[Any, ...]], pair: tuple[int, int]) -> None:
+        """Take over from a damaged journal: jobs that had not ended (columns as in RESTORED), and the last trigger."""
+        marks = ", ".join("?" * len(RESTORED.split(",")))
+        with self._transaction() as db:
+            db.executemany(f"INSERT INTO jobs ({RESTORED}) VALUES ({marks})", rows)
+        if pair[1]:
+            self.adopt(max((row[0] for row in rows), default=0), pair, None)
 
     def _number(self, key: str) -> int:
         """A number of `meta`, 0 where it is not there; within a transaction or the lock."""

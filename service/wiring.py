@@ -13,20 +13,29 @@ from contour.calibration import Calibration
 from drivers.camera import Camera
 from drivers.camera.files import FileCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
-from drivers.controller import Controller
+from drivers.controller import Controller, modbus
 from drivers.controller.mailbox import MailboxLayout
-from drivers.controller.modbus import ModbusTcpController
 from drivers.trigger.serial import SerialLineTrigger
 from service.calibration_file import CalibrationFileError, load_calibration
-from service.config import Config, ControllerTrigger, FilesCamera, IntervalTrigger, ModbusTcp, NoController
+from service.config import (
+    Config,
+    ControllerTrigger,
+    FilesCamera,
+    IntervalTrigger,
+    ModbusRtu,
+    ModbusRtuOverTcp,
+    ModbusTcp,
+    NoController,
+)
 from service.config import SerialTrigger as SerialTriggerSettings
 from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation
 from service.daemon import Parts
 from service.executor import Executor
 from service.health import Fault, Health
 from service.journal import Journal, JournalError
+from service.journal_recovery import open_journal
 from service.link import Link, LinkSettings
-from service.lock import Lock, LockError
+from service.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
 from service.measure import Measurer
 from service.reasons import Reason
 from service.state import State, StateMachine
@@ -72,16 +81,47 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     return parts
 
 
-def _make_journal(config: Config) -> tuple[Lock, Journal]:
+def _make_journal(config: Config) -> tuple[Locks, Journal]:
+    locks = Locks()
+    state_lock = config.service.state_dir / "combtrace.lock"
+    ran_before = state_lock.exists()
     try:
-        lock = Lock(config.service.state_dir / "combtrace.lock")
-    except LockError as error:
+        locks.add(Lock(state_lock))
+        locks.add(journal_lock(config.journal.path))
+        for name in controller_names(config):
+            locks.add(NameLock(name))
+        journal = open_journal(config.journal.path, config.archive.path, ran_before=ran_before)
+    except (LockError, JournalError) as error:
+        locks.release()
         raise WiringError(str(error)) from error
     try:
-        return lock, Journal(config.journal.path)
-    except JournalError as error:
-        lock.release()
-        raise WiringError(str(error)) from error
+        _observe_settles_nothing(config, journal)
+    except WiringError:
+        journal.close()
+        locks.release()
+        raise
+    return locks, journal
+
+
+def controller_names(config: Config) -> list[str]:
+    """What of the controller must be this daemon's alone on this machine; nothing for one that only observes."""
+    settings = config.controller
+    if isinstance(settings, ModbusRtu):
+        return [serial_name(settings.port)]
+    if isinstance(settings, NoController) or settings.mode == "observe":
+        return []
+    unit = settings.device_id if isinstance(settings, ModbusTcp) else None
+    return network_names(settings.host, settings.port, unit)
+
+
+def _observe_settles_nothing(config: Config, journal: Journal) -> None:
+    """Raise WiringError where a job is in flight at the controller, which only a service that writes can settle."""
+    sent = [job.job_id for job in journal.unsettled() if job.sent]
+    if sent and not isinstance(config.controller, NoController) and config.controller.mode == "observe":
+        raise WiringError(
+            f"{config.journal.path}: job {sent[0]} is in flight at the controller, and mode observe cannot settle it. "
+            "Run once with mode send, or give this one its own journal.path and service.state_dir"
+        )
 
 
 def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:
@@ -115,14 +155,22 @@ def make_camera(config: Config) -> Camera:
 
 
 def make_controller(config: Config) -> Controller | None:
-    """The controller's driver, None for `kind: none`; raise WiringError for a kind that this version cannot drive."""
+    """The controller's driver, None for `kind: none`."""
     settings = config.controller
     if isinstance(settings, NoController):
         return None
-    if not isinstance(settings, ModbusTcp):
-        raise WiringError(f"controller.kind {settings.kind!r} is not built in yet, expected 'modbus-tcp' or 'none'")
     layout = mailbox_layout(config)
-    return ModbusTcpController(settings.host, settings.port, settings.device_id, layout, timeout_s=settings.timeout_s)
+    assert layout is not None
+    shared: tuple[int, MailboxLayout, float] = (settings.device_id, layout, settings.timeout_s)
+    if isinstance(settings, ModbusTcp):
+        return modbus.ModbusTcpController(settings.host, settings.port, *shared)
+    if isinstance(settings, ModbusRtuOverTcp):
+        return modbus.ModbusRtuOverTcpController(settings.host, settings.port, *shared, baudrate=settings.baudrate)
+    rs485 = None if settings.rs485 is None else modbus.Rs485(**settings.rs485.model_dump())
+    line = modbus.SerialLine(
+        settings.port, settings.baudrate, settings.parity, settings.stop_bits, rs485=rs485, echo=settings.echo
+    )
+    return modbus.ModbusRtuController(line, *shared)
 
 
 def mailbox_layout(config: Config) -> MailboxLayout | None:
@@ -149,6 +197,7 @@ def cycle_settings(config: Config) -> CycleSettings:
         default_recipe=config.default_recipe,
         valid_for_s=settings.valid_for_s,
         job_timeout_s=settings.job_timeout_s,
+        observe=settings.mode == "observe",
         mailbox=MailboxFormat(settings.word_order, settings.payload_capacity),
         transfer=TransferSettings(
             handshake=settings.handshake == "full",
@@ -168,7 +217,12 @@ def _make_link(config: Config) -> Link | None:
     settings = config.controller
     return Link(
         controller,
-        LinkSettings(settings.handshake == "full", settings.poll_period_s, settings.heartbeat_timeout_s),
+        LinkSettings(
+            settings.handshake == "full",
+            settings.poll_period_s,
+            settings.heartbeat_timeout_s,
+            observe=settings.mode == "observe",
+        ),
     )
 
 

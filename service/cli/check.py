@@ -111,12 +111,9 @@ def _camera(config: Config) -> Finding:
 async def _controller(config: Config) -> Finding:
     from drivers.controller import ControllerError
     from service.link import Link, LinkSettings
-    from service.wiring import WiringError, make_controller
+    from service.wiring import make_controller
 
-    try:
-        controller = make_controller(config)
-    except WiringError as error:
-        return Finding("controller", False, str(error))
+    controller = make_controller(config)
     if controller is None:
         return Finding("controller", True, "none: contours are traced and not sent")
     link = Link(controller, LinkSettings())
@@ -155,24 +152,28 @@ def _serial(config: Config) -> Iterator[Finding]:
 
 
 def _state_dir(config: Config) -> Finding:
-    from service.journal import Journal, JournalError
-    from service.lock import Lock, LockError
+    from service.journal import Journal, JournalDamaged, JournalError
+    from service.lock import Lock, LockError, journal_lock
 
+    path, state_lock = config.journal.path, config.service.state_dir / "combtrace.lock"
     try:
-        Lock(config.service.state_dir / "combtrace.lock").release()
-        journal = Journal(config.journal.path)
+        # What is not there the daemon makes: it tells by it whether it ran here before, and at which number to begin.
+        if state_lock.exists():
+            Lock(state_lock).release()
+        if not path.exists():
+            return Finding("journal", True, f"{path}: no job yet")
+        journal_lock(path).release()
+        journal = Journal(path)
     except LockError as error:
         return Finding("state", False, str(error))
+    except JournalDamaged as error:
+        return Finding("journal", False, f"{error} The daemon moves it aside at its next start.")
     except JournalError as error:
         return Finding("journal", False, str(error))
     last = journal.last_settled()
     unsettled = len(journal.unsettled())
     journal.close()
-    text = (
-        f"{config.journal.path}: last job {last.job_id} {last.outcome}"
-        if last
-        else f"{config.journal.path}: no job yet"
-    )
+    text = f"{path}: last job {last.job_id} {last.outcome}" if last else f"{path}: no job yet"
     return Finding("journal", True, text + (f", {unsettled} in flight" if unsettled else ""))
 
 

@@ -164,18 +164,6 @@ def test_once_with_a_bad_configuration_has_status_2(tmp_path: Path) -> None:
     assert once(tmp_path, recipes="[{number: 1}]").returncode == 2
 
 
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ({"controller": "{kind: modbus-rtu, port: /dev/ttyS0}"}, "controller.kind 'modbus-rtu' is not built in yet"),
-    ],
-)
-def test_a_kind_that_is_not_built_in_yet_is_told_and_has_status_2(tmp_path: Path, change: dict, text: str) -> None:
-    done = once(tmp_path, **change)
-    assert done.returncode == 2
-    assert text in done.stderr
-
-
 def test_a_journal_that_is_none_stops_the_daemon_with_status_2_and_stays_as_it_is(tmp_path: Path) -> None:
     (tmp_path / "journal.sqlite").write_bytes(b"somebody's notes" * 100)
     done = once(tmp_path, journal="{path: journal.sqlite}")

@@ -1,0 +1,213 @@
+"""A journal that is lost or damaged: nothing of it is thrown away, and no job number comes twice."""
+
+from __future__ import annotations
+
+import logging
+import sqlite3
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from drivers.controller.mailbox import Page
+from service.journal import Journal, JournalDamaged, JournalError, TriggerStamp
+from service.journal_recovery import highest_archived, highest_job, open_journal, set_aside
+from service.reasons import Outcome
+
+PAGE = Page((1, 0, 7, 1, 1, 1, 4, *[0] * 24), (1, 2, 3, 4))
+UNIX_S = 1_795_000_000
+
+
+def filled(path: Path, jobs: int) -> None:
+    """A journal of `jobs` settled jobs, then one of the controller's in flight, closed as after a clean stop."""
+    journal = Journal(path)
+    for _ in range(jobs):
+        journal.settle(journal.take(TriggerStamp("serial")).job_id, Outcome.ACCEPTED, None, None, {"text": "x" * 300})
+    job = journal.take(TriggerStamp("controller", session=9, counter=5))
+    journal.store_pages(job.job_id, 9, (PAGE,))
+    journal.close()
+
+
+def reopened(path: Path, *, ran_before: bool = True) -> Journal:
+    return open_journal(path, path.parent / "archive", ran_before=ran_before, now=lambda: UNIX_S)
+
+
+def test_a_sound_journal_is_opened_as_it_is(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 3)
+    journal = reopened(path)
+    assert journal.take(TriggerStamp("serial")).job_id == 5
+    journal.close()
+    assert caplog.records == []
+
+
+def test_the_first_journal_of_all_begins_with_job_1(tmp_path: Path) -> None:
+    journal = reopened(tmp_path / "journal.sqlite", ran_before=False)
+    assert journal.take(TriggerStamp("serial")).job_id == 1
+    journal.close()
+
+
+def test_a_lost_journal_begins_at_the_unix_time_and_says_so(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    journal = reopened(tmp_path / "journal.sqlite")
+    assert journal.take(TriggerStamp("serial")).job_id == UNIX_S
+    assert journal.take(TriggerStamp("serial")).job_id == UNIX_S + 1
+    journal.close()
+    (record,) = caplog.records
+    assert record.levelno == logging.CRITICAL
+    assert "the journal is lost" in record.message
+
+
+def test_an_emptied_file_is_a_lost_journal(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    path.touch()
+    journal = reopened(path)
+    assert journal.take(TriggerStamp("serial")).job_id == UNIX_S
+    journal.close()
+
+
+def test_a_lost_journal_goes_on_above_the_controllers_last_job(tmp_path: Path) -> None:
+    journal = reopened(tmp_path / "journal.sqlite")
+    assert journal.take(TriggerStamp("serial"), above=41).job_id == 42
+    journal.close()
+
+
+def test_a_lost_journal_goes_on_above_the_archive(tmp_path: Path) -> None:
+    for name in ("17", "18.json", "notes.txt", "0", "99999999999"):
+        (tmp_path / "archive" / "2026" / name).mkdir(parents=True)
+    assert highest_archived(tmp_path / "archive") == 2026
+    (tmp_path / "archive" / "2027-contour.json").touch()
+    journal = reopened(tmp_path / "journal.sqlite")
+    assert journal.take(TriggerStamp("serial")).job_id == 2028
+    journal.close()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    ["header gone", "middle gone", "cut off", "all but the last page gone"],
+)
+def test_a_damaged_journal_is_moved_aside_whole_and_numbers_go_on_above_it(
+    tmp_path: Path, damage: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 60)
+    content = bytearray(path.read_bytes())
+    if damage == "header gone":
+        content[:100] = bytes(100)
+    elif damage == "middle gone":
+        content[4096 * 2 : 4096 * 3] = b"\xa5" * 4096
+    elif damage == "cut off":
+        del content[len(content) - 4096 :]
+    else:
+        content[: len(content) - 4096] = b"\xa5" * (len(content) - 4096)
+    path.write_bytes(content)
+    with pytest.raises(JournalDamaged):
+        Journal(path)
+    journal = reopened(path)
+    (kept,) = set_aside(path)
+    assert kept.read_bytes() == content
+    job = journal.take(TriggerStamp("serial"))
+    assert job.job_id == 62 if damage != "cut off" else job.job_id > 30
+    journal.close()
+    assert [record.levelno for record in caplog.records if record.levelno > logging.INFO] == [logging.CRITICAL]
+
+
+def test_what_had_not_ended_is_brought_over_where_it_can_be_read(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 60)
+    content = bytearray(path.read_bytes())
+    # An index that says nothing true: SQLite's check finds it, its rows are still there.
+    root = next(
+        page
+        for page in range(2, len(content) // 4096)
+        if content[page * 4096] == 0x0A and content[page * 4096 + 4] == 1
+    )
+    content[root * 4096 + 4] = 0
+    path.write_bytes(content)
+    journal = reopened(path)
+    in_flight = journal.unsettled()
+    if in_flight:  # the damaged index may be the one that the query uses
+        assert [(job.job_id, job.pages, job.session) for job in in_flight] == [(61, (PAGE,), 9)]
+    assert journal.take(TriggerStamp("serial")).job_id == 62
+    journal.close()
+
+
+def test_the_last_trigger_is_not_taken_again_after_a_journal_was_brought_over(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "journal.sqlite")
+    journal.restore([(61, "2026-11-21T08:00:00", "controller", 9, 5, 0, 0, None, None, None)], (9, 5))
+    assert journal.last_controller_trigger() == (9, 5)
+    assert [job.job_id for job in journal.unsettled()] == [61]
+    journal.close()
+
+
+def test_a_damaged_journal_without_any_number_begins_at_the_unix_time(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    path.write_bytes(b"\xa5" * 9000)
+    journal = reopened(path)
+    assert journal.take(TriggerStamp("serial")).job_id == UNIX_S
+    journal.close()
+
+
+def test_a_strange_file_where_the_service_never_ran_is_refused_and_stays(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    path.write_bytes(b"somebody's notes" * 100)
+    with pytest.raises(JournalDamaged):
+        reopened(path, ran_before=False)
+    assert path.read_bytes() == b"somebody's notes" * 100
+
+
+def test_a_second_loss_remembers_what_was_moved_aside_at_the_first(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 40)
+    content = bytearray(path.read_bytes())
+    content[:100] = bytes(100)
+    path.write_bytes(content)
+    reopened(path).close()
+    for part in ("", "-wal", "-shm"):
+        path.with_name(path.name + part).unlink(missing_ok=True)
+    journal = reopened(path)
+    assert journal.take(TriggerStamp("serial")).job_id == 42
+    journal.close()
+
+
+def test_numbers_that_stand_in_the_write_ahead_log_alone_are_found(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    journal = Journal(path)
+    for _ in range(5):
+        journal.take(TriggerStamp("serial"))
+    copy = tmp_path / "copy.sqlite"
+    copy.write_bytes(b"\xa5" * 8192)
+    copy.with_name("copy.sqlite-wal").write_bytes(path.with_name("journal.sqlite-wal").read_bytes())
+    journal.close()
+    assert highest_job(copy) == 5
+
+
+@given(st.binary(max_size=9000))
+@settings(max_examples=200)
+def test_no_damage_makes_the_search_for_numbers_fail(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
+    path = tmp_path_factory.mktemp("damaged") / "journal.sqlite"
+    path.write_bytes(b"\x0d" + content)
+    assert highest_job(path) == 0
+
+
+@pytest.mark.parametrize("last", [0xFFFFFFFF, 0xFFFFFFFF + 5])
+def test_after_the_last_number_that_a_register_holds_no_job_is_taken(tmp_path: Path, last: int) -> None:
+    journal = Journal(tmp_path / "journal.sqlite")
+    with pytest.raises(JournalError, match="the last number that a register can hold"):
+        journal.take(TriggerStamp("serial"), above=last)
+    journal.close()
+
+
+def test_a_locked_or_unreadable_file_is_no_damaged_one(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 1)
+    other = sqlite3.connect(path, isolation_level=None)
+    other.execute("PRAGMA locking_mode = EXCLUSIVE")
+    other.execute("BEGIN EXCLUSIVE")
+    try:
+        with pytest.raises(JournalError) as locked:
+            reopened(path)
+        assert not isinstance(locked.value, JournalDamaged)
+        assert set_aside(path) == []
+    finally:
+        other.close()

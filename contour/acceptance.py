@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contour.error_budget import ErrorBudget
-from contour.geometry import Contour, Ring, contour_defect
+from contour.geometry import Contour, Ring, area, contour_defect
 from contour.polygon import Polygon
+from contour.quality import QualityLimits, lost_in_noise, picture_faults, quality_faults
+from contour.region import Region
 from contour.segments import BoxTree, contains, first_meeting
+from contour.tracing import Trace
+
+# Of two blocks whose areas differ by less than this the larger one is a matter of chance.
+_EQUAL_SHARE = 0.8
+_WIDEST_DARK_WALL = 0.4
+_FINE_PITCH_PX = 15.0
 
 
 class Refusal(IntEnum):
     """Why a contour is refused; names and codes are the protocol's reject reasons."""
 
+    IMAGE_QUALITY = 102
+    SCENE_MOVED = 103
     NO_BLOCK_FOUND = 110
     TOUCHES_BORDER = 111
     AREA_OUT_OF_LIMITS = 112
@@ -37,6 +49,8 @@ class Limits:
     """What a contour must keep to. Limits in millimetres do not apply without a calibration.
 
     `work_area_mm` is a polygon in the machine frame, None = not checked; `max_uncertainty_mm` None = not checked.
+    `pieces` one: no other block may be in view; largest: a smaller one may. `block_share` of the traced block's area
+    makes another piece of comb a block, below that it is an offcut.
     """
 
     min_area_mm2: float = 0.0
@@ -45,6 +59,9 @@ class Limits:
     border_px: float = 2.0
     work_area_mm: Ring | None = None
     max_uncertainty_mm: float | None = None
+    pieces: Literal["one", "largest"] = "one"
+    block_share: float = 0.04
+    quality: QualityLimits = field(default_factory=QualityLimits)
 
 
 @dataclass(frozen=True)
@@ -56,27 +73,98 @@ class Finding:
 
 
 def judge(
-    polygon: Polygon, frame_size: tuple[int, int], limits: Limits, *, budget: ErrorBudget | None = None
+    polygon: Polygon,
+    frame_size: tuple[int, int],
+    limits: Limits,
+    *,
+    traced: Trace | None = None,
+    region: Region | None = None,
+    budget: ErrorBudget | None = None,
 ) -> tuple[Finding, ...]:
     """Every reason to refuse the polygon, lowest code first; empty = accepted.
 
-    `frame_size` is (width, height) in pixels. Where there is a limit to the uncertainty in millimetres, a `budget` of
-    None (nobody knows it) is refused as one too large.
+    `frame_size` is (width, height) in pixels, `region` what was looked at of it. `traced`, what the polygon was made
+    of, adds what was seen besides. Where there is a limit to the uncertainty in millimetres, a `budget` of None (nobody
+    knows it) is refused as one too large.
     """
+    outlines = [polygon.pixels.exterior, *([traced.contour.exterior] if traced else [])]
     findings = [
-        _touches_border(polygon.pixels.exterior, frame_size, limits.border_px),
+        *_quality(traced, limits.quality),
+        _no_walls(traced, limits.quality),
+        _no_comb(traced),
+        _touches_region(outlines, region, limits.border_px),
+        _touches_border(outlines, frame_size, limits.border_px),
+        _goes_on(traced),
         _area(polygon.area_mm2, limits),
         _uncertainty(polygon, budget, limits.max_uncertainty_mm),
         _work_area(polygon.millimetres, limits.work_area_mm),
+        _several(traced, limits),
         _points(polygon.pixels, limits.max_vertices),
         _shape(polygon),
     ]
-    return tuple(sorted((finding for finding in findings if finding), key=lambda finding: finding.refusal))
+    found = sorted((finding for finding in findings if finding), key=lambda finding: finding.refusal)
+    # Each reason once, in the words of the first that saw it.
+    return tuple(finding for n, finding in enumerate(found) if finding.refusal not in {f.refusal for f in found[:n]})
 
 
-def _touches_border(exterior: Ring, frame_size: tuple[int, int], border_px: float) -> Finding | None:
-    # Pixel (0, 0) is a centre: the frame's edges lie half a pixel outside the first and last ones.
-    low, high = exterior.min(axis=0) + 0.5, np.asarray(frame_size) - 0.5 - exterior.max(axis=0)
+def judge_without_block(picture: NDArray[np.uint8], text: str) -> tuple[Finding, ...]:
+    """Why there is no contour, lowest code first: what is wrong with the picture as a whole, and `text`, which says
+    what was looked for in vain.
+    """
+    faults = picture_faults(picture)
+    return (*(_bad_picture(fault) for fault in faults), Finding(Refusal.NO_BLOCK_FOUND, text))
+
+
+def _quality(traced: Trace | None, limits: QualityLimits) -> list[Finding]:
+    if traced is None or traced.quality is None:
+        return []
+    return [_bad_picture(fault) for fault in quality_faults(traced.quality, limits)]
+
+
+def _bad_picture(fault: str) -> Finding:
+    return Finding(Refusal.IMAGE_QUALITY, f"The picture is not good enough: {fault}.")
+
+
+def _no_walls(traced: Trace | None, limits: QualityLimits) -> Finding | None:
+    if traced is None or traced.quality is None:
+        return None
+    why = lost_in_noise(traced.quality, limits)
+    return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
+
+
+def _goes_on(traced: Trace | None) -> Finding | None:
+    if traced is None or not traced.reaches_frame:
+        return None
+    return Finding(
+        Refusal.TOUCHES_BORDER,
+        "The block's walls go on to the last pixels of what was looked at: part of it may lie outside. Move the block "
+        "so that all of it is in view.",
+    )
+
+
+def _no_comb(traced: Trace | None) -> Finding | None:
+    """The dark squares of a board are as wide as the light ones; no wall is. Those of fine cells look wide, and foam's
+    bright ones are.
+    """
+    if traced is None or traced.wall_px is None or not traced.pitch_px or traced.pitch_px <= _FINE_PITCH_PX:
+        return None
+    share = traced.wall_px / traced.pitch_px
+    if traced.polarity == "bright" or share <= _WIDEST_DARK_WALL:
+        return None
+    return Finding(
+        Refusal.NO_BLOCK_FOUND,
+        f"No block found: what lies between light patches {traced.pitch_px:.0f} px apart is {100 * share:.0f} % as "
+        f"wide as that, cell walls are {100 * _WIDEST_DARK_WALL:g} % at most. Check that a block lies in view, and set "
+        "edge: cells for a perforated plate.",
+    )
+
+
+def _touches_border(outlines: list[Ring], frame_size: tuple[int, int], border_px: float) -> Finding | None:
+    # Pixel (0, 0) is a centre: the frame's edges lie half a pixel outside the first and last ones. A ring reaches
+    # farthest at a vertex; the polygon leaves some out, so the ring that it was made of counts too.
+    lowest = np.min([outline.min(axis=0) for outline in outlines], axis=0)
+    highest = np.max([outline.max(axis=0) for outline in outlines], axis=0)
+    low, high = lowest + 0.5, np.asarray(frame_size) - 0.5 - highest
     sides = {"left": low[0], "top": low[1], "right": high[0], "bottom": high[1]}
     side = min(sides, key=lambda name: float(sides[name]))
     if sides[side] > border_px:
@@ -85,6 +173,48 @@ def _touches_border(exterior: Ring, frame_size: tuple[int, int], border_px: floa
         Refusal.TOUCHES_BORDER,
         f"The contour comes within {max(float(sides[side]), 0.0):.1f} px of the picture's {side} edge, at least "
         f"{border_px:g} px are needed. Move the block so that all of it is in view.",
+    )
+
+
+def _touches_region(outlines: list[Ring], region: Region | None, border_px: float) -> Finding | None:
+    if region is None:
+        return None
+    # A block that goes on outside of the region is cut by its border, along the last pixels' centres.
+    margin = min(region.margin(outline) for outline in outlines) + 0.5
+    if margin > border_px:
+        return None
+    return Finding(
+        Refusal.TOUCHES_BORDER,
+        f"The contour comes within {max(margin, 0.0):.1f} px of the edge of the region of interest, at least "
+        f"{border_px:g} px are needed. Move the block so that all of it lies in the region, or correct roi_px or "
+        "roi_mm.",
+    )
+
+
+def _several(traced: Trace | None, limits: Limits) -> Finding | None:
+    if traced is None:
+        return None
+    own = area(traced.contour)
+    blocks = [piece for piece in traced.others if piece.area_px2 >= limits.block_share * own]
+    if limits.pieces == "largest":
+        blocks = [piece for piece in blocks if piece.area_px2 >= _EQUAL_SHARE * own]
+    if not blocks:
+        return None
+    left, top, right, bottom = blocks[0].box_px
+    seen = (
+        f"Beside the traced block of {own:.0f} px² lies another of {blocks[0].area_px2:.0f} px² "
+        f"(x {left} to {right}, y {top} to {bottom} px)" + (f", and {len(blocks) - 1} more" if blocks[1:] else "")
+    )
+    if limits.pieces == "largest":
+        return Finding(
+            Refusal.SEVERAL_BLOCKS,
+            f"{seen}. For pieces: largest others may reach {100 * _EQUAL_SHARE:.0f} % of it, else the largest is a "
+            "guess. Take one of them away.",
+        )
+    return Finding(
+        Refusal.SEVERAL_BLOCKS,
+        f"{seen}. The recipe allows one, and offcuts up to {100 * limits.block_share:g} % of it. Leave one block on "
+        "the table, or use a recipe with pieces: largest.",
     )
 
 

@@ -13,6 +13,9 @@ from contour import binarize, direct_scan, find_contours, sliding_matrix
 from contour.cells import FEWEST_CELLS, Cells
 from contour.errors import NoBlockFound, ParameterError, PictureError
 from contour.geometry import Contour, oriented_contour
+from contour.pieces import Piece, pieces_beside
+from contour.quality import Quality, block_quality
+from contour.region import Region, shifted
 
 Method = Literal["wall-tips", "sliding-matrix", "direct-scan", "find-contours"]
 Polarity = Literal["bright", "dark"]
@@ -47,35 +50,70 @@ class TraceSettings:
 
 @dataclass(frozen=True)
 class Trace:
-    """A traced contour in pixels: exterior counter-clockwise as seen in the work frame, so negative by the shoelace."""
+    """A traced contour in pixels: exterior counter-clockwise as seen in the work frame, so negative by the shoelace.
+
+    `others` are pieces of comb beside it, `quality` says how well its walls are seen, `wall_px` how wide those of a cut
+    block look (None where no method looked); `reaches_frame` where its walls go on
+    to the last pixels of what was looked at.
+    """
 
     method: Method
     polarity: Polarity
     pitch_px: float | None
     contour: Contour
     uncertainty_px: float | None = None
+    others: tuple[Piece, ...] = ()
+    quality: Quality | None = None
+    wall_px: float | None = None
+    reaches_frame: bool = False
 
 
 def trace(
     picture: NDArray[np.uint8],
     settings: TraceSettings,
     *,
+    region: Region | None = None,
     rectifier: Rectifier | None = None,
     on_stage: OnStage = lambda _name: None,
 ) -> Trace:
     """The block's contour in `picture` (shape (H, W) grey or (H, W, 3) BGR, uint8), in pixels.
 
-    `on_stage` is called with "mask" and "trace" when each of these stages has ended. `rectifier`, where the lens is
-    known, lets a method fit straight edges in undistorted coordinates; methods on pixel centres ignore it.
-    Raises PictureError, ParameterError, NoBlockFound.
+    `on_stage` is called with "mask", "trace" and "quality" when each of these stages has ended. Outside of `region`
+    nothing is seen. `rectifier`, where the lens is known, lets a method fit straight edges in undistorted coordinates;
+    methods on pixel centres ignore it. Raises PictureError, ParameterError, NoBlockFound.
     """
     check_picture(picture)
     method = _METHODS.get(settings.method)
     if method is None:
         raise ParameterError(f"method is {settings.method!r}: expected one of {', '.join(_METHODS)}.")
+    first = np.zeros(2)
+    if region is not None:
+        picture, first = region.cut(picture)
+        rectifier = None if rectifier is None else _Moved(rectifier, first)
     found = method(picture, settings, rectifier=rectifier, on_stage=on_stage)
     # As seen is y up: counter-clockwise then is clockwise by the formula, whose y runs down in pixels.
-    return replace(found, contour=oriented_contour(found.contour, counter_clockwise=False))
+    contour = oriented_contour(found.contour, counter_clockwise=False)
+    quality = block_quality(picture, contour, found.pitch_px)
+    on_stage("quality")
+    if region is not None:
+        x, y = first.astype(int).tolist()
+        contour = shifted(contour, first)
+        found = replace(found, others=tuple(piece.moved(x, y) for piece in found.others))
+    return replace(found, contour=contour, quality=quality)
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """A rectifier for pixels that are counted from another first one."""
+
+    whole: Rectifier
+    first: NDArray[np.float64]
+
+    def rectify(self, points_px: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.whole.rectify(points_px + self.first)
+
+    def unrectify(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.whole.unrectify(points) - self.first
 
 
 def check_picture(picture: NDArray[np.uint8]) -> None:
@@ -112,9 +150,10 @@ def _on_mask(contour_of: _FromMask) -> _MethodCall:
         walls = binarize.binarize(picture, settings.binarize, settings.polarity)
         on_stage("mask")
         contour = contour_of(walls, settings)
-        on_stage("trace")
         pitch_px = walls.cells.pitch_px if walls.cells else None
-        return Trace(settings.method, walls.polarity, pitch_px, contour)
+        others = pieces_beside(walls.mask, contour.exterior, pitch_px) if pitch_px else ()
+        on_stage("trace")
+        return Trace(settings.method, walls.polarity, pitch_px, contour, others=others)
 
     return call
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.geometry import Ring
+from contour.pieces import Piece
 
 
 class WitnessKind(IntEnum):
@@ -47,6 +48,8 @@ class BlockEvidence:
     """All that was seen of one block: its rings (exterior first), cell pitch and wall width in pixels, polarity.
 
     leaves_picture: whether the block runs out of the picture, so that its rings follow the picture's border there.
+    others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
+    pixels.
     """
 
     rings: tuple[RingEvidence, ...]
@@ -57,3 +60,5 @@ class BlockEvidence:
     noise: float
     contrast: float
     leaves_picture: bool = False
+    others: tuple[Piece, ...] = ()
+    reaches_frame: bool = False

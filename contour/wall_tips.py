@@ -9,8 +9,9 @@ from contour.errors import NoBlockFound, ParameterError
 from contour.geometry import Contour, Ring
 from contour.material_edge import material_edge
 from contour.outline_fit import FittedRing, fit_ring
+from contour.pieces import pieces_beside
 from contour.ring_depth import depth_inside
-from contour.tracing import OnStage, Polarity, Rectifier, Trace, TraceSettings
+from contour.tracing import OnStage, Rectifier, Trace, TraceSettings
 from contour.wall_cells import probe
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import wall_light
@@ -57,12 +58,11 @@ def wall_tips(
             f"expected at least {100 * (1 - _MOST_UNSEEN):.0f} %. "
             "Check the light, and that all of the block lies in view"
         )
-    polarity: Polarity = "dark" if seen.polarity == "dark" else "bright"
     # Rings are fitted with the material on their left in pixels; seen in the work frame, whose y runs up, that is
     # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
     on_stage("trace")
-    return Trace("wall-tips", polarity, seen.pitch_px, contour)
+    return _told(seen, contour)
 
 
 def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
@@ -70,8 +70,20 @@ def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage)
     last = np.array([picture.shape[1] - 1.0, picture.shape[0] - 1.0])
     rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
     on_stage("trace")
-    polarity: Polarity = "dark" if seen.polarity == "dark" else "bright"
-    return Trace("wall-tips", polarity, seen.pitch_px, Contour(rings[0], tuple(rings[1:])))
+    contour = Contour(rings[0], tuple(rings[1:]))
+    return _told(seen, contour)
+
+
+def _told(seen: BlockEvidence, contour: Contour) -> Trace:
+    return Trace(
+        "wall-tips",
+        "dark" if seen.polarity == "dark" else "bright",
+        seen.pitch_px,
+        contour,
+        others=seen.others,
+        wall_px=seen.wall_px,
+        reaches_frame=seen.reaches_frame,
+    )
 
 
 def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
@@ -81,8 +93,9 @@ def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage:
     walls = wall_mask(light, cells.pitch, bright=cells.bright, contrast=cells.contrast).mask
     on_stage("mask")
     contour = material_edge(picture, cells.pitch, walls)
+    others = pieces_beside(walls, contour.exterior, cells.pitch)
     on_stage("trace")
-    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch, contour)
+    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch, contour, others=others)
 
 
 def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:

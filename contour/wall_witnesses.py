@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contour.coarse_block import CoarseBlock, coarse_block
 from contour.errors import NoBlockFound
+from contour.pieces import pieces_beside, reaches_frame
 from contour.table_surface import without_light_table
 from contour.wall_cells import Cells, probe
 from contour.wall_ends import edge_chains, find_ends, outermost
@@ -78,7 +79,9 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
         seen = _darker_than_table(seen, small, cells)
     on_mask()
     coarse = coarse_block(seen.mask, small, cells.pitch / scale, cells.wall / scale)
-    return _evidence(light, seen, coarse, cells, scale)
+    others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)
+    evidence = _evidence(light, seen, coarse, cells, scale)
+    return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse))
 
 
 def _darker_than_table(seen: WallMask, light: Gray, cells: Cells) -> WallMask:

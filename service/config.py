@@ -283,7 +283,15 @@ class Recipe(Model):
         "flat", description="How walls are told from gaps: flat, otsu, or a fixed grey level 0 to 255."
     )
     edge: Literal["cut", "cells"] = Field("cut", description="cut: cells are cut open at the edge; cells: closed.")
-    pieces: Literal["one", "largest"] = Field("one", description="What several blocks lead to; not applied yet.")
+    pieces: Literal["one", "largest"] = Field(
+        "one", description="one: other blocks in view are refused; largest: smaller ones are not."
+    )
+    roi_px: tuple[Number, ...] = Field(
+        (), description="Nothing is seen outside of it: left, top, right, bottom, px; none = the whole picture."
+    )
+    roi_mm: tuple[Number, ...] = Field(
+        (), description="The same in the machine frame, at the block's top: left, bottom, right, top, mm."
+    )
     parameters: dict[str, Number] = Field(
         default_factory=dict, description="Sizes of the method; left out, they follow from the picture."
     )
@@ -294,6 +302,8 @@ class Recipe(Model):
             raise ValueError(
                 f"binarize is {self.binarize!r}, but wall-tips finds its own threshold; use flat, or another method"
             )
+        if self.roi_px and self.roi_mm:
+            raise ValueError("roi_px and roi_mm are both given, expected one of them")
         if self.min_area_mm2 >= self.max_area_mm2:
             raise ValueError(
                 f"min_area_mm2 is {self.min_area_mm2:g}, expected less than max_area_mm2, {self.max_area_mm2:g}"
@@ -309,6 +319,15 @@ class Recipe(Model):
             if name.endswith("_px") and value != int(value):
                 raise ValueError(f"parameters.{name} is {value:g}, expected a whole number of pixels")
         return self
+
+    @field_validator("roi_px", "roi_mm")
+    @classmethod
+    def _box(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if value and (len(value) != 4 or value[0] >= value[2] or value[1] >= value[3]):
+            raise ValueError(
+                f"is {list(value)}, expected four numbers, the third above the first and the fourth above the second"
+            )
+        return value
 
 
 class Service(Model):
@@ -364,6 +383,8 @@ class Config(Model):
                 raise ValueError(f"recipes: {name} {', '.join(twice)} is there more than once")
         if self.default_recipe not in {recipe.number for recipe in self.recipes}:
             raise ValueError(f"default_recipe is {self.default_recipe}, but no recipe has that number")
+        if self.calibration is None and any(recipe.roi_mm for recipe in self.recipes):
+            raise ValueError("calibration is missing: a recipe's roi_mm needs millimetres. Set calibration.file")
         if self.calibration is None and not isinstance(self.controller, NoController):
             raise ValueError("calibration is missing: a controller needs millimetres. Set calibration.file")
         controllers = [trigger for trigger in self.triggers if isinstance(trigger, ControllerTrigger)]

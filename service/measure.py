@@ -10,15 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.acceptance import Limits, judge
+from contour.acceptance import Finding, Limits, judge, judge_without_block
 from contour.calibration import Calibration
 from contour.error_budget import ErrorBudget, error_budget
-from contour.errors import CalibrationError, NoBlockFound
-from contour.geometry import Contour, Ring
+from contour.errors import CalibrationError, NoBlockFound, ParameterError
+from contour.geometry import Contour, Ring, densified
 from contour.polygon import Polygon, cutting_polygon
+from contour.region import Region
 from contour.tracing import Trace, TraceSettings, check_picture, trace
 from service.config import Recipe
 from service.reasons import Reason
+
+_ROI_STEPS = 12
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,7 @@ class Measurer:
         try:
             result = self._traced(picture, recipe, thickness_mm, result, watch)
         except NoBlockFound as error:
-            result = replace(result, findings=((Reason.NO_BLOCK_FOUND, str(error)),))
+            result = replace(result, findings=_told(judge_without_block(picture, str(error))))
         except CalibrationError as error:
             result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))
         total = sum(watch.milliseconds.values())
@@ -145,7 +148,8 @@ class Measurer:
         if calibration is not None:
             calibration.check_fits(width, height)
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
-        traced: Trace = trace(picture, trace_settings(recipe), rectifier=rectifier, on_stage=watch.lap)
+        region = self._region(recipe, thickness_mm)
+        traced: Trace = trace(picture, trace_settings(recipe), region=region, rectifier=rectifier, on_stage=watch.lap)
         result = replace(result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour)
         polygon = cutting_polygon(
             traced.contour,
@@ -157,7 +161,7 @@ class Measurer:
         # What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither.
         sure_px = None if traced.uncertainty_px is None else float(np.hypot(traced.uncertainty_px, polygon.shift_px))
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
-        findings = judge(polygon, (width, height), self._limits(recipe), budget=budget)
+        findings = judge(polygon, (width, height), self._limits(recipe), traced=traced, region=region, budget=budget)
         watch.lap("judge")
         return replace(
             result,
@@ -167,8 +171,21 @@ class Measurer:
             area_mm2=polygon.area_mm2,
             uncertainty_px=sure_px,
             uncertainty=budget,
-            findings=tuple((Reason(int(finding.refusal)), finding.text) for finding in findings),
+            findings=_told(findings),
         )
+
+    def _region(self, recipe: Recipe, thickness_mm: float) -> Region | None:
+        if recipe.roi_px:
+            return Region.of_box(*recipe.roi_px)
+        if not recipe.roi_mm:
+            return None
+        if self._calibration is None:
+            raise ParameterError("roi_mm needs a calibration. Name one, or give roi_px")
+        left, bottom, right, top = recipe.roi_mm
+        corners = np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
+        # Straight in millimetres is bent by the lens.
+        ring = densified(corners, max(right - left, top - bottom) / _ROI_STEPS)
+        return Region(self._calibration.to_pixels(ring, thickness_mm))
 
     def _budget(
         self, polygon: Polygon, recipe: Recipe, thickness_mm: float, uncertainty_px: float | None
@@ -190,8 +207,13 @@ class Measurer:
             max_area_mm2=recipe.max_area_mm2,
             max_vertices=recipe.max_vertices,
             work_area_mm=self._work_area_mm,
+            pieces=recipe.pieces,
             max_uncertainty_mm=recipe.max_uncertainty_mm or None,
         )
+
+
+def _told(findings: tuple[Finding, ...]) -> tuple[tuple[Reason, str], ...]:
+    return tuple((Reason(int(finding.refusal)), finding.text) for finding in findings)
 
 
 def trace_settings(recipe: Recipe) -> TraceSettings:

@@ -3,10 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contour.acceptance import Limits, Refusal, judge
+from contour.acceptance import Finding, Limits, Refusal, judge, judge_without_block
 from contour.error_budget import ErrorBudget
 from contour.geometry import Contour
+from contour.pieces import Piece
 from contour.polygon import Polygon
+from contour.quality import Quality
+from contour.region import Region
+from contour.tracing import Trace
 from tests.contour.rings import SQUARE
 
 FRAME = (640, 480)
@@ -30,6 +34,8 @@ def test_a_good_polygon_is_accepted() -> None:
 
 def test_codes_and_names_are_the_protocols() -> None:
     table = {
+        102: "image_quality",
+        103: "scene_moved",
         110: "no_block_found",
         111: "touches_border",
         112: "area_out_of_limits",
@@ -138,6 +144,88 @@ def test_an_uncertainty_that_nobody_knows_is_not_within_a_limit() -> None:
     limits = replace(LIMITS, max_uncertainty_mm=0.5)
     assert [finding.refusal for finding in judge(GOOD, FRAME, limits)] == [Refusal.UNCERTAINTY_TOO_LARGE]
     assert judge(polygon(SQUARE * 10 + 100, mm_per_px=None), FRAME, limits) == ()
+
+
+def traced(**changes: object) -> Trace:
+    """A good trace of the good polygon."""
+    return replace(Trace("wall-tips", "bright", 24.0, GOOD.pixels), **changes)
+
+
+def test_the_ring_that_the_polygon_was_made_of_must_keep_off_the_frame_too() -> None:
+    bulge = np.insert(GOOD.pixels.exterior, 1, [0.0, 150.0], axis=0)
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(contour=Contour(bulge)))
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+    assert judge(GOOD, FRAME, LIMITS, traced=traced()) == ()
+
+
+def test_a_contour_at_the_regions_edge_is_told_as_such() -> None:
+    (finding,) = judge(GOOD, FRAME, LIMITS, region=Region.of_box(50, 50, 201, 400))
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+    assert "1.5 px" in finding.text
+    assert "region of interest" in finding.text
+    assert judge(GOOD, FRAME, LIMITS, region=Region.of_box(50, 50, 202, 400)) == ()
+
+
+def test_a_bad_picture_is_told_before_what_was_traced_in_it() -> None:
+    quality = Quality(180.0, 120.0, 1.5, 4.0, 24.0, 0.01)
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(quality=quality))
+    assert finding.refusal == Refusal.IMAGE_QUALITY
+    assert finding.text.startswith("The picture is not good enough: walls are blurred by 4.0 px")
+
+
+def test_another_block_is_refused_where_the_recipe_wants_one() -> None:
+    other = Piece(3000.0, (400, 50, 460, 120))
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(others=(other,)))
+    assert finding.refusal == Refusal.SEVERAL_BLOCKS
+    assert "10000 px²" in finding.text
+    assert "3000 px² (x 400 to 460, y 50 to 120 px)" in finding.text
+    assert judge(GOOD, FRAME, replace(LIMITS, pieces="largest"), traced=traced(others=(other,))) == ()
+
+
+def test_an_offcut_is_no_block() -> None:
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(others=(Piece(390.0, (400, 50, 460, 120)),))) == ()
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(others=(Piece(410.0, (400, 50, 460, 120)),))) != ()
+
+
+def test_of_two_nearly_equal_blocks_none_is_the_largest() -> None:
+    twins = (Piece(8100.0, (400, 50, 500, 150)), Piece(100.0, (0, 0, 9, 9)))
+    (finding,) = judge(GOOD, FRAME, replace(LIMITS, pieces="largest"), traced=traced(others=twins))
+    assert finding.refusal == Refusal.SEVERAL_BLOCKS
+    assert "80 %" in finding.text
+
+
+@pytest.mark.parametrize(
+    ("wall_px", "pitch_px", "polarity", "refused"),
+    [(9.0, 24.0, "dark", False), (11.0, 24.0, "dark", True), (11.0, 24.0, "bright", False), (4.0, 8.0, "dark", False)],
+)
+def test_dark_squares_of_a_board_are_no_walls(wall_px: float, pitch_px: float, polarity: str, refused: bool) -> None:
+    seen = traced(wall_px=wall_px, pitch_px=pitch_px, polarity=polarity)
+    findings = judge(GOOD, FRAME, LIMITS, traced=seen)
+    assert [finding.refusal for finding in findings] == ([Refusal.NO_BLOCK_FOUND] if refused else [])
+
+
+def test_walls_that_go_on_to_the_last_pixels_touch_the_border() -> None:
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(reaches_frame=True))
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+
+
+def test_walls_lost_in_noise_are_no_block() -> None:
+    quality = Quality(180.0, 9.0, 3.0, 1.4, 24.0, 0.0)
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(quality=quality))
+    assert finding.refusal == Refusal.NO_BLOCK_FOUND
+
+
+def test_each_reason_is_told_once() -> None:
+    findings = judge(polygon(SQUARE * 10 - 50), FRAME, LIMITS, traced=traced(reaches_frame=True))
+    assert [int(finding.refusal) for finding in findings] == [111]
+
+
+def test_without_a_contour_a_useless_picture_is_told_first() -> None:
+    black = np.zeros((480, 640), np.uint8)
+    assert [int(finding.refusal) for finding in judge_without_block(black, "nothing there.")] == [102, 110]
+    grey = np.full((480, 640), 90, np.uint8)
+    (finding,) = judge_without_block(grey, "nothing there.")
+    assert finding == Finding(Refusal.NO_BLOCK_FOUND, "nothing there.")
 
 
 def test_all_findings_are_told_lowest_code_first() -> None:

@@ -80,7 +80,7 @@ def test_contours_of_the_papers_methods_lie_on_pixel_centres(method: Any) -> Non
 def test_stages_are_told_as_they_end(method: Any) -> None:
     stages: list[str] = []
     trace(block("rectangle").picture, TraceSettings(method=method), on_stage=stages.append)
-    assert stages == ["mask", "trace"]
+    assert stages == ["mask", "trace", "quality"]
 
 
 @pytest.mark.parametrize("method", PAPER_METHODS)

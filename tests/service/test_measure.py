@@ -48,7 +48,7 @@ def test_the_contour_in_millimetres_lies_near_the_true_outline(rendered, measure
 
 def test_each_stage_is_timed_and_total_is_their_sum(rendered, measurer: Measurer) -> None:
     times = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM).timings_ms
-    assert set(times) == {"mask", "trace", "convert", "simplify", "judge", "total"}
+    assert set(times) == {"mask", "trace", "quality", "convert", "simplify", "judge", "total"}
     assert times["total"] == pytest.approx(sum(value for name, value in times.items() if name != "total"))
 
 
@@ -82,6 +82,44 @@ def test_the_recipes_limits_refuse(rendered, measurer: Measurer, change: dict, r
     seen = measurer.measure(rendered.picture, RECIPE.model_copy(update=change), THICKNESS_MM)
     assert seen.reasons == (reason,)
     assert seen.pixels is not None
+
+
+def test_a_region_in_pixels_and_the_same_in_millimetres_see_the_same(rendered, measurer: Measurer) -> None:
+    whole = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM)
+    assert whole.millimetres is not None
+    low, high = whole.millimetres.exterior.min(axis=0) - 8, whole.millimetres.exterior.max(axis=0) + 8
+    recipe = RECIPE.model_copy(update={"roi_mm": (*low.tolist(), *high.tolist())})
+    seen = measurer.measure(rendered.picture, recipe, THICKNESS_MM)
+    assert seen.findings == ()
+    assert seen.millimetres is not None
+    assert hausdorff(seen.millimetres.exterior, whole.millimetres.exterior, 0.5) < 0.2
+
+
+@pytest.mark.parametrize("shift", [(-60, 0), (60, 0), (0, -60), (0, 60)])
+def test_a_block_that_the_region_cuts_is_refused_with_words_for_it(rendered, measurer: Measurer, shift) -> None:
+    low, high = rendered.truth_px.exterior.min(axis=0) - 9, rendered.truth_px.exterior.max(axis=0) + 9
+    box = (*(low + shift).tolist(), *(high + shift).tolist())
+    seen = measurer.measure(rendered.picture, RECIPE.model_copy(update={"roi_px": box}), THICKNESS_MM)
+    assert seen.reasons[0] == Reason.TOUCHES_BORDER
+    assert "region of interest" in seen.texts[0]
+
+
+def test_a_turned_region_that_cuts_a_block_refuses_too(rendered, measurer: Measurer) -> None:
+    whole = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM)
+    low, high = whole.millimetres.exterior.min(axis=0), whole.millimetres.exterior.max(axis=0)
+    recipe = RECIPE.model_copy(update={"roi_mm": (*(low - 10).tolist(), high[0] - 40.0, high[1] + 10.0)})
+    seen = measurer.measure(rendered.picture, recipe, THICKNESS_MM)
+    assert seen.reasons[0] == Reason.TOUCHES_BORDER
+
+
+def test_a_region_in_millimetres_needs_a_calibration(rendered) -> None:
+    with pytest.raises(ParameterError, match="roi_mm needs a calibration"):
+        Measurer(None).measure(rendered.picture, RECIPE.model_copy(update={"roi_mm": (0, 0, 300, 300)}), 20)
+
+
+def test_a_covered_lens_is_bad_quality_before_it_is_no_block(measurer: Measurer) -> None:
+    seen = measurer.measure(np.full((1200, 1600), 2, np.uint8), RECIPE, 20)
+    assert seen.reasons == (Reason.IMAGE_QUALITY, Reason.NO_BLOCK_FOUND)
 
 
 def test_the_work_area_refuses(rendered) -> None:

@@ -155,12 +155,13 @@ def test_the_worst_status_of_several_pictures_counts(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("value", [0, 30, 128, 255])
-def test_an_empty_table_is_refused_with_no_block_found(tmp_path: Path, value: int) -> None:
+@pytest.mark.parametrize(("value", "codes"), [(0, [102, 110]), (30, [110]), (128, [110]), (255, [102, 110])])
+def test_an_empty_table_is_refused_with_no_block_found(tmp_path: Path, value: int, codes: list[int]) -> None:
+    """A black or white picture shows no table at all: that is said first."""
     cv2.imwrite(str(tmp_path / "empty.png"), np.full((200, 300), value, np.uint8))
     (record,) = traced(tmp_path / "empty.png", status=3)
-    assert record["reason"] == "no_block_found"
-    assert record["reason_codes"][0] == 110
+    assert record["reason_codes"] == codes
+    assert record["reasons"][-1] == "no_block_found"
     assert record["pixels"] is None
 
 

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera bench accuracy check format clean
+.PHONY: install demo test test-camera bench accuracy soak hil check format clean
 
 install: $(STAMP)
 

@@ -65,14 +65,14 @@ def _decimal_integer(loader: _Loader, node: yaml.ScalarNode) -> int:
 _Loader.add_constructor("tag:yaml.org,2002:int", _decimal_integer)
 
 
-def read_yaml(path: Path) -> Any:
+def read_yaml(path: Path, option: str = "--config") -> Any:
     """What a YAML file holds; raise ConfigError that names file, line and column."""
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise ConfigError(f"{path}: {path.stat().st_size} bytes, expected {LARGEST_FILE} at most")
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}. Name another file with --config") from error
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}. Name another file with {option}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is no UTF-8 text (byte {error.start}). Save it as UTF-8") from error
     try:

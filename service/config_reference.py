@@ -65,13 +65,14 @@ def _section(title: str, models: tuple[type[BaseModel], ...]) -> str:
         if kind is not None:
             text += f"\n### kind: {_choices(kind)}\n"
         text += f"\n{(model.__doc__ or '').strip()}\n"
-        rows = list(_rows(model))
-        if rows:
-            text += "\n| key | value | default | meaning |\n|---|---|---|---|\n" + "".join(rows)
+        table = list(rows(model))
+        if table:
+            text += "\n| key | value | default | meaning |\n|---|---|---|---|\n" + "".join(table)
     return text
 
 
-def _rows(model: type[BaseModel]) -> Iterator[str]:
+def rows(model: type[BaseModel]) -> Iterator[str]:
+    """The table's rows of a model's keys, but for `kind`."""
     properties = model.model_json_schema()["properties"]
     for name, field in model.model_fields.items():
         if name != "kind":

@@ -49,6 +49,7 @@ class SimulatedController:
     host, port: where it listens; port 0 takes a free one, told by `port`.
     framing: "tcp" for Modbus TCP, "rtu" for RTU frames over TCP, as a serial server hands them on.
     scan_s: period of the program's scan.
+    first_trigger: the first `trigger_counter` of a session. clock_start_ms: `clock` at the program's start.
     session_source: the session of each start; by default a retained counter, begun at random where there is none.
     memory_path: where last answer and session counter outlive the process; None: they live as long as this object.
     has_clock: False: `clock` stays 0 for ever.
@@ -72,6 +73,7 @@ class SimulatedController:
         memory_path: Path | None = None,
         has_clock: bool = True,
         clock_start_ms: int = 0,
+        first_trigger: int = 1,
         judge: Judge = judge_by_geometry,
         faults: FaultPlan | None = None,
         pace: Pace | None = None,
@@ -85,7 +87,7 @@ class SimulatedController:
         self.scan_s = scan_s
         self._framing: FramingName = framing
         self._host = host
-        self._port = port
+        self._port = self._used_port = port
         self._serial: tuple[str, int] | None = None
         self._device_id = device_id
         self._layout = layout or MailboxLayout()
@@ -93,6 +95,7 @@ class SimulatedController:
         self._session_source = session_source or self._memory.count_session
         self._has_clock = has_clock
         self._clock_start_ms = clock_start_ms
+        self._first_trigger = first_trigger
         self._on_accepted = on_accepted
         self._now = now
         self._registers = [0] * REGISTERS
@@ -136,14 +139,31 @@ class SimulatedController:
             raise ControllerError("the simulated controller runs already. Stop it first")
         self._hand_on(self._memory.undelivered)
         server = RegisterServer(self, self._framing, self.faults)
-        if self._serial is None:
-            await server.listen(self._host, self._port)
-        else:
-            server.open_line(*self._serial)
+        await self._listen(server, self._port)
         self._server = server
         self._began = self._now()
         self._run_since = self._now()
         self._scanning = asyncio.create_task(self._scan_for_ever(), name="simulated controller")
+
+    async def switch_off(self) -> None:
+        """Listen no more and stand still, as without power."""
+        self._halted = True
+        if self._server is not None:
+            self._used_port = self._server.port or self._port
+            await self._server.stop()
+
+    async def switch_on(self) -> None:
+        """Power is back: listen where it did, and start the program anew; raise ControllerUnavailable."""
+        if self._server is None:  # stopped for good meanwhile
+            return
+        await self._listen(self._server, self._used_port)
+        self.restart()
+
+    async def _listen(self, server: RegisterServer, port: int) -> None:
+        if self._serial is None:
+            await server.listen(self._host, port)
+        else:
+            server.open_line(*self._serial)
 
     async def stop(self) -> None:
         """Stop the program and close every connection; nothing is left open. An error of `on_accepted` is raised."""
@@ -186,6 +206,7 @@ class SimulatedController:
     def request_measurement(self, recipe: int = 0, thickness_um: int = 0, *, force: bool = False) -> int:
         """Trigger a measurement and return the new `trigger_counter`; see ControllerProgram.request_measurement."""
         counter = self._program.request_measurement(recipe, thickness_um, force=force)
+        self._watch.issued(self._program.session, counter)
         self.verdict.tell("trigger", session=self._program.session, trigger=counter, recipe=recipe)
         return counter
 
@@ -215,6 +236,7 @@ class SimulatedController:
             judge=self._judged,
             has_clock=self._has_clock,
             clock_start_ms=self._clock_start_ms,
+            first_trigger=self._first_trigger,
             pace=self.pace,
         )
 

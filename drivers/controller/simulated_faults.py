@@ -59,14 +59,14 @@ assert set(TARGETS) == set(get_args(Target))
 
 @dataclass(frozen=True)
 class Fault:
-    """One rule: what befalls which of the requests that `on` names.
+    """One rule: what befalls which of the requests that `request` names.
 
     chance: of each such request, 0 to 1. every: each n-th of them. at: the n-th ones, counted from 1.
     times: at most so often, 0 = no limit. after_s, before_s: only so long after the start; before_s 0 = no end.
     """
 
     kind: FaultKind
-    on: Target = "any"
+    request: Target = "any"
     chance: float = 0.0
     every: int = 0
     at: tuple[int, ...] = ()
@@ -101,7 +101,7 @@ class FaultPlan:
         if not self.enabled:
             return None
         for number, fault in enumerate(self._faults):
-            if fault.on not in targets or (fault.times and self._done[number] >= fault.times):
+            if fault.request not in targets or (fault.times and self._done[number] >= fault.times):
                 continue
             if since_start_s < fault.after_s or (fault.before_s and since_start_s >= fault.before_s):
                 continue

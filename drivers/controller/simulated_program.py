@@ -9,7 +9,7 @@ from enum import IntEnum
 
 from drivers.controller.errors import ControllerError
 from drivers.controller.layout import MailboxLayout
-from drivers.controller.simulated_contour import AcceptedContour, Assembly, Contradiction, PageCopy, u32
+from drivers.controller.simulated_contour import HEADER, AcceptedContour, Assembly, Contradiction, PageCopy, u32
 from drivers.controller.simulated_memory import RetainedMemory
 from drivers.controller.simulated_watch import ClientWatch, ring_fault
 
@@ -74,6 +74,7 @@ class ControllerProgram:
         judge: Judge,
         has_clock: bool = True,
         clock_start_ms: int = 0,
+        first_trigger: int = 1,
         pace: Pace | None = None,
     ) -> None:
         self.state = READY
@@ -87,8 +88,10 @@ class ControllerProgram:
         self._judge = judge
         self._has_clock = has_clock
         self._clock_start_ms = clock_start_ms
+        self._first_trigger = first_trigger
         self._scans = 0
         self._copied: list[int] = []
+        self._to_copy = 0
         self._checks_left = 0
         self._to_write: deque[dict[int, int]] = deque()
         self._session = 0
@@ -191,7 +194,7 @@ class ControllerProgram:
             )
         self._set(3, recipe)
         self._set32(4, thickness_um)
-        counter = self._link(2) % 0xFFFF + 1
+        counter = self._link(2) % 0xFFFF + 1 if self._link(2) else self._first_trigger
         self._set(2, counter)
         self._trigger_open, self._job_of_trigger = True, None
         return counter
@@ -233,12 +236,14 @@ class ControllerProgram:
         start, end = self._layout.blocks["contour_address"]
         if not self._copied and self._registers[start] in (0, self._link(6)):
             return None
-        if len(self._copied) < end - start:
-            part = -(-(end - start) // max(1, self.pace.copy_scans))
+        if not self._copied:
+            self._to_copy = min(HEADER + self._registers[start + 7], end - start)
+        if len(self._copied) < self._to_copy:
+            part = -(-self._to_copy // max(1, self.pace.copy_scans))
             here = start + len(self._copied)
-            self._copied += self._registers[here : min(here + part, end)]
+            self._copied += self._registers[here : min(here + part, start + self._to_copy)]
             self._checks_left = self.pace.check_scans
-            if len(self._copied) < end - start:
+            if len(self._copied) < self._to_copy:
                 return None
         if self._checks_left > 0:
             self._checks_left -= 1

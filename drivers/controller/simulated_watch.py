@@ -36,6 +36,7 @@ class ClientWatch:
         self._lost_write: str | None = None
         self._transfer: int | None = None  # as the client wrote it: late writes of the line's are not its own
         self._service: tuple[int, ...] | None = None
+        self._service_at_commit: tuple[int, ...] | None = None
         self._page: dict[int, int] = {}  # offsets and values that the client wrote since it cleared `transfer`
         self._owner = 0
         self._owner_at = 0.0
@@ -56,7 +57,7 @@ class ClientWatch:
 
     def tick(self, now: float, session: int, trigger_counter: int) -> None:
         """Look for a heartbeat that stands still. A serial line shows no connections, so there it is not judged."""
-        self._issued(session, trigger_counter)
+        self.issued(session, trigger_counter)
         if self._connections > 0 and self._beat is not None and now - self._beat_at > HEARTBEAT_LIMIT_S:
             self._gap(now - self._beat_at)
 
@@ -133,7 +134,7 @@ class ClientWatch:
     def _trigger_acknowledged(self, values: Sequence[int], held: Sequence[int]) -> None:
         link = self._layout.link_address
         session, counter = held[link + 13], held[link + 2]
-        if session and values[10] == session and values[3] not in self._issued(session, counter):
+        if session and values[10] == session and values[3] not in self.issued(session, counter):
             text = f"trigger_ack {values[3]} of session {session}, whose trigger_counter is {counter}"
             self._verdict.note("unknown-trigger-acknowledged", text, self._layout.service_address, values)
         acknowledged = (session, values[3])
@@ -142,7 +143,8 @@ class ClientWatch:
             job = u32(values, 6, self._layout.word_order)
             self._verdict.tell("acknowledged", session=session, trigger=values[3], job=job)
 
-    def _issued(self, session: int, counter: int) -> set[int]:
+    def issued(self, session: int, counter: int) -> set[int]:
+        """Note that `trigger_counter` had this value; all that it had in this session."""
         if self._counters[0] != session:
             self._counters = (session, set())
         self._counters[1].add(counter)
@@ -199,19 +201,21 @@ class ClientWatch:
         elif copy.session != 0 and transfer in (self._last_transfer, acknowledged):
             self._verdict.note("transfer-not-new", f"transfer {transfer}, ack_transfer {acknowledged}")
         self._last_transfer, self._last_content = transfer, copy.content
+        self._service_at_commit = self._service
         split = sorted(cut for cut in self._cuts if not _may_be_cut(cut, copy))
         if split and own and copy.job_id:  # job 0: the program has restarted and cleared the page in between
             self._verdict.note("value-split", f"requests begin or end at offsets {split} of job {copy.job_id}")
 
     def _is_own(self, copy: PageCopy) -> bool:
         """True where the page is as the client wrote it, not spoilt by late writes and restarts."""
-        return all(copy.registers[offset] == value for offset, value in self._page.items())
+        registers = dict(enumerate(copy.registers))
+        return all(registers.get(offset, value) == value for offset, value in self._page.items())
 
     # --- pages --------------------------------------------------------------------------------------------------
 
     def page(self, copy: PageCopy, service_block: Sequence[int], session: int) -> None:
         """Judge a page whose CRC is right; `service_block` as it stands now, `session` the controller's."""
-        service_block = self._service or service_block
+        service_block = self._service_at_commit or service_block
         if not self._is_own(copy) or (self._last_transfer and copy.transfer != self._last_transfer):
             return
         if copy.job_id == 0 or copy.job_id < self._highest_job:

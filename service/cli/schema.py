@@ -1,4 +1,4 @@
-"""`combtrace schema`: the JSON schema of config.yaml."""
+"""`combtrace schema`: the JSON schema of config.yaml, or of a scenario of the simulated controller."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ DESCRIPTION = "Print the JSON schema of config.yaml, for editors that check whil
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """No arguments."""
+    """Which schema."""
+    parser.add_argument("--scenario", action="store_true", help="of a scenario for simulate-controller instead")
 
 
-def run(_args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Print the schema."""
     from service.config_file import config_schema
+    from service.scenario_file import scenario_schema
 
-    print(json.dumps(config_schema(), indent=2))
+    print(json.dumps(scenario_schema() if args.scenario else config_schema(), indent=2))
     return EXIT_OK

@@ -7,35 +7,41 @@ import asyncio
 import json
 import os
 import signal
-import sys
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from service.cli.errors import EXIT_OK, UserError
 
 if TYPE_CHECKING:
     from drivers.controller.simulated import AcceptedContour, SimulatedController
+    from drivers.controller.simulated_scenario import Scenario
 
 HELP = "play the cutting machine's controller"
 DESCRIPTION = """\
 Serve the contour mailbox as a controller does, and check the client against the
-protocol meanwhile. Ends on SIGTERM or SIGINT; then the verdict is written.
+protocol meanwhile. Ends on SIGTERM or SIGINT. The verdict is written at the start,
+every two seconds and at the end. docs/simulated-controller.md explains scenarios.
 
 The addresses are those of the default layout; --layout gives others."""
+
+VERDICT_PERIOD_S = 2.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where it listens, what it writes, how it behaves."""
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--tcp", metavar="HOST:PORT", help="listen there; port 0 takes a free one and prints it")
+    where.add_argument("--rtu-over-tcp", metavar="HOST:PORT", help="the same with RTU frames, as a serial server")
     where.add_argument("--rtu", metavar="PORT", help="serve on this serial port, 8N1")
     parser.add_argument("--baudrate", type=int, default=115200, metavar="BAUD", help="of --rtu; default 115200")
     parser.add_argument("--log", type=Path, metavar="FILE", help="append accepted contours as JSON Lines")
     parser.add_argument("--verdict", type=Path, metavar="FILE", help="write what the client did against the protocol")
     parser.add_argument("--events", type=Path, metavar="FILE", help="append what happens, as it happens, as JSON Lines")
+    parser.add_argument("--scenario", type=Path, metavar="FILE", help="what the machine does and what befalls the line")
     parser.add_argument("--memory", type=Path, metavar="FILE", help="retained memory that outlives a restart")
-    parser.add_argument("--scan-ms", type=float, default=10.0, metavar="MS", help="period of the program; default 10")
+    parser.add_argument("--device-id", type=int, default=1, metavar="N", help="Modbus device id; default 1")
+    parser.add_argument("--scan-ms", type=float, metavar="MS", help="period of the program; default 10")
     parser.add_argument("--word-order", choices=("big", "little"), default="big", help="default big (ABCD)")
     parser.add_argument(
         "--layout",
@@ -59,33 +65,46 @@ async def _serve(args: argparse.Namespace) -> int:
     stop = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop.set)
-    log, events = _open_log("--log", args.log), _open_log("--events", args.events)
-    try:
-        controller = _build(args, log)
-        if events is not None:
-            controller.verdict.on_event = lambda event: _write_line(events, event)
-        await controller.start()
-        where = f"{args.tcp.rpartition(':')[0]}:{controller.port}" if args.tcp else args.rtu
-        print(f"simulated controller on {where}", flush=True)
+    scenario = _scenario(args)
+    with ExitStack() as files:
+        log, events = (_open_log(files, option, getattr(args, option)) for option in ("log", "events"))
         try:
-            await _until_stopped(controller, stop, args)
-        finally:
-            await controller.stop()
-    except ControllerError as error:
-        raise UserError(str(error)) from error
-    finally:
-        for file in (log, events):
-            if file is not None:
-                file.close()
-    if args.verdict is not None:
-        _write_verdict(args.verdict, controller)
+            controller = _build(args, scenario, log)
+            if events is not None:
+                controller.verdict.on_event = lambda event: _write_line(events, event)
+            if args.verdict is not None:
+                _write_verdict(args.verdict, controller)  # now, so that a path that cannot be written is known now
+            await controller.start()
+            print(f"simulated controller on {_where(args, controller)}", flush=True)
+            try:
+                await _until_stopped(controller, scenario, stop, args)
+            finally:
+                await controller.stop()
+                if args.verdict is not None:
+                    _write_verdict(args.verdict, controller)
+        except ControllerError as error:
+            raise UserError(str(error)) from error
     print(controller.verdict, flush=True)
     return EXIT_OK
 
 
-def _build(args: argparse.Namespace, log: TextIO | None) -> SimulatedController:
+def _scenario(args: argparse.Namespace) -> Scenario:
+    from drivers.controller.simulated_scenario import Scenario
+    from service.config_file import ConfigError
+    from service.scenario_file import load_scenario
+
+    if args.scenario is None:
+        return Scenario()
+    try:
+        return load_scenario(args.scenario)
+    except ConfigError as error:
+        raise UserError(str(error)) from error
+
+
+def _build(args: argparse.Namespace, scenario: Scenario, log: TextIO | None) -> SimulatedController:
     from drivers.controller.mailbox import MailboxLayout
     from drivers.controller.simulated import SimulatedController
+    from drivers.controller.simulated_scenario import machine_options
 
     logged = _last_logged(args.log)
 
@@ -98,26 +117,43 @@ def _build(args: argparse.Namespace, log: TextIO | None) -> SimulatedController:
             _write_line(log, contour.as_json())
             os.fsync(log.fileno())
 
-    options = {
+    options: dict[str, Any] = {
+        **machine_options(scenario),
         "layout": MailboxLayout(*_numbers(args.layout), word_order=args.word_order),
-        "scan_s": args.scan_ms / 1000,
+        "device_id": args.device_id,
         "memory_path": args.memory,
         "on_accepted": accepted,
     }
-    if args.tcp is not None:
-        host, port = _address(args.tcp)
-        controller = SimulatedController(host, port, **options)
-    else:
+    if args.scan_ms is not None:
+        options["scan_s"] = args.scan_ms / 1000
+    if args.rtu is not None:
         controller = SimulatedController.on_serial(args.rtu, args.baudrate, **options)
+    elif args.tcp is not None:
+        controller = SimulatedController(*_address("--tcp", args.tcp), **options)
+    else:
+        controller = SimulatedController(*_address("--rtu-over-tcp", args.rtu_over_tcp), framing="rtu", **options)
     if args.refuse:
         controller.judge = lambda _contour: 7
     return controller
 
 
-async def _until_stopped(controller: SimulatedController, stop: asyncio.Event, args: argparse.Namespace) -> None:
+def _where(args: argparse.Namespace, controller: SimulatedController) -> str:
+    address: str | None = args.tcp or args.rtu_over_tcp
+    return f"{address.rpartition(':')[0]}:{controller.port}" if address else str(args.rtu)
+
+
+async def _until_stopped(
+    controller: SimulatedController, scenario: Scenario, stop: asyncio.Event, args: argparse.Namespace
+) -> None:
+    from drivers.controller.simulated_scenario import Play
+
     waiting = [asyncio.ensure_future(stop.wait()), asyncio.ensure_future(controller.wait())]
+    if scenario.events:
+        waiting.append(asyncio.ensure_future(Play(controller, scenario).play_for_ever()))
     if args.trigger_every:
         waiting.append(asyncio.ensure_future(_trigger(controller, args.trigger_every, args.recipe)))
+    if args.verdict is not None:
+        waiting.append(asyncio.ensure_future(_keep_verdict(args.verdict, controller)))
     try:
         done, _ = await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
         for task in done:
@@ -127,6 +163,13 @@ async def _until_stopped(controller: SimulatedController, stop: asyncio.Event, a
             task.cancel()
             with suppress(asyncio.CancelledError):
                 await task
+
+
+async def _keep_verdict(path: Path, controller: SimulatedController) -> None:
+    """Write the verdict now and then, so that a killed process leaves one."""
+    while True:
+        await asyncio.sleep(VERDICT_PERIOD_S)
+        _write_verdict(path, controller)
 
 
 async def _trigger(controller: SimulatedController, period_s: float, recipe: int) -> None:
@@ -141,13 +184,13 @@ def _write_line(file: TextIO, line: dict[str, object]) -> None:
     file.flush()
 
 
-def _open_log(option: str, path: Path | None) -> TextIO | None:
+def _open_log(files: ExitStack, option: str, path: Path | None) -> TextIO | None:
     if path is None:
         return None
     try:
-        return path.open("a", encoding="utf-8")
+        return files.enter_context(path.open("a", encoding="utf-8"))
     except OSError as error:
-        raise UserError(f"{option} {path}: cannot be written: {error.strerror}. Name another file") from error
+        raise UserError(f"--{option} {path}: cannot be written: {error.strerror}. Name another file") from error
 
 
 def _last_logged(path: Path | None) -> int | None:
@@ -162,16 +205,19 @@ def _last_logged(path: Path | None) -> int | None:
 
 
 def _write_verdict(path: Path, controller: SimulatedController) -> None:
+    """Replace the verdict's file as a whole: who reads it never sees half of one."""
+    beside = path.with_name(path.name + ".new")
     try:
-        path.write_text(json.dumps(controller.verdict.as_json(), indent=2) + "\n", encoding="utf-8")
+        beside.write_text(json.dumps(controller.verdict.as_json(), indent=2) + "\n", encoding="utf-8")
+        os.replace(beside, path)
     except OSError as error:
-        print(f"--verdict {path}: cannot be written: {error.strerror}", file=sys.stderr)
+        raise UserError(f"--verdict {path}: cannot be written: {error.strerror}. Name another file") from error
 
 
-def _address(text: str) -> tuple[str, int]:
+def _address(option: str, text: str) -> tuple[str, int]:
     host, colon, port = text.rpartition(":")
     if not colon or not host or not port.isdigit() or int(port) > 65535:
-        raise UserError(f"--tcp {text}: expected HOST:PORT, for example 127.0.0.1:5020")
+        raise UserError(f"{option} {text}: expected HOST:PORT, for example 127.0.0.1:5020")
     return host.strip("[]"), int(port)
 
 

@@ -95,19 +95,19 @@ class Outcome:
 
 def fault_rules(risk: float) -> list[Fault]:
     """Every kind of fault; a read is struck a twentieth as often as a write, for most requests only look."""
-    rules = [Fault(kind, on="write", chance=risk / 12) for kind in LINE_FAULTS]  # type: ignore[arg-type]
-    rules += [Fault(kind, on="write", chance=risk / 12) for kind in CONNECTION_FAULTS]  # type: ignore[arg-type]
-    rules += [Fault("exception", on="write", chance=risk / 30, code=code, delay_s=0.1) for code in EXCEPTIONS]
+    rules = [Fault(kind, request="write", chance=risk / 12) for kind in LINE_FAULTS]  # type: ignore[arg-type]
+    rules += [Fault(kind, request="write", chance=risk / 12) for kind in CONNECTION_FAULTS]  # type: ignore[arg-type]
+    rules += [Fault("exception", request="write", chance=risk / 30, code=code, delay_s=0.1) for code in EXCEPTIONS]
     for delay_s in LATE:
-        rules += [Fault("late-write", on="write", chance=risk / 20, delay_s=delay_s)]
-        rules += [Fault("late-reply", on="write", chance=risk / 40, delay_s=delay_s)]
-        rules += [Fault("repeated-reply", on="any", chance=risk / 200, delay_s=delay_s)]
-        rules += [Fault("late-reply", on="read", chance=risk / 400, delay_s=delay_s)]
-    rules += [Fault("exception", on="read", chance=risk / 400, code=code) for code in EXCEPTIONS]
-    rules += [Fault(kind, on="read", chance=risk / 100) for kind in (*LINE_FAULTS, *CONNECTION_FAULTS)]  # type: ignore[arg-type]
+        rules += [Fault("late-write", request="write", chance=risk / 20, delay_s=delay_s)]
+        rules += [Fault("late-reply", request="write", chance=risk / 40, delay_s=delay_s)]
+        rules += [Fault("repeated-reply", request="any", chance=risk / 200, delay_s=delay_s)]
+        rules += [Fault("late-reply", request="read", chance=risk / 400, delay_s=delay_s)]
+    rules += [Fault("exception", request="read", chance=risk / 400, code=code) for code in EXCEPTIONS]
+    rules += [Fault(kind, request="read", chance=risk / 100) for kind in (*LINE_FAULTS, *CONNECTION_FAULTS)]  # type: ignore[arg-type]
     # The commit and what comes just before it: where a mistake would cost most.
-    rules += [Fault(kind, on="commit", chance=risk / 6) for kind in ("lost-reply", "reset-after")]  # type: ignore[arg-type]
-    rules += [Fault("late-write", on="clear", chance=risk / 12, delay_s=0.15)]
+    rules += [Fault(kind, request="commit", chance=risk / 6) for kind in ("lost-reply", "reset-after")]  # type: ignore[arg-type]
+    rules += [Fault("late-write", request="clear", chance=risk / 12, delay_s=0.15)]
     return rules
 
 

@@ -154,9 +154,11 @@ class KilledCell:
         plan = FaultPlan(
             [
                 Fault("lost-reply", chance=killing.risk),
-                Fault("late-write", on="write", chance=killing.risk, delay_s=0.5),
-                Fault("late-write", on="write", chance=killing.risk, delay_s=1.5),  # lands in the next service's time
-                Fault("exception", on="write", chance=killing.risk, code=6),
+                Fault("late-write", request="write", chance=killing.risk, delay_s=0.5),
+                Fault(
+                    "late-write", request="write", chance=killing.risk, delay_s=1.5
+                ),  # lands in the next service's time
+                Fault("exception", request="write", chance=killing.risk, code=6),
             ],
             killing.seed,
         )

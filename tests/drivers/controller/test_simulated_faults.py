@@ -44,7 +44,7 @@ async def silent(client: Client) -> bool:
 
 
 def with_fault(kind: str, **options: object) -> SimulatedController:
-    return simulated(faults=FaultPlan([Fault(kind, **{"at": (1,), "on": "write", **options})]))  # type: ignore[arg-type]
+    return simulated(faults=FaultPlan([Fault(kind, **{"at": (1,), "request": "write", **options})]))  # type: ignore[arg-type]
 
 
 # --- on TCP ---------------------------------------------------------------------------------------------------------
@@ -73,9 +73,9 @@ async def test_a_repeated_reply_comes_twice() -> None:
 
 
 async def test_a_foreign_reply_tells_of_another_register() -> None:
-    async with with_fault("foreign-reply", on="any", every=1) as controller, Client(controller.port) as client:
+    async with with_fault("foreign-reply", request="any", every=1) as controller, Client(controller.port) as client:
         assert await client.ask(COMMIT) == struct.pack(">BHH", 6, 33, 5)
-    async with with_fault("foreign-reply", on="any") as controller, Client(controller.port) as client:
+    async with with_fault("foreign-reply", request="any") as controller, Client(controller.port) as client:
         assert len(await client.ask(READ_LINK)) == 2 + 30
 
 
@@ -130,7 +130,7 @@ async def test_a_late_write_lands_though_its_client_has_gone_and_nobody_blames_i
 
 
 async def test_going_on_with_a_page_after_a_lost_reply_is_against_the_protocol() -> None:
-    async with with_fault("lost-reply", on="clear") as controller:
+    async with with_fault("lost-reply", request="clear") as controller:
         async with Client(controller.port) as client:
             client.writer.write(struct.pack(">HHHB", 1, 0, 6, 1) + CLEAR)
             assert await silent(client)
@@ -142,7 +142,7 @@ async def test_going_on_with_a_page_after_a_lost_reply_is_against_the_protocol()
 
 
 async def test_clearing_again_after_a_lost_reply_is_in_order() -> None:
-    async with with_fault("lost-reply", on="page") as controller:
+    async with with_fault("lost-reply", request="page") as controller:
         async with Client(controller.port) as client:
             await client.write_one(32, 0)
             client.writer.write(struct.pack(">HHHBBHHBH", 1, 0, 9, 1, 16, 33, 1, 2, 0))
@@ -154,7 +154,7 @@ async def test_clearing_again_after_a_lost_reply_is_in_order() -> None:
 
 
 async def test_asking_again_on_a_connection_that_owes_a_reply_is_against_the_protocol() -> None:
-    async with with_fault("lost-reply", on="read") as controller, Client(controller.port) as client:
+    async with with_fault("lost-reply", request="read") as controller, Client(controller.port) as client:
         client.writer.write(struct.pack(">HHHB", 1, 0, 6, 1) + READ_LINK)
         assert await silent(client)
         await client.ask(READ_LINK)
@@ -226,7 +226,7 @@ def test_every_kind_of_fault_is_explained() -> None:
 
 
 def test_a_rule_strikes_the_requests_that_it_names_and_no_others() -> None:
-    plan = FaultPlan([Fault("lost-reply", on="commit", every=2, times=2)])
+    plan = FaultPlan([Fault("lost-reply", request="commit", every=2, times=2)])
     layout = MailboxLayout()
     struck = [
         plan.strike(targets_of(pdu, layout), 0.0) is not None

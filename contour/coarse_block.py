@@ -22,6 +22,9 @@ _CLOSING_PITCHES = 0.72
 # A gap in a ring of single cells around an opening, up to a cell wide, is a missing wall and no way out.
 _LINK_PITCHES = 1.0
 _FRAGMENT_PITCHES = 2.0
+_SPECK_PITCHES = 0.4
+# All gaps around an opening together, its line being a sample or two wide.
+_GAPS_PITCHES = 2.5
 # Samples of another piece within two of the main one that make both of them one block.
 _CONTACTS = 6
 # An inner opening in which a disc of this radius fits is a hole, not a missing cell.
@@ -196,7 +199,8 @@ def _linked(walls: Gray, kept: Gray, filled: Gray, samples: float) -> tuple[Gray
     """
     reach = 0.5 * _LINK_PITCHES * samples
     _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
-    small = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) < _FRAGMENT_PITCHES * samples
+    size = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
+    small = (size > _SPECK_PITCHES * samples) & (size < _FRAGMENT_PITCHES * samples)
     small[0] = False
     strand = kept | small[labels].astype(np.uint8)
     away = cv2.distanceTransform(1 - strand, cv2.DIST_L2, 5)
@@ -211,11 +215,18 @@ def _linked(walls: Gray, kept: Gray, filled: Gray, samples: float) -> tuple[Gray
     _, nearest = cv2.distanceTransformWithLabels(
         (seeds == 0).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP
     )
-    low = cv2.erode(nearest.astype(np.float32), np.ones((3, 3), np.uint8))
-    line = ((low < nearest) & (away <= reach + 1)).astype(np.uint8)
-    across = np.unique(labels[(line > 0) & (cv2.dilate(filled, np.ones((3, 3), np.uint8)) == 0)])
+    low = cv2.erode(nearest.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
+    line = (low < nearest) & (away <= reach + 1) & (filled == 0)
+    # Dust on a table encloses openings too, but its strands are gaps for the most part.
+    gaps = line & (cv2.dilate(strand, np.ones((3, 3), np.uint8)) == 0)
+    both = np.concatenate([nearest[gaps], low[gaps]])
+    length = np.bincount(both, minlength=int(nearest.max()) + 1)
+    closed = length <= _GAPS_PITCHES * samples
+    closed[nearest[0, 0]] = False
+    line &= closed[low] | closed[nearest]
+    across = np.unique(labels[line & (cv2.dilate(filled, np.ones((3, 3), np.uint8)) == 0)])
     joined = np.isin(np.arange(len(small)), across) & small
-    return filled | line, kept | joined[labels].astype(np.uint8)
+    return filled | line.astype(np.uint8), kept | joined[labels].astype(np.uint8)
 
 
 def _sides(filled: Gray, samples: float) -> list[int]:

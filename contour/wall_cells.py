@@ -19,7 +19,7 @@ _TILES = 4
 # First guesses of the pitch; the mask's windows forgive a factor of two either way.
 _GUESSES = (24.0, 70.0, 8.0)
 _GOOD_SCORE = 0.2
-_LEAST_SCORE = 0.1
+_LEAST_SCORE = 0.14
 _LEAST_CELLS = 6
 # Two readings of one pitch differ by less than this share of it.
 _SAME_PITCH = 0.1

@@ -1,4 +1,4 @@
-"""Wall mask: where the picture shows wall, at half the local wall contrast, whatever the lighting."""
+"""Wall mask: where the picture shows wall, at a share of the local wall contrast, whatever the lighting."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ Float = NDArray[np.float32]
 AnyFloat = NDArray[np.floating[Any] | np.integer[Any]]
 Levels = NDArray[np.uint8] | NDArray[np.uint16]
 
-# Standard deviations above the level of cells, itself 1.25 below the mean where there is nothing but noise: lower, and
-# the table fills with specks.
+# Standard deviations above the level that walls stand on, itself about 1.5 below the mean where there is nothing but
+# noise: lower, and the table fills with specks.
 NOISE_FLOOR = 4.0
 # The maps of local light need no more than this many samples a pitch.
 _MAP_SAMPLES = 8
-# Foils side by side differ in brightness by a factor of three: a threshold halfway up loses the dimmer ones.
-_RISE = 0.35
+# Foils side by side differ in brightness by a factor of three: a threshold any higher loses the dimmer ones.
+_RISE = 0.42
 # Walls of fine cells run into each other at that height: cells to be counted are kept apart, but once they are known,
 # no faint wall may be lost, and blur takes most from thin ones.
 _FINE_RISE = (0.08, -0.05)
 _REGION_RISE = 0.25
 # Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
 _PICTURE_RISE = 0.2
+# Squares wider than any wall and narrower than most cells.
+_BESIDE_PITCHES = 0.8
 _BYTE_CONTRAST = 40.0
 FINE_PITCH = 12.0
 _LEAST_OVER_NOISE = 20.0
@@ -51,31 +53,28 @@ class WallMask:
 def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0) -> WallMask:
     """Walls of `light` (H, W) where cells are about `pitch` pixels apart and walls are brighter (or darker) than cells.
 
-    The local mean over 1.5 pitches flattens the light without a model of it. The threshold lies a third of the
-    way from the local level of cells to that of walls, each a mean weighted with its own difference, whatever share of
-    the area is wall; it is never below NOISE_FLOOR times the noise. `contrast`, where it is known, sets one
-    more floor, and above 40 levels allows a faster way.
+    Walls are what stands out on both sides over less than a cell, whatever the light: a table as light as the walls is
+    no wall, nor is the edge of a shadow or of a lamp's spot on it. The threshold lies at 0.42 of the local height of
+    walls, a mean weighted with itself, whatever share of the area is wall; it is never below NOISE_FLOOR times the
+    noise. `contrast`, where it is known, sets one more floor, and above 40 levels allows a faster way.
     """
     step = max(1, int(pitch / _MAP_SAMPLES))
     smooth, unit = _smoothed(light, step, contrast)
-    mean = _shrunk(smooth, step)
-    mean = np.asarray(cv2.blur(mean, (_odd(1.5 * pitch / step),) * 2, borderType=cv2.BORDER_REFLECT), np.float32)
+    sign = 1 if bright else -1
+    beside = _beside(sign * _shrunk(smooth, step), pitch / step)
     # Every step-th pixel, not their average: an average would take the walls' contrast away.
-    local = smooth[step // 2 :: step, step // 2 :: step].astype(np.float32) - mean
-    if not bright:
-        local = -local
+    height = np.maximum(sign * smooth[step // 2 :: step, step // 2 :: step].astype(np.float32) - beside, 0.0)
     noise = _noise_level(smooth, pitch, unit)
-    upper, lower, region = _levels(local, pitch / step)
-    # All floors count from the level of cells, which on a bare table is the noise below its mean.
+    walls, region, typical = _heights(height, beside, pitch / step)
     share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch) / 8, 0, 1))
     floor = max(NOISE_FLOOR * noise, _PICTURE_RISE * contrast * unit)
-    offset = np.maximum(np.maximum(share * (upper + lower), _REGION_RISE * region), floor) - lower
-    threshold = np.clip(mean + offset if bright else mean - offset, 0, 255 * unit).astype(smooth.dtype)
+    rise = np.maximum(np.maximum(share * walls, _REGION_RISE * region), floor)
+    threshold = np.clip(sign * (beside + rise), 0, 255 * unit).astype(smooth.dtype)
     if step > 1:
         threshold = cv2.resize(threshold, (smooth.shape[1], smooth.shape[0]), interpolation=cv2.INTER_LINEAR)
     mask = cv2.compare(smooth, threshold, cv2.CMP_GT if bright else cv2.CMP_LT)
     mask = np.asarray(mask, np.uint8)[: light.shape[0], : light.shape[1]]
-    return WallMask(np.ascontiguousarray(mask), noise / unit, _typical(upper + lower) / unit)
+    return WallMask(np.ascontiguousarray(mask), noise / unit, _typical(typical) / unit)
 
 
 def _smoothed(light: Gray, step: int, contrast: float) -> tuple[Levels, int]:
@@ -92,6 +91,16 @@ def _smoothed(light: Gray, step: int, contrast: float) -> tuple[Levels, int]:
 def _shrunk(smooth: Levels, step: int) -> Float:
     size = (smooth.shape[1] // step, smooth.shape[0] // step)
     return (cv2.resize(smooth, size, interpolation=cv2.INTER_AREA) if step > 1 else smooth).astype(np.float32)
+
+
+def _beside(small: Float, pitch: float) -> Float:
+    """The level on which walls stand: what stays of `small` when all is taken away that is narrower than a cell.
+
+    A morphological opening (Matheron): the highest of the lowest levels of all squares that hold a sample. A table's
+    edge of light or shadow stays, for it stands out on one side only.
+    """
+    square = np.ones((_odd(_BESIDE_PITCHES * pitch - 1),) * 2, np.uint8)
+    return np.asarray(cv2.morphologyEx(small, cv2.MORPH_OPEN, square, borderType=cv2.BORDER_REFLECT), np.float32)
 
 
 def _typical(span: Float) -> float:
@@ -122,23 +131,27 @@ def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
     return max(quiet, 0.3 * unit)
 
 
-def _levels(local: Float, pitch: float) -> tuple[Float, Float, Float]:
-    """Local level of walls above, and of cells below, the local mean, and the level of walls of the wider region.
+def _heights(height: Float, beside: Float, pitch: float) -> tuple[Float, Float, Float]:
+    """How far walls near each sample rise above the level beside it, how far walls of the wider region, and the walls
+    near it, rise above what lies beside themselves.
 
-    `pitch` in samples of `local`. The region spans a dozen pitches: on the table beside a block it still holds the
-    level of the block's walls, so that the table's own texture stays below the threshold.
+    `pitch` in samples of `height`. Beside a light table the first is less than the last: walls end at the same level.
+    The region spans a dozen pitches: on the table beside a block it still holds the height of the block's walls, so
+    that the table's own texture stays below the threshold.
     """
     # Glints and dust would raise the threshold around them and wipe out faint walls nearby.
-    above = np.minimum(np.maximum(local, 0), _typical_peak(local, pitch))
-    below = np.maximum(-local, 0)
-    window = _odd(1.3 * pitch)
+    height = np.minimum(height, _typical_peak(height, pitch))
     coarse = max(1, round(pitch / 2))
-    grid = (max(1, local.shape[1] // coarse), max(1, local.shape[0] // coarse))
-    wide = _odd(12 * pitch / coarse)
-    weight, square = (cv2.resize(part, grid, interpolation=cv2.INTER_AREA) for part in (above, above * above))
-    region = cv2.resize(_ratio(square, weight, wide), (local.shape[1], local.shape[0]), interpolation=cv2.INTER_LINEAR)
-    upper, lower = _ratio(above * above, above, window), _ratio(below * below, below, window)
-    return upper, lower, np.asarray(region, np.float32)
+    grid = (max(1, height.shape[1] // coarse), max(1, height.shape[0] // coarse))
+    weight, square = (cv2.resize(part, grid, interpolation=cv2.INTER_AREA) for part in (height, height * height))
+    region = cv2.resize(
+        _ratio(square, weight, _odd(12 * pitch / coarse)),
+        (height.shape[1], height.shape[0]),
+        interpolation=cv2.INTER_LINEAR,
+    )
+    window = _odd(1.3 * pitch)
+    own = _ratio(height * height, height, window)
+    return own + _ratio(beside * height, height, window) - beside, np.asarray(region, np.float32), own
 
 
 def _typical_peak(local: Float, pitch: float) -> float:

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from contour.coarse_block import CoarseBlock, coarse_block
 from contour.errors import NoBlockFound
 from contour.pieces import pieces_beside, reaches_frame
-from contour.table_surface import without_light_table
 from contour.wall_cells import Cells, probe
 from contour.wall_ends import edge_chains, find_ends, outermost
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
@@ -72,10 +71,7 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
             f"no block found: cells of {cells.pitch:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
             "like noise. Check the light, and that a block lies in view"
         )
-    if cells.bright:
-        mask = without_light_table(seen.mask, small, cells.pitch / scale, cells.level, cells.floor)
-        seen = replace(seen, mask=mask)
-    else:
+    if not cells.bright:
         seen = _darker_than_table(seen, small, cells)
     on_mask()
     coarse = coarse_block(seen.mask, small, cells.pitch / scale, cells.wall / scale)

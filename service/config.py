@@ -78,6 +78,9 @@ class FilesCamera(Model):
         None, description="Folder that files are moved to once they were read; needs loop: false. none = they stay."
     )
     timeout_s: Seconds = Field(5.0, description="Longest wait for a watched-for file, s.")
+    average: int = Field(
+        1, ge=1, le=64, description="Frames of a still scene that are averaged; 103 where it moves. 1 = none."
+    )
 
     @model_validator(mode="after")
     def _a_loop_keeps_its_files(self) -> Self:
@@ -108,6 +111,16 @@ class V4l2Camera(Model):
         ge=0,
         le=60_000,
         description="Exposure time where the camera does not tell it, ms; none = one frame period is assumed.",
+    )
+    average: int = Field(
+        1, ge=1, le=64, description="Frames of a still scene that are averaged; 103 where it moves. 1 = none."
+    )
+    warm_up_s: float = Field(
+        0,
+        ge=0,
+        le=7200,
+        description="Time after opening in which no trigger is taken, s: calibration holds for a warm camera. After an "
+        "interruption at most as long as that was.",
     )
 
 

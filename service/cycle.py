@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, ParamSpec, TypeVar
 
 from contour.errors import ParameterError, PictureError
-from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable
+from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
 from drivers.controller import ControllerError
 from drivers.controller.mailbox import (
     ContourMessage,
@@ -225,6 +225,8 @@ class Cycle:
         except CameraUnavailable as error:
             self._health.report("camera", Fault(Reason.NO_FRAME, str(error)))
             raise _Stop(Reason.NO_FRAME, str(error)) from error
+        except SceneMoved as error:
+            raise _Stop(Reason.SCENE_MOVED, str(error)) from error
         except FrameUnusable as error:
             raise _Stop(Reason.NO_FRAME, str(error)) from error
         except CameraError as error:

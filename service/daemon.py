@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from drivers.camera import Camera, CameraError
+from drivers.camera import Camera
+from service.camera_watch import CameraWatch
 from service.executor import Executor, Ticket, TriggerRefused
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
@@ -22,7 +23,6 @@ from service.state import State
 
 log = logging.getLogger("combtrace.daemon")
 
-CAMERA_RETRY_S = 1.0
 JOURNAL_RETRY_S = 1.0
 WATCH_PERIOD_S = 0.1
 TELL_AFTER_S = 1.0
@@ -42,6 +42,7 @@ class Parts:
     lock: Held
     triggers: list[Callable[[], Awaitable[None]]] = field(default_factory=list)
     serial_pool: ThreadPoolExecutor | None = None
+    warm_up_s: float = 0.0
 
 
 class Daemon:
@@ -85,8 +86,10 @@ class Daemon:
 
     def _start(self, triggers: Iterable[Callable[[], Awaitable[None]]]) -> list[asyncio.Task[None]]:
         parts = self._parts
+        watch = CameraWatch(parts.camera, parts.pool, parts.health, warm_up_s=parts.warm_up_s)
+        watch.start()
         runs: list[Callable[[], Awaitable[None]]] = [
-            self._watch_camera,
+            watch.run,
             self._watch_journal,
             parts.executor.run,
             *triggers,
@@ -94,31 +97,8 @@ class Daemon:
         if parts.link is not None:
             runs += [parts.link.run, partial(self._watch_link, parts.link)]
             self._report_link(parts.link)
-        self._report_camera(Fault(Reason.NO_FRAME, "the camera is being opened", starting=True))
         parts.health.start()
         return [asyncio.ensure_future(_as_task(run)) for run in runs]
-
-    async def _watch_camera(self) -> None:
-        """Open the camera, and open it again after it was lost."""
-        parts, loop = self._parts, asyncio.get_running_loop()
-        fault: str | None = None
-        while True:
-            if parts.health.fault("camera") is not None and parts.health.job is None:
-                try:
-                    await loop.run_in_executor(parts.pool, _reopen, parts.camera)
-                except CameraError as error:
-                    if str(error) != fault:
-                        log.warning("camera: %s", error)
-                        fault = str(error)
-                    self._report_camera(Fault(Reason.NO_FRAME, str(error)))
-                    await asyncio.sleep(CAMERA_RETRY_S)
-                else:
-                    fault = None
-                    self._report_camera(None)
-            await asyncio.sleep(WATCH_PERIOD_S)
-
-    def _report_camera(self, fault: Fault | None) -> None:
-        self._parts.health.report("camera", fault)
 
     async def _watch_journal(self) -> None:
         """Try the journal again after it could not be written; until then no trigger is taken."""
@@ -224,8 +204,3 @@ def _raise_first(tasks: list[asyncio.Task[None]]) -> None:
             if not task.cancelled():
                 task.result()
             raise RuntimeError(f"{task} ended, expected it to run for ever. Report it with the log")
-
-
-def _reopen(camera: Camera) -> None:
-    camera.close()
-    camera.open()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contour.calibration import Calibration
 from drivers.camera import Camera
+from drivers.camera.averaging import AveragingCamera
 from drivers.camera.files import FileCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.controller import Controller, modbus
@@ -77,6 +78,7 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     if link is not None:
         link.on_look = executor.wake
     parts = Parts(camera, journal, health, executor, link, pool, lock)
+    parts.warm_up_s = getattr(config.camera, "warm_up_s", 0.0)
     _add_triggers(config, parts)
     return parts
 
@@ -137,6 +139,11 @@ def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:
 
 def make_camera(config: Config) -> Camera:
     """The camera's driver, not yet opened."""
+    camera = _single_frames(config)
+    return camera if config.camera.average == 1 else AveragingCamera(camera, config.camera.average)
+
+
+def _single_frames(config: Config) -> Camera:
     settings = config.camera
     if isinstance(settings, FilesCamera):
         return FileCamera(settings.path, loop=settings.loop, watch=settings.watch, move_to=settings.move_to)

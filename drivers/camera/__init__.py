@@ -1,4 +1,4 @@
-"""Cameras: a role of three verbs, and what is thrown when one cannot be kept."""
+"""Cameras: a role of four verbs, and what is thrown when one cannot be kept."""
 
 from __future__ import annotations
 
@@ -27,6 +27,10 @@ class CameraTimeout(CameraError):
 
 class FrameUnusable(CameraError):
     """A frame or file arrived that is no usable picture; the next one may be."""
+
+
+class SceneMoved(FrameUnusable):
+    """Frames that were to show one still scene do not."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,9 @@ class Camera(Protocol):
 
         Raises CameraTimeout after `timeout_s`, CameraUnavailable where the source has gone, FrameUnusable.
         """
+
+    def check(self) -> None:
+        """Raise CameraUnavailable where the open camera has gone or fallen silent since; takes no frame away."""
 
     def close(self) -> None:
         """Let the device go; never raises. Closing a closed camera does nothing."""

@@ -88,6 +88,18 @@ class FileCamera:
         self._sequence += 1
         return Frame(pixels, self._read_at_s, simulated=True, source=source, sequence=self._sequence)
 
+    def check(self) -> None:
+        """Raise CameraUnavailable where file or folder have gone."""
+        if not self._is_open:
+            raise CameraUnavailable(f"{self._path}: not open; expected open() before check().")
+        try:
+            self._path.stat()
+        except OSError as error:
+            raise CameraUnavailable(
+                f"{self._path}: has gone ({error.strerror}); expected a picture file or a folder of them. "
+                "Check camera.path, and that what it lies on is mounted."
+            ) from error
+
     def close(self) -> None:
         """Forget the list of files; never raises. Closing it twice does nothing."""
         self._is_open = False

@@ -44,6 +44,11 @@ class SimulatedCamera:
         self._sequence += 1
         return Frame(pixels, exposed_at_s, simulated=True, source="simulated", sequence=self._sequence)
 
+    def check(self) -> None:
+        """Raise CameraUnavailable where it is not open."""
+        if not self._is_open:
+            raise CameraUnavailable("simulated camera: not open; expected open() before check().")
+
     def close(self) -> None:
         """Stop grabbing; never raises. Closing it twice does nothing."""
         self._is_open = False

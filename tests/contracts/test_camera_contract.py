@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame
+from drivers.camera.averaging import AveragingCamera
 from drivers.camera.files import FileCamera
 from drivers.camera.simulated import SimulatedCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
@@ -39,6 +40,7 @@ CAMERAS = {
     "folder": folder_camera,
     "single file": single_file_camera,
     "simulated": lambda _tmp_path: SimulatedCamera(picture),
+    "averaging": lambda _tmp_path: AveragingCamera(SimulatedCamera(lambda _number: picture(7)), 3),
 }
 if os.environ.get("COMBTRACE_CAMERA_GUEST"):
     CAMERAS["v4l2"] = vivid_camera
@@ -117,4 +119,13 @@ def test_a_camera_can_be_opened_again(camera):
     camera.grab(0.0, 5.0)
     camera.close()
     camera.open()
+    assert camera.grab(0.0, 5.0).sequence == 2
+
+
+def test_a_check_takes_no_frame_and_finds_an_open_camera_well(camera):
+    with pytest.raises(CameraUnavailable, match="not open"):
+        camera.check()
+    camera.open()
+    camera.grab(0.0, 5.0)
+    camera.check()
     assert camera.grab(0.0, 5.0).sequence == 2

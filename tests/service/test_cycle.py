@@ -9,13 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 
 from contour.errors import ParameterError, PictureError
 from contour.geometry import Contour, area
-from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable
+from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable, SceneMoved
 from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.mailbox import Answer, Page
 from service.config import Recipe
@@ -213,6 +214,18 @@ async def test_a_frame_of_before_the_trigger_is_refused_with_101(tmp_path: Path)
         job = await built.job()
         assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.STALE_FRAME)
         assert "20 ms before the trigger" in (job.detail or "")
+
+
+async def test_a_scene_that_moves_while_frames_are_averaged_is_refused_with_103(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+
+        def moved(_number: int) -> NoReturn:
+            raise SceneMoved("cam0: the scene moved by 1.0 px")
+
+        built.camera._make_picture = moved
+        job = await built.job()
+        assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.SCENE_MOVED)
+        assert built.machine.state is State.READY
 
 
 async def test_findings_refuse_the_job_with_the_lowest_code_and_all_texts(tmp_path: Path) -> None:

@@ -8,19 +8,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from drivers.camera import CameraRefused, CameraTimeout, CameraUnavailable, Frame, FrameUnusable
+from drivers.camera.v4l2 import kernel_interface as v4l2
 from drivers.camera.v4l2.controls import apply_controls, exposure_s
-from drivers.camera.v4l2.device import Device
+from drivers.camera.v4l2.device import TELL_WHAT_IT_IS, Device
 from drivers.camera.v4l2.exposure import FrameTiming
 from drivers.camera.v4l2.formats import PictureFormat, set_format, set_frame_rate
 from drivers.camera.v4l2.identity import CameraIdentity, identify
 from drivers.camera.v4l2.pixels import bytes_needed, to_pixels
 from drivers.camera.v4l2.signal_input import select_input
-from drivers.camera.v4l2.stream import Filled, Stream
+from drivers.camera.v4l2.stream import BUFFERS, Filled, Stream
 
 log = logging.getLogger("combtrace.camera")
 
 # Where a driver tells no frame period: longer than that of any camera that suits a cutting cell.
 UNKNOWN_PERIOD_S = 0.2
+# A stream that brings nothing for so long, and for so many periods, is silent.
+SILENT_S, SILENT_PERIODS = 2.0, 5
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,7 @@ class V4l2Camera:
         self._handed_out = 0
         self._last: Filled | None = None
         self._asked_at_s = 0.0
+        self._heard_at_s = 0.0
         self._seen_period_s = 0.0
         self.counts = FrameCounts()
 
@@ -101,11 +105,16 @@ class V4l2Camera:
         try:
             self._opened = self._set_up(device)
             self._stream = Stream(device)
+            if not device.wait(self._silence_s(self._opened)):
+                raise CameraUnavailable(f"{device.path}: no frame came; expected its stream to run. {_CHECK}")
         except BaseException:
-            self._opened = None
+            if self._stream is not None:
+                self._stream.close()
+            self._opened = self._stream = None
             device.close()
             raise
         self._device, self._last, self._seen_period_s = device, None, 0.0
+        self._heard_at_s = self._now()
         self._stalled, self.counts = False, FrameCounts()
         log.info("camera %s opened: %s", self._settings.device, self._opened)
 
@@ -122,6 +131,29 @@ class V4l2Camera:
             self.close()
             raise
 
+    def check(self) -> None:
+        """Raise CameraUnavailable where the device has gone or no frame came for some time; then it is closed.
+
+        Frames that lie waiting are given back: each was exposed before whatever is triggered from now on.
+        """
+        if self._stream is None or self._device is None or self._opened is None:
+            raise CameraUnavailable(f"{self._settings.device}: not open; expected open() before check().")
+        try:
+            self._device.call(v4l2.QUERYCAP, v4l2.Capability(), TELL_WHAT_IT_IS)
+            for _ in range(BUFFERS):
+                filled = self._stream.take()
+                if filled is None:
+                    break
+                self._stream.give_back(filled.index)
+                self._heard_at_s = self._now()
+            silent_s = self._now() - self._heard_at_s
+            if silent_s > self._silence_s(self._opened):
+                seen = f"{self._settings.device}: silent for {silent_s:.1f} s"
+                raise CameraUnavailable(f"{seen}; expected its stream to run. {_CHECK}")
+        except CameraUnavailable:
+            self.close()
+            raise
+
     def close(self) -> None:
         """Let the device go; never raises. Closing it twice does nothing."""
         if self._stream is not None:
@@ -129,6 +161,10 @@ class V4l2Camera:
         if self._device is not None:
             self._device.close()
         self._device = self._stream = self._opened = None
+
+    @staticmethod
+    def _silence_s(opened: Opened) -> float:
+        return max(SILENT_S, SILENT_PERIODS * (opened.period_s or UNKNOWN_PERIOD_S))
 
     def _set_up(self, device: Device) -> Opened:
         settings = self._settings
@@ -170,6 +206,7 @@ class V4l2Camera:
     def _used(self, stream: Stream, filled: Filled, exposed_after_s: float) -> Frame:
         """The frame in a buffer; raise FrameUnusable, _TooEarly."""
         opened, device = self._opened, self._settings.device
+        self._heard_at_s = self._now()
         assert opened is not None
         began_s = self._exposed_at(filled, opened)
         if filled.damaged or filled.bytes_used < bytes_needed(opened.picture):
@@ -211,8 +248,11 @@ class V4l2Camera:
             seen += f" (last: {trouble})" if trouble else ""
         return CameraTimeout(
             f"{self._settings.device}: {seen} within {timeout_s:g} s; expected one good frame exposed after the "
-            "trigger. Check the camera's cable, power and frame rate."
+            f"trigger. {_CHECK}"
         )
+
+
+_CHECK = "Check the camera's cable, power and frame rate."
 
 
 class _TooEarly(Exception):

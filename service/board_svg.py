@@ -22,9 +22,12 @@ def board_svg(board: Board) -> str:
         f"M{MARGIN_MM + left:.4f} {bottom - top:.4f}H{MARGIN_MM + right:.4f}V{bottom - low:.4f}H{MARGIN_MM + left:.4f}z"
         for left, low, right, top in boxes.tolist()
     )
+    # A letter is about 0.55 of its size wide: the longest line stays on the sheet.
+    letters = max(len(line) for line in parameters(board))
+    size = min(3.0, (width - 2 * MARGIN_MM) / (0.55 * letters))
     lines = "".join(
-        f'<text x="{MARGIN_MM}" y="{bottom + 19 + 4.2 * number:.1f}" font-size="3">{escape(line)}</text>'
-        for number, line in enumerate(parameters(board))
+        f'<text x="{MARGIN_MM}" y="{bottom + 19 + 1.4 * size * row:.1f}" font-size="{size:.2f}">{escape(line)}</text>'
+        for row, line in enumerate(parameters(board))
     )
     return (
         f'<?xml version="1.0" encoding="UTF-8"?>\n'

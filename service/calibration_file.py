@@ -27,6 +27,10 @@ class CalibrationFileError(Exception):
     """A calibration file cannot be used: seen, expected, next step."""
 
 
+class CalibrationChanged(CalibrationFileError):
+    """A calibration file no longer is what was written: its hash does not match."""
+
+
 @dataclass(frozen=True)
 class CalibrationRecord:
     """A calibration with what its file says besides: of which camera, when, by what means, and the fixed marks.
@@ -58,7 +62,7 @@ def load_record(path: Path) -> CalibrationRecord:
     except ValidationError as error:
         raise CalibrationFileError("; ".join(f"{path}: {line}" for line in describe(error, model))) from error
     if file.hash is not None and file.hash != content_hash(data):
-        raise CalibrationFileError(
+        raise CalibrationChanged(
             f"{path}: its hash is {file.hash}, its content gives {content_hash(data)}: it was changed after it was "
             "written. Restore it, calibrate again, or remove the line `hash` if the change was meant"
         )

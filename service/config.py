@@ -128,16 +128,13 @@ class Calibration(Model):
     """Where pixels become millimetres."""
 
     file: FilePath = Field(description="Calibration file.")
-    max_age_days: float = Field(
-        0, ge=0, le=36_500, description="Oldest accepted calibration, days; 0 = no limit, the only value so far."
+    max_age_days: float = Field(0, ge=0, le=36_500, description="Oldest accepted calibration, days; 0 = no limit.")
+    sentinel_tolerance_px: float = Field(
+        1.0, ge=0.05, le=1000, description="How far a fixed mark may lie from where the calibration saw it, px."
     )
-
-    @field_validator("max_age_days")
-    @classmethod
-    def _not_yet(cls, value: float) -> float:
-        if value:
-            raise ValueError(f"is {value:g}, expected 0: the age of a calibration is not checked yet")
-        return value
+    sentinels_required: bool = Field(
+        True, description="Refuse where the calibration has fixed marks and none of them is seen."
+    )
 
 
 class NoController(Model):

@@ -243,7 +243,9 @@ class Cycle:
         thickness_mm = job.trigger.thickness_um / 1000 if job.trigger.thickness_um else recipe.thickness_mm
         loop = asyncio.get_running_loop()
         try:
-            return await loop.run_in_executor(self._pool, self._measurer.measure, frame.pixels, recipe, thickness_mm)
+            return await loop.run_in_executor(
+                self._pool, self._measurer.measure, frame.pixels, recipe, thickness_mm, frame.camera
+            )
         except PictureError as error:
             raise _Stop(Reason.NO_FRAME, f"{frame.source}: {error}") from error
         except ParameterError as error:

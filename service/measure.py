@@ -18,6 +18,7 @@ from contour.geometry import Contour, Ring, densified
 from contour.polygon import Polygon, cutting_polygon
 from contour.region import Region
 from contour.tracing import Trace, TraceSettings, check_picture, trace
+from service.calibration_guard import CalibrationGuard
 from service.config import Recipe
 from service.reasons import Reason
 
@@ -105,10 +106,12 @@ class Measurer:
         self,
         calibration: Calibration | None,
         *,
+        guard: CalibrationGuard | None = None,
         work_area_mm: Ring | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._calibration = calibration
+        self._guard = guard
         self._work_area_mm = work_area_mm
         self._clock = clock
 
@@ -117,8 +120,11 @@ class Measurer:
         """True where pixels become millimetres."""
         return self._calibration is not None
 
-    def measure(self, picture: NDArray[np.uint8], recipe: Recipe, thickness_mm: float) -> Measurement:
-        """The measurement of one picture; raise PictureError or ParameterError where that or the recipe is unusable."""
+    def measure(self, picture: NDArray[np.uint8], recipe: Recipe, thickness_mm: float, camera: str = "") -> Measurement:
+        """The measurement of one picture of a camera ("" = not told).
+
+        Raises PictureError or ParameterError where the picture or the recipe is unusable.
+        """
         watch = _Stopwatch(self._clock)
         result = Measurement(
             method=recipe.method,
@@ -131,6 +137,10 @@ class Measurer:
             result = replace(result, findings=_told(judge_without_block(picture, str(error))))
         except CalibrationError as error:
             result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))
+        if self._guard is not None:
+            findings = (*result.findings, *self._guard.findings(picture, camera))
+            result = replace(result, findings=tuple(sorted(findings, key=lambda finding: finding[0])))
+            watch.lap("guard")
         total = sum(watch.milliseconds.values())
         return replace(result, timings_ms={**watch.milliseconds, "total": total})
 

@@ -17,7 +17,8 @@ from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.controller import Controller, modbus
 from drivers.controller.mailbox import MailboxLayout
 from drivers.trigger.serial import SerialLineTrigger
-from service.calibration_file import CalibrationFileError, load_calibration
+from service.calibration_file import CalibrationChanged, CalibrationFileError, load_record
+from service.calibration_guard import CalibrationGuard, GuardLimits
 from service.config import (
     Config,
     ControllerTrigger,
@@ -51,7 +52,7 @@ class WiringError(Exception):
 
 def build(config: Config, *, observe: Callable[[Observation], None] = lambda _observation: None) -> Parts:
     """The daemon's parts; raise WiringError. Must be called in the event loop's thread."""
-    calibration, calibration_fault = find_calibration(config)
+    guard, calibration_fault = find_guard(config)
     camera = make_camera(config)
     lock, journal = _make_journal(config)
     link = _make_link(config)
@@ -60,7 +61,7 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     pool = ThreadPoolExecutor(1, "camera")
     cycle = Cycle(
         camera,
-        Measurer(calibration, work_area_mm=_work_area(config)),
+        Measurer(guard.record.calibration if guard else None, guard=guard, work_area_mm=_work_area(config)),
         {recipe.number: recipe for recipe in config.recipes},
         journal,
         health,
@@ -128,11 +129,21 @@ def _observe_settles_nothing(config: Config, journal: Journal) -> None:
 
 def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:
     """The calibration, and the fault where a controller waits for millimetres that cannot be had."""
+    guard, fault = find_guard(config)
+    return None if guard is None else guard.record.calibration, fault
+
+
+def find_guard(config: Config) -> tuple[CalibrationGuard | None, Fault | None]:
+    """The calibration with its limits, and the fault where a controller waits for millimetres that cannot be had."""
     if config.calibration is None:
         fault = Fault(Reason.CALIBRATION_MISSING, "no calibration file is configured. Set calibration.file")
         return None, None if isinstance(config.controller, NoController) else fault
+    settings = config.calibration
+    limits = GuardLimits(settings.max_age_days, settings.sentinel_tolerance_px, settings.sentinels_required)
     try:
-        return load_calibration(config.calibration.file), None
+        return CalibrationGuard(load_record(settings.file), limits), None
+    except CalibrationChanged as error:
+        return None, Fault(Reason.CALIBRATION_MISMATCH, str(error))
     except CalibrationFileError as error:
         return None, Fault(Reason.CALIBRATION_MISSING, str(error))
 

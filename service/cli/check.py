@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_UNUSABLE
 
 if TYPE_CHECKING:
+    from service.calibration_guard import CalibrationGuard
     from service.config import Config
 
 HELP = "say what is wrong with configuration and devices"
@@ -67,20 +68,32 @@ def findings(config: Config, *, devices: bool) -> Iterator[Finding]:
 
 
 def _calibration(config: Config) -> Finding:
-    from service.wiring import find_calibration
+    from service.wiring import find_guard
 
-    calibration, fault = find_calibration(config)
+    guard, fault = find_guard(config)
     if fault is not None:
         return Finding("calibration", False, fault.text)
-    if calibration is None:
+    if guard is None:
         return Finding("calibration", True, "none: contours stay in pixels")
+    calibration = guard.record.calibration
     aligned = "aligned to the machine" if calibration.aligned else "not aligned: machine frame = work frame"
-    size = f"{calibration.image_width} x {calibration.image_height} px"
-    text = f"for pictures of {size}, {aligned}"
+    text = f"for pictures of {calibration.image_width} x {calibration.image_height} px, {_age(guard)}, {aligned}"
+    sure = calibration.uncertainty
+    heights = sorted({0.0, *(recipe.thickness_mm for recipe in config.recipes)})
+    told = ", ".join(f"{sure.figure_mm(height):.3f} at {height:g} mm" for height in heights) if sure else "not stated"
+    text += f"; 95 % of positions within, mm: {told}"
+    if guard.record.sentinels is not None:
+        text += f"; {len(guard.record.sentinels.marks)} fixed marks"
     blind = [recipe.name for recipe in config.recipes if not calibration.height_known(recipe.thickness_mm)]
     if blind:
         text += f"; its scale is not known at the thickness of {', '.join(blind)}: use the camera form, or that height"
-    return Finding("calibration", True, text)
+    expired = guard.expired()
+    return Finding("calibration", False, expired[1]) if expired else Finding("calibration", True, text)
+
+
+def _age(guard: CalibrationGuard) -> str:
+    age = guard.age_days
+    return "age not stated" if age is None else f"{age:.1f} days old"
 
 
 def _camera(config: Config) -> Finding:
@@ -88,7 +101,7 @@ def _camera(config: Config) -> Finding:
 
     from contour.errors import CalibrationError
     from drivers.camera import CameraError
-    from service.wiring import WiringError, find_calibration, make_camera
+    from service.wiring import WiringError, find_guard, make_camera
 
     try:
         camera = make_camera(config)
@@ -98,14 +111,19 @@ def _camera(config: Config) -> Finding:
         camera.open()
         frame = camera.grab(time.monotonic(), 5.0)
         height, width = frame.pixels.shape[:2]
-        calibration, _ = find_calibration(config)
-        if calibration is not None:
-            calibration.check_fits(width, height)
+        guard, _ = find_guard(config)
+        if guard is not None:
+            guard.record.calibration.check_fits(width, height)
     except (CameraError, CalibrationError) as error:
         return Finding("camera", False, str(error))
     finally:
         camera.close()
-    return Finding("camera", True, f"{frame.source}: {width} x {height} px")
+    text = f"{frame.source}: {width} x {height} px" + (f", camera_name {frame.camera!r}" if frame.camera else "")
+    against = guard.findings(frame.pixels, frame.camera) if guard is not None else ()
+    if against:
+        return Finding("camera", False, f"{text}; " + "; ".join(reason for _, reason in against))
+    marks = guard.sentinels(frame.pixels) if guard is not None else None
+    return Finding("camera", True, text + (f"; fixed marks: {marks}" if marks is not None else ""))
 
 
 async def _controller(config: Config) -> Finding:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 
 if TYPE_CHECKING:
-    from contour.calibration import Calibration
     from contour.geometry import Contour
+    from service.calibration_guard import CalibrationGuard
     from service.config import Config, Recipe
     from service.measure import Measurement, Measurer
 
@@ -87,7 +87,7 @@ class _Setup:
 
         config = _config(args.config)
         recipe = _recipe(config, args)
-        calibration = _calibration(config, args)
+        guard = _guard(config, args)
         if args.thickness_mm is not None and not 0 <= args.thickness_mm <= 10_000:
             raise UserError(f"--thickness-mm {args.thickness_mm:g}: expected 0 to 10000")
         work_area = np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
@@ -99,7 +99,7 @@ class _Setup:
         if folder:
             _make_folder(overlay)
         return cls(
-            Measurer(calibration, work_area_mm=work_area),
+            Measurer(guard.record.calibration if guard else None, guard=guard, work_area_mm=work_area),
             recipe,
             recipe.thickness_mm if args.thickness_mm is None else args.thickness_mm,
             overlay,
@@ -122,16 +122,20 @@ def _config(path: Path | None) -> Config:
         raise UserError(str(error)) from error
 
 
-def _calibration(config: Config, args: argparse.Namespace) -> Calibration | None:
-    from service.calibration_file import CalibrationFileError, load_calibration
+def _guard(config: Config, args: argparse.Namespace) -> CalibrationGuard | None:
+    """The calibration that the command line or a given configuration names, with its limits; None where none is."""
+    from service.calibration_file import CalibrationFileError, load_record
+    from service.calibration_guard import CalibrationGuard, GuardLimits
 
-    path = args.calibration
-    if path is None and args.config is not None and config.calibration is not None:
-        path = config.calibration.file
+    settings = config.calibration if args.config is not None else None
+    path = args.calibration or (settings.file if settings is not None else None)
     if path is None:
         return None
+    limits = GuardLimits()
+    if settings is not None:
+        limits = GuardLimits(settings.max_age_days, settings.sentinel_tolerance_px, settings.sentinels_required)
     try:
-        return load_calibration(path)
+        return CalibrationGuard(load_record(path), limits)
     except CalibrationFileError as error:
         raise UserError(str(error)) from error
 

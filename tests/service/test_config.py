@@ -142,7 +142,7 @@ def test_the_embedded_defaults_need_no_file() -> None:
         ),
         (SMALL + "triggers: [{kind: serial}]\n", "triggers[0].port: is missing"),
         (SMALL + "recipes: []\n", "recipes is empty"),
-        (SMALL.replace("c.yaml", "c.yaml, max_age_days: 30"), "is 30, expected 0: the age of a calibration is not"),
+        (SMALL.replace("c.yaml", "c.yaml, max_age_days: -1"), "calibration.max_age_days: seen -1"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, port: 05020"), "05020 begins with 0; write 5020"),
         (SMALL + "recipes: [{number: 1, name: a, binarize: otsu}]\n", "wall-tips finds its own threshold"),
         (
@@ -181,7 +181,7 @@ def test_the_embedded_defaults_need_no_file() -> None:
         (SMALL + "extra: 1\n", "extra: unknown key, expected one of archive, calibration, camera"),
         (
             SMALL.replace("file: c.yaml", "file: c.yaml, max_vertices: 3"),
-            "calibration.max_vertices: unknown key, expected one of file, max_age_days",
+            "calibration.max_vertices: unknown key, expected one of file, max_age_days, sentinel_tolerance_px, ",
         ),
         (SMALL + "recipes: [{number: 1, name: a, tolerance: 1}]\n", "unknown key; did you mean tolerance_mm?"),
         (SMALL.replace("path: in", "path: ''"), "camera.path: is '', expected the path of a file"),

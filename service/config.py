@@ -166,6 +166,8 @@ class ModbusController(Model):
     )
     contour_address: Register = Field(32, description="First register of header and payload (PDU address).")
     payload_capacity: int = Field(1984, ge=8, le=REGISTERS, description="Registers of payload, an even number.")
+    longest_write: int = Field(123, ge=32, le=123, description="Most registers in one write, the standard's 123.")
+    longest_read: int = Field(125, ge=32, le=125, description="Most registers in one read, the standard's 125.")
     timeout_s: Seconds = Field(1.0, description="Longest wait for the reply to one request, s.")
     poll_period_s: float = Field(0.05, ge=0.001, le=0.5, description="Period of looking at the controller's block, s.")
     heartbeat_timeout_s: float = Field(

@@ -14,7 +14,7 @@ from drivers.camera import Camera
 from drivers.camera.averaging import AveragingCamera
 from drivers.camera.files import FileCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
-from drivers.controller import Controller, modbus
+from drivers.controller import modbus
 from drivers.controller.mailbox import MailboxLayout
 from drivers.trigger.serial import SerialLineTrigger
 from service.calibration_file import CalibrationChanged, CalibrationFileError, load_record
@@ -172,14 +172,15 @@ def _single_frames(config: Config) -> Camera:
     )
 
 
-def make_controller(config: Config) -> Controller | None:
+def make_controller(config: Config) -> modbus.ModbusController | None:
     """The controller's driver, None for `kind: none`."""
     settings = config.controller
     if isinstance(settings, NoController):
         return None
     layout = mailbox_layout(config)
     assert layout is not None
-    shared: tuple[int, MailboxLayout, float] = (settings.device_id, layout, settings.timeout_s)
+    limits = modbus.RequestLimits(settings.longest_write, settings.longest_read)
+    shared = settings.device_id, layout, settings.timeout_s, limits
     if isinstance(settings, ModbusTcp):
         return modbus.ModbusTcpController(settings.host, settings.port, *shared)
     if isinstance(settings, ModbusRtuOverTcp):

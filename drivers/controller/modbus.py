@@ -24,9 +24,8 @@ from drivers.controller.mailbox import (
     encode_service,
 )
 from drivers.controller.requests import (
-    LONGEST_READ,
-    LONGEST_WRITE,
     Request,
+    RequestLimits,
     read_registers,
     registers_of,
     stream_of,
@@ -42,6 +41,7 @@ __all__ = [
     "ModbusRtuController",
     "ModbusRtuOverTcpController",
     "ModbusTcpController",
+    "RequestLimits",
     "Rs485",
     "SerialLine",
 ]
@@ -53,7 +53,12 @@ class ModbusController:
     """The Controller role over `wire`; see `Controller` for what is raised."""
 
     def __init__(
-        self, wire: Wire, device_id: int = 1, layout: MailboxLayout | None = None, timeout_s: float = 1.0
+        self,
+        wire: Wire,
+        device_id: int = 1,
+        layout: MailboxLayout | None = None,
+        timeout_s: float = 1.0,
+        limits: RequestLimits | None = None,
     ) -> None:
         cap_library_log()
         wire.frames(device_id)  # MailboxError: a device id that none can have
@@ -61,6 +66,7 @@ class ModbusController:
         self._device_id = device_id
         self._layout = layout or MailboxLayout()
         self._timeout_s = timeout_s
+        self._limits = limits or RequestLimits()
         self._connecting = asyncio.Lock()
         self._connection: Connection | None = None
         self._opening: Connection | None = None
@@ -89,6 +95,16 @@ class ModbusController:
         """Close the connection; never raises."""
         self._closings += 1
         self._drop("closed by this side")
+
+    @property
+    def layout(self) -> MailboxLayout:
+        """Where the mailbox lies."""
+        return self._layout
+
+    @property
+    def limits(self) -> RequestLimits:
+        """How long one request may be."""
+        return self._limits
 
     async def run(self, requests: Sequence[Request]) -> list[bytes]:
         """The PDUs of the replies to requests that the caller made: for commissioning."""
@@ -122,7 +138,7 @@ class ModbusController:
         await self._held().run(
             [
                 write_registers(first + offset, stream[2 * (offset - 1) : 2 * (offset - 1 + count)])
-                for offset, count in spans(page_starts(page.header, len(page.payload)), LONGEST_WRITE)
+                for offset, count in spans(page_starts(page.header, len(page.payload)), self._limits.write)
             ]
         )
 
@@ -134,7 +150,7 @@ class ModbusController:
         (reply,) = await connection.run([read_registers(first + 1, HEADER_REGISTERS)])
         header = registers_of(reply)
         starts = [start for start in page_starts(header, payload_length) if start >= PAYLOAD_OFFSET]
-        reads = [read_registers(first + offset, count) for offset, count in spans(starts, LONGEST_READ)]
+        reads = [read_registers(first + offset, count) for offset, count in spans(starts, self._limits.read)]
         replies = await connection.run(reads) if reads else []
         return Page(header, tuple(register for reply in replies for register in registers_of(reply)))
 
@@ -212,17 +228,23 @@ class ModbusTcpController(ModbusController):
         device_id: int = 1,
         layout: MailboxLayout | None = None,
         timeout_s: float = 1.0,
+        limits: RequestLimits | None = None,
     ) -> None:
-        super().__init__(TcpWire(host, port), device_id, layout, timeout_s)
+        super().__init__(TcpWire(host, port), device_id, layout, timeout_s, limits)
 
 
 class ModbusRtuController(ModbusController):
     """Over Modbus RTU on a serial port of this machine; timeout_s counts from when the request has gone out."""
 
     def __init__(
-        self, line: SerialLine, device_id: int = 1, layout: MailboxLayout | None = None, timeout_s: float = 1.0
+        self,
+        line: SerialLine,
+        device_id: int = 1,
+        layout: MailboxLayout | None = None,
+        timeout_s: float = 1.0,
+        limits: RequestLimits | None = None,
     ) -> None:
-        super().__init__(RtuWire(line), device_id, layout, timeout_s)
+        super().__init__(RtuWire(line), device_id, layout, timeout_s, limits)
 
 
 class ModbusRtuOverTcpController(ModbusController):
@@ -235,6 +257,7 @@ class ModbusRtuOverTcpController(ModbusController):
         device_id: int = 1,
         layout: MailboxLayout | None = None,
         timeout_s: float = 1.0,
+        limits: RequestLimits | None = None,
         baudrate: int = 9600,
     ) -> None:
-        super().__init__(RtuOverTcpWire(host, port, baudrate), device_id, layout, timeout_s)
+        super().__init__(RtuOverTcpWire(host, port, baudrate), device_id, layout, timeout_s, limits)

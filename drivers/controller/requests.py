@@ -9,6 +9,8 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from drivers.controller.errors import MailboxError
+
 READ_REGISTERS = 3
 WRITE_REGISTER = 6
 WRITE_REGISTERS = 16
@@ -16,6 +18,20 @@ EXCEPTION = 0x80
 LONGEST_WRITE = 123  # registers in one FC16
 LONGEST_READ = 125  # registers in one FC3
 EXCEPTION_LENGTH = 2  # bytes of an exception's PDU
+SHORTEST_LIMIT = 32  # the page's header is read by one request, which `line_check.py` relies on
+
+
+@dataclass(frozen=True)
+class RequestLimits:
+    """Registers that the controller takes in one FC16 and gives in one FC3; few take less than the standard's."""
+
+    write: int = LONGEST_WRITE
+    read: int = LONGEST_READ
+
+    def __post_init__(self) -> None:
+        for name, seen, largest in (("write", self.write, LONGEST_WRITE), ("read", self.read, LONGEST_READ)):
+            if not SHORTEST_LIMIT <= seen <= largest:
+                raise MailboxError(f"longest_{name} is {seen}, expected {SHORTEST_LIMIT} to {largest} registers")
 
 
 @dataclass(frozen=True, slots=True)

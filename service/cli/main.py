@@ -11,7 +11,7 @@ from service.cli.errors import EXIT_UNUSABLE, UserError
 
 COMMANDS = (
     *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
-    *("board", "calibrate"),
+    *("board", "calibrate", "probe"),
     *("schema", "reasons", "register-map"),
 )
 

@@ -1,0 +1,67 @@
+"""How a controller numbers its registers and orders its words, told from what stands and moves in them.
+
+The service and the controller's program may each be right and yet not meet: one counts registers from 0, the other
+from 1, or the halves of a 32-bit value go in another order. Both show in the link block: in `test_echo`, which the
+controller computes from `test_value`, and in which registers move.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from drivers.controller.mailbox import MailboxLayout, WordOrder
+
+SHIFTS = (0, 1, -1)
+STATE, HEARTBEAT, ECHO, CLOCK = 0, 1, 8, 14  # offsets in the link block
+TEST_VALUE = 8  # offset in the service block
+Registers = Mapping[int, int]
+"""What was read, by PDU address."""
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How the controller sees the mailbox. shift: registers by which its blocks lie higher than configured."""
+
+    shift: int
+    word_order: WordOrder | None
+
+
+def from_echo(registers: Registers, layout: MailboxLayout) -> list[Signature]:
+    """Every way of seeing in which `test_echo` is `test_value` + 1, from one look at both blocks."""
+    ways: list[Signature] = []
+    orders: tuple[WordOrder, ...] = ("big", "little")
+    for shift in SHIFTS:
+        for order in orders:
+            value = _u32(registers, layout.service_address + TEST_VALUE + shift, order)
+            echo = _u32(registers, layout.link_address + ECHO + shift, order)
+            if value is not None and echo == (value + 1) % 2**32:
+                ways.append(Signature(shift, order))
+    return ways
+
+
+def from_movement(looks: Sequence[Registers], layout: MailboxLayout) -> list[Signature]:
+    """Every way of seeing in which the heartbeat moves and `controller_state` does not, from looks over some time.
+
+    The word order follows from `clock`, of which the lower half moves fast, the higher one hardly ever.
+    """
+    moves = {
+        address: sum(before.get(address) != after.get(address) for before, after in pairwise(looks))
+        for address in looks[0]
+    }
+    ways = []
+    for shift in SHIFTS:
+        start = layout.link_address + shift
+        if moves.get(start + HEARTBEAT) and not moves.get(start + STATE):
+            high, low = moves.get(start + CLOCK, 0), moves.get(start + CLOCK + 1, 0)
+            order: WordOrder | None = None if high == low else "big" if low > high else "little"
+            ways.append(Signature(shift, order))
+    return ways
+
+
+def _u32(registers: Registers, address: int, order: WordOrder) -> int | None:
+    first, second = registers.get(address), registers.get(address + 1)
+    if first is None or second is None:
+        return None
+    return first << 16 | second if order == "big" else second << 16 | first

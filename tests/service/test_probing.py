@@ -1,0 +1,183 @@
+"""Probing a controller: what is seen of it, what is to be changed, and what is left as it was."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from typing import Any
+
+import pytest
+
+from drivers.controller import ServiceBlock
+from drivers.controller.mailbox import MailboxLayout
+from drivers.controller.modbus import ModbusTcpController
+from drivers.controller.requests import read_registers, registers_of, stream_of, write_register, write_registers
+from drivers.controller.simulated import SimulatedController
+from service.probing import Finding, Probe
+from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply
+from tests.interop.programs import libmodbus_tcp
+from tests.interop.shifted_program import program
+
+FASTER = 8
+
+
+async def probed(port: int, layout: MailboxLayout | None = None, *, write: bool = True) -> tuple[dict[str, Any], Probe]:
+    """What the probe said, by part, and the probe; its waits are `FASTER` times shorter."""
+    controller = ModbusTcpController("127.0.0.1", port, layout=layout, timeout_s=5)
+    probe = Probe(
+        controller, 5, sleep=lambda pause_s: asyncio.sleep(pause_s / FASTER), now=lambda: FASTER * time.monotonic()
+    )
+    findings: dict[str, Finding] = {}
+    try:
+        async for finding in probe.findings(write=write):
+            findings[finding.part] = finding
+    finally:
+        await controller.close()
+    return findings, probe
+
+
+@pytest.fixture
+async def client() -> AsyncIterator[ModbusTcpController]:
+    """A second client of a libmodbus server with all registers of the default layout and more."""
+    with libmodbus_tcp() as (_, port):
+        made = ModbusTcpController("127.0.0.1", port, timeout_s=30)
+        await made.connect()
+        yield made
+        await made.close()
+
+
+def port_of(client: ModbusTcpController) -> int:
+    return int(str(client).split(":")[1].split()[0])
+
+
+async def held(client: ModbusTcpController, address: int, count: int) -> list[int]:
+    registers: list[int] = []
+    while len(registers) < count:
+        (reply,) = await client.run([read_registers(address + len(registers), min(125, count - len(registers)))])
+        registers += registers_of(reply)
+    return registers
+
+
+async def put(client: ModbusTcpController, address: int, registers: list[int]) -> None:
+    for start in range(0, len(registers), 123):
+        await client.run([write_registers(address + start, stream_of(registers[start : start + 123]))])
+
+
+async def test_the_simulated_controller_is_as_it_should_be() -> None:
+    async with SimulatedController(scan_s=0.001) as simulated:
+        findings, probe = await probed(simulated.port)
+    assert {part: finding.text for part, finding in findings.items() if not finding.well} == {}
+    assert probe.changes == {}
+    assert {"round trip", "longest read", "longest write", "writable", "test_echo", "heartbeat"} <= set(findings)
+    restored = "service-block-content"  # all zero, as it was before
+    assert set(simulated.verdict.counts) <= {"heartbeat-stalled", restored}, simulated.verdict
+
+
+@pytest.mark.parametrize("shift", [0, 1, -1])
+@pytest.mark.parametrize("order", ["big", "little"])
+@pytest.mark.parametrize("write", [True, False])
+async def test_another_numbering_and_another_order_of_words_are_told(
+    client: ModbusTcpController, shift: int, order: str, write: bool
+) -> None:
+    """The mailbox is configured at 100; the program counts otherwise."""
+    layout = MailboxLayout(100, 116, 132)
+    async with program(port_of(client), 100 + shift, order):
+        findings, probe = await probed(port_of(client), layout, write=write)
+    changes = {"link_address": 100 + shift, "service_address": 116 + shift, "contour_address": 132 + shift}
+    expected: dict[str, object] = dict(changes) if shift else {}
+    if order == "little":
+        expected["word_order"] = "little"
+    assert probe.changes == expected
+    parts = ("heartbeat", "test_echo") if write else ("heartbeat",)
+    assert [findings[part].well for part in parts] == [not expected] * len(parts)
+
+
+async def test_a_numbering_below_0_is_told_in_words(client: ModbusTcpController) -> None:
+    async with program(port_of(client), 0):
+        findings, probe = await probed(port_of(client), MailboxLayout(1, 17, 33), write=False)
+    assert probe.changes == {"link_address": 0, "service_address": 16, "contour_address": 32}
+    assert "one register lower than configured: the controller counts registers from 0" in findings["heartbeat"].text
+
+
+async def test_registers_that_are_missing_shorten_the_payload() -> None:
+    with libmodbus_tcp(1001) as (_, port):
+        findings, probe = await probed(port)
+    assert probe.changes == {"payload_capacity": 1001 - 64 - 1}
+    assert "up to register 1000 (401001), not all of it" in findings["readable"].text
+    assert not findings["writable"].well
+
+
+async def test_a_contour_block_that_is_not_there_is_told() -> None:
+    with libmodbus_tcp(40) as (_, port):
+        findings, probe = await probed(port)
+    assert "Set contour_address" in findings["readable"].text
+    assert "not tried" in findings["writing"].text
+    assert "payload_capacity" not in probe.changes
+
+
+async def test_what_stood_there_is_put_back_and_nothing_else_is_touched(client: ModbusTcpController) -> None:
+    layout = MailboxLayout(3000, 100, 500, payload_capacity=600)
+    before = [(address * 7 + 1) & 0xFFFF for address in range(4000)]
+    before[3013] = 0  # no session: no page can be under way
+    before[111] = 0  # no owner
+    await put(client, 0, before)
+    await probed(port_of(client), layout)
+    before[500] = 0  # transfer
+    before[114:116] = [before[114], before[115]]
+    assert await held(client, 0, 4000) == before
+
+
+async def test_nothing_is_written_without_being_told_to(client: ModbusTcpController) -> None:
+    before = [(address * 7 + 1) & 0xFFFF for address in range(2048)]
+    await put(client, 0, before)
+    findings, _ = await probed(port_of(client), write=False)
+    assert await held(client, 0, 2048) == before
+    assert "writable" not in findings
+
+
+async def test_nothing_is_written_while_another_service_is_alive(client: ModbusTcpController) -> None:
+    async def beat() -> None:
+        for number in range(10_000):
+            await client.write_service(ServiceBlock(owner=77, service_heartbeat=number))
+            await asyncio.sleep(0.02)
+
+    beating = asyncio.create_task(beat())
+    findings, _ = await probed(port_of(client))
+    beating.cancel()
+    await asyncio.wait([beating])
+    assert findings["writing"].text == "not tried: a service (owner 77) is alive on this controller. Stop it first"
+    await client.connect()
+    assert await held(client, 32, 100) == [0] * 100
+
+
+async def test_nothing_is_written_while_a_page_waits_for_its_answer(client: ModbusTcpController) -> None:
+    await put(client, 0, [1, 1, 0, 0, 0, 0, 4, 1, 0, 0, 0, 0, 0, 9, 0, 0])
+    await client.run([write_register(32, 5)])
+    findings, _ = await probed(port_of(client))
+    assert "page 5 is committed and not answered yet" in findings["writing"].text
+    assert await held(client, 32, 1) == [5]
+
+
+async def test_a_dead_services_block_does_not_hinder(client: ModbusTcpController) -> None:
+    await client.write_service(ServiceBlock(owner=77, service_heartbeat=5))
+    findings, _ = await probed(port_of(client))
+    assert findings["writable"].well
+
+
+@pytest.mark.parametrize("longest", [100, 40])
+async def test_shorter_requests_than_the_standards_are_found(longest: int) -> None:
+    async with MisbehavingServer() as server:
+        right = server.behave
+
+        async def short(request: bytes, writer: asyncio.StreamWriter) -> None:
+            count = int.from_bytes(request[10:12], "big")
+            if request[7] in (3, 16) and count > longest:
+                writer.write(exception_reply(request, 3))
+            else:
+                await right(request, writer)
+
+        server.behave = short
+        findings, probe = await probed(server.port, write=False)
+    assert probe.changes == {"longest_read": longest}
+    assert f"{longest} registers in one request, the standard's limit is 125" in findings["longest read"].text

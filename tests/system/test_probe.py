@@ -1,0 +1,52 @@
+"""`combtrace probe` against three servers that others wrote, with a controller's program behind each."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from tests.interop.programs import TCP_SERVERS
+from tests.interop.shifted_program import program
+from tests.system.processes import combtrace
+
+SAMPLES = Path(__file__).parents[2] / "service" / "samples"
+
+
+def config(folder: Path, port: int, **controller: object) -> Path:
+    file = folder / "config.yaml"
+    keys = "".join(f", {key}: {value}" for key, value in controller.items())
+    file.write_text(
+        f"camera: {{kind: files, path: {SAMPLES}}}\ncalibration: {{file: {SAMPLES / 'calibration.yaml'}}}\n"
+        f"controller: {{kind: modbus-tcp, port: {port}, timeout_s: 5{keys}}}\nservice: {{state_dir: state}}\n"
+    )
+    return file
+
+
+@pytest.mark.parametrize(
+    ("server", "shift", "order", "changes"),
+    [
+        ("libmodbus", 0, "little", ["word_order: little"]),
+        ("pyModbusTCP", 1, "big", ["link_address: 1", "service_address: 17", "contour_address: 33"]),
+        ("modbus-serial", 0, "big", []),
+    ],
+)
+async def test_it_says_what_to_change(tmp_path: Path, server: str, shift: int, order: str, changes: list[str]) -> None:
+    with TCP_SERVERS[server]() as (_, port):
+        async with program(port, shift, order):
+            said = await asyncio.to_thread(combtrace, "probe", "--write", "--config", config(tmp_path, port))
+    assert said.stderr == ""
+    assert said.returncode == (1 if changes else 0), said.stdout
+    told = [line.strip() for line in said.stdout.splitlines() if line.startswith("  ")]
+    assert told == changes
+    assert ("FAULT" in said.stdout) == bool(changes)
+    for part in ("round trip", "longest read", "longest write", "writable", "test_echo", "heartbeat"):
+        assert f" {part} " in said.stdout
+
+
+async def test_a_controller_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:
+    said = await asyncio.to_thread(combtrace, "probe", "--config", config(tmp_path, 1))
+    assert said.returncode == 1
+    assert "FAULT controller    127.0.0.1:1: no connection: " in said.stdout
+    assert said.stderr == ""

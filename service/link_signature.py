@@ -16,6 +16,7 @@ from drivers.controller.mailbox import MailboxLayout, WordOrder
 SHIFTS = (0, 1, -1)
 STATE, HEARTBEAT, ECHO, CLOCK = 0, 1, 8, 14  # offsets in the link block
 TEST_VALUE = 8  # offset in the service block
+FEWEST_BEATS = 2  # a state may change once in the meantime
 Registers = Mapping[int, int]
 """What was read, by PDU address."""
 
@@ -42,7 +43,7 @@ def from_echo(registers: Registers, layout: MailboxLayout) -> list[Signature]:
 
 
 def from_movement(looks: Sequence[Registers], layout: MailboxLayout) -> list[Signature]:
-    """Every way of seeing in which the heartbeat moves and `controller_state` does not, from looks over some time.
+    """Every way of seeing in which the heartbeat moves and `controller_state` hardly does, from looks over some time.
 
     The word order follows from `clock`, of which the lower half moves fast, the higher one hardly ever.
     """
@@ -53,7 +54,8 @@ def from_movement(looks: Sequence[Registers], layout: MailboxLayout) -> list[Sig
     ways = []
     for shift in SHIFTS:
         start = layout.link_address + shift
-        if moves.get(start + HEARTBEAT) and not moves.get(start + STATE):
+        beats = moves.get(start + HEARTBEAT, 0)
+        if beats >= FEWEST_BEATS and 2 * moves.get(start + STATE, 0) < beats:
             high, low = moves.get(start + CLOCK, 0), moves.get(start + CLOCK + 1, 0)
             order: WordOrder | None = None if high == low else "big" if low > high else "little"
             ways.append(Signature(shift, order))

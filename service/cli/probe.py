@@ -51,19 +51,22 @@ def run(args: argparse.Namespace) -> int:
 async def _probe(config: Config, *, write: bool) -> int:
     from drivers.controller import ControllerError
     from service.config import NoController
-    from service.lock import Lock, LockError
+    from service.lock import LockError, Locks, NameLock
     from service.probing import Finding, Probe
-    from service.wiring import make_controller
+    from service.wiring import controller_names, make_controller
 
     controller = make_controller(config)
     assert controller is not None
     assert not isinstance(config.controller, NoController)
-    lock = None
-    if write:
-        try:
-            lock = Lock(config.service.state_dir / "combtrace.lock")
-        except LockError as error:
-            raise UserError(f"nothing is written while the service runs here: {error}") from error
+    if write and config.controller.mode == "observe":
+        raise UserError("controller.mode is observe: another process writes there. Probe without --write")
+    locks = Locks()
+    try:
+        for name in controller_names(config) if write else ():
+            locks.add(NameLock(name))
+    except LockError as error:
+        locks.release()
+        raise UserError(f"nothing is written while a service runs here: {error}") from error
     probe = Probe(controller, config.controller.timeout_s)
     well = True
     try:
@@ -75,8 +78,7 @@ async def _probe(config: Config, *, write: bool) -> int:
         well = False
     finally:
         await controller.close()
-        if lock is not None:
-            lock.release()
+        locks.release()
     _print_changes(probe.changes)
     if not write:
         print("Not written to. With --write: writable registers, the longest write, and the word order by test_echo.")

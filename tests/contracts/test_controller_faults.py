@@ -23,7 +23,7 @@ from drivers.controller import (
 )
 from drivers.controller.connection import Connection
 from drivers.controller.library_log import LIBRARY_LOGGER
-from drivers.controller.modbus import ModbusTcpController
+from drivers.controller.modbus import ModbusTcpController, RequestLimits
 from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 
 PATIENT_S = 60.0  # longer than any test: what fails then did not fail by its time-out
@@ -455,3 +455,22 @@ async def test_the_library_does_not_dump_frames_into_the_log(
     with pytest.raises(ControllerError):
         await controller.read_link()
     assert caplog.records == []
+
+
+async def test_no_request_is_longer_than_the_controller_takes(server: MisbehavingServer) -> None:
+    limits = RequestLimits(write=50, read=33)
+    controller = ModbusTcpController("127.0.0.1", server.port, timeout_s=PATIENT_S, limits=limits)
+    await controller.connect()
+    await controller.write_page(Page((1, 0, 1, 1, 1, 1, 0, *(0,) * 24), (5,) * 402))
+    await controller.read_page(402)
+    await controller.close()
+    counts = [(request[7], int.from_bytes(request[10:12], "big")) for request in server.requests]
+    assert sum(count for function_code, count in counts if function_code == 16) == 31 + 402
+    assert sum(count for function_code, count in counts if function_code == 3) == 31 + 402
+    assert all(count <= {16: 50, 3: 33}[function_code] for function_code, count in counts)
+
+
+@pytest.mark.parametrize("limits", [{"write": 31}, {"read": 31}, {"write": 124}, {"read": 126}])
+def test_limits_that_no_controller_can_have_are_refused(limits: dict[str, int]) -> None:
+    with pytest.raises(MailboxError, match="expected 32 to 12"):
+        RequestLimits(**limits)

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from service.config_file import load_config
+from service.lock import NameLock
+from service.wiring import controller_names
 from tests.interop.programs import TCP_SERVERS
 from tests.interop.shifted_program import program
 from tests.system.processes import combtrace
@@ -43,6 +46,22 @@ async def test_it_says_what_to_change(tmp_path: Path, server: str, shift: int, o
     assert ("FAULT" in said.stdout) == bool(changes)
     for part in ("round trip", "longest read", "longest write", "writable", "test_echo", "heartbeat"):
         assert f" {part} " in said.stdout
+
+
+async def test_nothing_is_written_while_a_service_of_this_machine_holds_the_controller(tmp_path: Path) -> None:
+    file = config(tmp_path, 1)
+    locks = [NameLock(name) for name in controller_names(load_config(file))]
+    said = await asyncio.to_thread(combtrace, "probe", "--write", "--config", file)
+    for lock in locks:
+        lock.release()
+    assert said.returncode == 2
+    assert "nothing is written while a service runs here" in said.stderr
+
+
+async def test_nothing_is_written_beside_the_process_that_is_only_observed(tmp_path: Path) -> None:
+    said = await asyncio.to_thread(combtrace, "probe", "--write", "--config", config(tmp_path, 1, mode="observe"))
+    assert said.returncode == 2
+    assert "Probe without --write" in said.stderr
 
 
 async def test_a_controller_that_is_not_there_is_told_in_one_line(tmp_path: Path) -> None:

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from benchmarks.pictures import FOLDER, Gallery
-
-PAGE = FOLDER.parent / "accuracy.md"
+from benchmarks.page_section import PAGE, kept_sections
+from benchmarks.pictures import Gallery
 
 _HEAD = """# Accuracy and speed
 
@@ -41,7 +40,8 @@ Random scenes of fresh seeds are the stricter test.
 
 
 def write_page(blocks: Sequence[tuple[str, str]], gallery: Gallery) -> list[str]:
-    """Write the page and its pictures; their names."""
+    """Write the page and its pictures; their names. Sections that other commands wrote are kept."""
+    kept = kept_sections()
     paths = gallery.write()
     machine = (
         f"{os.cpu_count()} cores, Python {platform.python_version()}, numpy {np.__version__}, OpenCV {cv2.__version__}"
@@ -49,6 +49,7 @@ def write_page(blocks: Sequence[tuple[str, str]], gallery: Gallery) -> list[str]
     parts = [_HEAD.format(arguments=shlex.join(sys.argv[1:])), f"Measured on {machine}.\n"]
     *tables, last = blocks
     parts += [f"## {title}\n\n{text}\n" for title, text in tables]
+    parts += [f"{section}\n" for section in kept]
     parts.append(f"## The scenes, with the contour of {gallery.method}\n")
     parts += [f"![{path.stem}](pictures/{path.name})\n" for path in paths]
     parts.append("In the close-ups the truth is red and the found contour green.\n")

@@ -12,6 +12,7 @@ from contour.outline_fit import FittedRing, fit_ring
 from contour.pieces import pieces_beside
 from contour.ring_depth import depth_inside
 from contour.tracing import OnStage, Rectifier, Trace, TraceSettings
+from contour.uncertainty import uncertainty
 from contour.wall_cells import probe
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import wall_light
@@ -61,8 +62,9 @@ def wall_tips(
     # Rings are fitted with the material on their left in pixels; seen in the work frame, whose y runs up, that is
     # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
+    sure_px = uncertainty(list(zip(seen.rings, rings, strict=True)), pitch_px=seen.pitch_px, blur_px=seen.blur_px)
     on_stage("trace")
-    return _told(seen, contour)
+    return _told(seen, contour, uncertainty_px=sure_px)
 
 
 def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
@@ -74,12 +76,13 @@ def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage)
     return _told(seen, contour)
 
 
-def _told(seen: BlockEvidence, contour: Contour) -> Trace:
+def _told(seen: BlockEvidence, contour: Contour, *, uncertainty_px: float | None = None) -> Trace:
     return Trace(
         "wall-tips",
         "dark" if seen.polarity == "dark" else "bright",
         seen.pitch_px,
         contour,
+        uncertainty_px=uncertainty_px,
         others=seen.others,
         wall_px=seen.wall_px,
         reaches_frame=seen.reaches_frame,

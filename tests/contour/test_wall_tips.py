@@ -229,5 +229,12 @@ def test_a_threshold_of_ones_own_is_refused(binarize: Literal["otsu"] | int) -> 
         wall_tips(block().picture, TraceSettings(method="wall-tips", binarize=binarize))
 
 
-def test_an_uncertainty_that_nobody_computed_is_none() -> None:
-    assert traced().uncertainty_px is None
+def test_the_outline_comes_with_a_bound_that_it_keeps() -> None:
+    found = traced()
+    assert found.uncertainty_px is not None
+    assert apart(found, block().truth_px.rings) < 3 * found.uncertainty_px < 3.0
+
+
+def test_of_closed_cells_nobody_computes_an_uncertainty() -> None:
+    picture, _ = closed_lattice()
+    assert wall_tips(picture, TraceSettings(method="wall-tips", edge="cells")).uncertainty_px is None

@@ -50,7 +50,9 @@ def test_json_has_the_contracts_keys_and_the_same_vertices_in_pixels_and_millime
     net = sum(shoelace(ring) for ring in [record["millimetres"]["exterior"], *record["millimetres"]["holes"]])
     assert record["area_mm2"] == pytest.approx(net, rel=1e-9)
     assert set(record["timings_ms"]) >= {"read", "mask", "trace", "convert", "simplify", "total"}
-    assert record["uncertainty_px"] is None
+    assert 0.15 <= record["uncertainty_px"] < 2.0
+    # The shipped calibration states nothing of itself: the picture's part alone, at about 0.4 mm a pixel.
+    assert record["uncertainty_mm"] == pytest.approx(0.385 * record["uncertainty_px"], rel=0.1)
 
 
 def test_without_a_calibration_everything_in_millimetres_is_null_and_that_is_no_refusal() -> None:

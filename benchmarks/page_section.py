@@ -1,0 +1,28 @@
+"""Sections of docs/accuracy.md that other commands than the bench write: kept when the page is written anew."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "accuracy.md"
+
+
+def put_section(name: str, text: str, page: Path = PAGE) -> None:
+    """Write the section `name` into the page, in place of the one of this name, else at the end."""
+    old = page.read_text(encoding="utf-8") if page.exists() else ""
+    block = f"<!-- {name}: begin -->\n{text}\n<!-- {name}: end -->"
+    pattern = _pattern(re.escape(name))
+    found = pattern.search(old)
+    new = f"{old.rstrip()}\n\n{block}\n" if found is None else old[: found.start()] + block + old[found.end() :]
+    page.write_text(new, encoding="utf-8")
+
+
+def kept_sections(page: Path = PAGE) -> list[str]:
+    """All such sections of the page as they stand, marks included."""
+    old = page.read_text(encoding="utf-8") if page.exists() else ""
+    return [found.group(0) for found in _pattern(r"[\w-]+").finditer(old)]
+
+
+def _pattern(name: str) -> re.Pattern[str]:
+    return re.compile(rf"<!-- (?P<name>{name}): begin -->\n.*?<!-- (?P=name): end -->", re.DOTALL)

@@ -24,7 +24,7 @@ from service.state import State
 log = logging.getLogger("combtrace.daemon")
 
 JOURNAL_RETRY_S = 1.0
-WATCH_PERIOD_S = 0.1
+WATCH_PERIOD_S = 0.25
 TELL_AFTER_S = 1.0
 STOP_BOUND_S = 8.0
 

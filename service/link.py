@@ -10,7 +10,8 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from operator import attrgetter
 from typing import Any
 
 from drivers.controller import Controller, ControllerError, ControllerUnavailable
@@ -20,12 +21,17 @@ from service.reasons import Reason
 
 log = logging.getLogger("combtrace.link")
 
-RETRY_PAUSES_S = (0.1, 0.2, 0.5, 1.0)  # the last one again and again: back within 2 s of the controller's return
+# The last one again and again: with 1 s for an attempt that meets nobody, back within 2 s of the controller's return.
+RETRY_PAUSES_S = (0.1, 0.2, 0.5)
 HEARTBEAT_PERIOD_S = 0.4  # the protocol wants a change at least once a second
+REMINDER_S = 60.0  # how often a loss that lasts is told again
 CLOCK_TOLERANCE_MS = 1000  # protocol: a clock reading counts only if it fits the one before within 1 s
 READS_FOR_TWO_ALIKE = 20
 CLOCK_MODULUS = 1 << 32
 LARGEST_JOB = (1 << 32) - 1
+STEADY_FIELDS = attrgetter(
+    *(field.name for field in fields(LinkBlock) if field.name not in ("controller_heartbeat", "clock", "test_echo"))
+)
 
 
 class LinkUnsteady(ControllerError):
@@ -58,9 +64,9 @@ class Stamp:
     clock_ms: int
 
 
-def steady(block: LinkBlock) -> LinkBlock:
+def steady(block: LinkBlock) -> tuple[int, ...]:
     """The part of a block that two reads in a row must show alike: all but heartbeat, clock and test echo."""
-    return replace(block, controller_heartbeat=0, clock=0, test_echo=0)
+    return STEADY_FIELDS(block)
 
 
 class Link:
@@ -94,6 +100,9 @@ class Link:
         self._trouble: str | None = "not connected yet"
         self._served = False
         self._connected_at = 0.0
+        self._heard_at = 0.0
+        self._lost_at: float | None = None
+        self._told_at = 0.0
         self._clock_ran_in = 0  # the session in which the clock was seen at another value than 0
         self._zero: tuple[int, float] = (0, 0.0)  # session, and when its clock was first seen at 0
         self._well_or_failed = False
@@ -147,8 +156,11 @@ class Link:
         return Reason.OTHER_SERVICE if other else Reason.CONTROLLER_LOST
 
     def _beat_fault(self) -> str | None:
-        silent_s = self._now() - (self._connected_at if self._beat_at is None else self._beat_at)
+        now = self._now()
+        silent_s = now - (self._connected_at if self._beat_at is None else self._beat_at)
         if silent_s > self.settings.heartbeat_timeout_s:
+            if now - self._heard_at > self.settings.heartbeat_timeout_s:
+                return f"the controller has not answered for {self.settings.heartbeat_timeout_s:g} s. Check its cable"
             return (
                 f"the controller's heartbeat has not changed for {self.settings.heartbeat_timeout_s:g} s: "
                 "its program does not run"
@@ -213,9 +225,10 @@ class Link:
             self._heard(block)
             previous, self._previous = self._previous, block
             if previous is not None and steady(previous) == steady(block):
-                self.view = block
+                before, self.view = self.view, block
                 self._unsteady = None
-                self.on_look()
+                if before is None or steady(before) != steady(block):
+                    self.on_look()
                 return block
         self.view = None
         text = (
@@ -227,7 +240,7 @@ class Link:
         raise LinkUnsteady(text)
 
     def _heard(self, block: LinkBlock) -> None:
-        now = self._now()
+        now = self._heard_at = self._now()
         if self._beat is not None and block.controller_heartbeat != self._beat:
             self._beat_at = now
         self._beat = block.controller_heartbeat
@@ -293,7 +306,6 @@ class Link:
         if self.ownership.is_foreign(found):
             await self.on_found(found)
         await self._write_service()
-        self.on_look()
 
     async def _write_service(self) -> None:
         self._block = replace(self._block, service_heartbeat=(self._block.service_heartbeat + 1) & 0xFFFF)
@@ -337,23 +349,30 @@ class Link:
             await self.controller.close()
 
     def _lost(self, error: ControllerError) -> None:
-        """Note why; one line of log from one success to the next, however many attempts that takes."""
-        first = self._served or not self._well_or_failed
+        """Note why; one line of log from one success to the next, and one a minute, however often it is tried."""
+        now = self._now()
+        if self._lost_at is None:
+            self._lost_at = self._told_at = now
+            log.warning("link: %s: the controller cannot be reached. It is tried again by itself", error)
+        elif now - self._told_at >= REMINDER_S:
+            self._told_at = now
+            log.warning("link: still not reached after %.0f s: %s", now - self._lost_at, error)
+        else:
+            log.debug("link: %s", error)
         self._up.clear()
         self._forget()
         self._served = False
         self._trouble = str(error)
         self._well_or_failed = True
-        log.log(logging.WARNING if first else logging.DEBUG, "link: %s", error)
         self.on_look()
 
     def _serves(self) -> None:
         """The controller answered a whole round: what was wrong before is over."""
         if self._served:
             return
-        if self._well_or_failed:
-            log.info("link: controller is back")
-        self._served, self._trouble = True, None
+        if self._lost_at is not None:
+            log.info("link: the controller answers again, after %.1f s", self._now() - self._lost_at)
+        self._served, self._trouble, self._lost_at = True, None, None
         self.on_look()
 
     async def _serve(self) -> None:
@@ -368,10 +387,10 @@ class Link:
             await self._pause()
 
     async def _pause(self) -> None:
+        """Wait for the poll period, or until something is published."""
+        timer = asyncio.get_running_loop().call_later(self.settings.poll_period_s, self._wake.set)
         try:
-            # not wait_for: before Python 3.12 it loses a cancellation that comes together with the event
-            async with asyncio.timeout(self.settings.poll_period_s):
-                await self._wake.wait()
-        except TimeoutError:
-            return
+            await self._wake.wait()
+        finally:
+            timer.cancel()
         self._wake.clear()

@@ -506,3 +506,32 @@ async def test_a_withdrawal_that_drags_on_is_an_error_with_its_reason(tmp_path: 
         built.controller.answers = [Answer.WITHDRAWN]
         await asyncio.wait_for(task, 10)
         assert built.machine.state is State.READY
+
+
+async def test_an_observed_job_is_made_and_not_sent(tmp_path: Path) -> None:
+    async with rig(tmp_path, replace(SETTINGS, observe=True)) as built:
+        job = await built.job(TriggerStamp("controller", session=9, counter=5))
+        assert (job.outcome, job.reason) == (Outcome.WRITTEN, None)
+        assert job.detail == "observed only: 1 page(s) made, nothing sent"
+        assert job.report["vertices"] == 4
+        assert {name for name, _ in built.controller.requests} <= {"write_service"}
+        assert built.journal.unsettled() == ()
+
+
+async def test_a_job_that_was_found_without_its_pages_is_withdrawn_with_154(tmp_path: Path) -> None:
+    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
+        built.journal.adopt(70, (9, 6), 9)
+        (job,) = built.journal.unsettled()
+        settled = await asyncio.wait_for(built.cycle.resume(job), 15)
+        assert (settled.outcome, settled.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
+        assert built.controller.link.last_job == 70
+
+
+async def test_a_job_that_was_found_and_had_been_accepted_is_accepted(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        built.controller.link = replace(built.controller.link, last_job=70, last_result=1)
+        built.journal.adopt(70, (9, 6), 9)
+        (job,) = built.journal.unsettled()
+        settled = await asyncio.wait_for(built.cycle.resume(job), 15)
+        assert settled.outcome is Outcome.ACCEPTED
+        assert built.controller.count("write_page") == 0

@@ -52,11 +52,11 @@ class DeafController:
 class Bench:
     """An executor with a real journal and a link whose view the test sets."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, observe: bool = False) -> None:
         self.journal = Journal(folder / "journal.sqlite")
         self.health = Health(StateMachine())
         self.runner = HeldRunner(self.journal)
-        self.link = Link(DeafController(), LinkSettings(), now=lambda: 0.0)  # type: ignore[arg-type]
+        self.link = Link(DeafController(), LinkSettings(observe=observe), now=lambda: 0.0)  # type: ignore[arg-type]
         self.settled: list[Job] = []
         self.executor = Executor(
             self.journal, self.runner, self.health, self.link, controller_triggers=True, on_settled=self._note
@@ -76,8 +76,8 @@ class Bench:
 
 
 @asynccontextmanager
-async def running(folder: Path) -> AsyncIterator[Bench]:
-    bench = Bench(folder)
+async def running(folder: Path, *, observe: bool = False) -> AsyncIterator[Bench]:
+    bench = Bench(folder, observe=observe)
     task = asyncio.ensure_future(bench.executor.run())
     bench.health.start()
     bench.controller_says()
@@ -328,3 +328,126 @@ async def test_no_trigger_is_taken_before_the_journal_has_told_what_is_in_flight
         with suppress(asyncio.CancelledError):
             await task
         bench.journal.close()
+
+
+# --- after a service of another journal -------------------------------------------------------------------------
+
+
+def left_behind(**fields: int) -> ServiceBlock:
+    """The service block as a service that ended had left it in session 9."""
+    values = {"owner": 4711, "job_id": 70, "settled_job": 70, "trigger_ack": 6, "session_ack": 9, **fields}
+    return ServiceBlock(**values)
+
+
+async def test_a_trigger_that_a_lost_journal_held_is_not_taken_again(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        await bench.link.on_found(left_behind())
+        bench.controller_says(trigger_counter=6)
+        await asyncio.sleep(0.05)
+        assert bench.settled == []
+        published = bench.link.published
+        assert (published.trigger_ack, published.session_ack) == (6, 9)
+        assert (published.job_id, published.settled_job) == (70, 70)
+        bench.controller_says(trigger_counter=7)
+        await until(lambda: bench.settled)
+        assert bench.settled[0].job_id == 71, "numbers go on above what was found"
+
+
+async def test_a_job_that_a_lost_journal_held_in_flight_is_settled_before_any_trigger(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        await bench.link.on_found(left_behind(settled_job=69))
+        assert bench.health.state is State.ERROR
+        bench.controller_says(trigger_counter=7)
+        await until(lambda: bench.runner.resumed == [70])
+        with pytest.raises(TriggerRefused):
+            await bench.executor.submit(TriggerStamp("serial"))
+        (job,) = bench.journal.unsettled()
+        assert (job.sent, job.session, job.withdraw_reason) == (True, 9, Reason.SERVICE_RESTARTED)
+        bench.runner.go.set()
+        await until(lambda: len(bench.settled) == 2)
+        assert [job.job_id for job in bench.settled] == [70, 71]
+
+
+async def test_what_was_found_is_known_after_the_next_restart_too(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        await bench.link.on_found(left_behind())
+    async with running(tmp_path) as bench:
+        assert bench.journal.last_controller_trigger() == (9, 6)
+        bench.controller_says(trigger_counter=6)
+        await asyncio.sleep(0.05)
+        assert bench.settled == []
+        ticket = await bench.executor.submit(TriggerStamp("serial"))
+        assert ticket.job.job_id == 71
+        await ticket.settled
+
+
+async def test_registers_that_hold_no_service_block_are_not_believed(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        await bench.link.on_found(left_behind(test_value=99, job_id=4_000_000_000))
+        ticket = await bench.executor.submit(TriggerStamp("serial"))
+        assert ticket.job.job_id == 1
+        await ticket.settled
+
+
+async def test_a_service_whose_numbers_were_lower_leaves_ours_as_they_are(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(last_job=200)
+        await (await bench.executor.submit(TriggerStamp("serial"))).settled
+        await bench.link.on_found(left_behind(settled_job=69))
+        assert bench.link.published.job_id == 201
+        assert bench.journal.unsettled() == ()
+
+
+# --- observing --------------------------------------------------------------------------------------------------
+
+
+async def test_an_observer_takes_triggers_that_come_while_it_looks_and_not_the_one_before(tmp_path: Path) -> None:
+    async with running(tmp_path, observe=True) as bench:
+        bench.controller_says(trigger_counter=3)
+        await asyncio.sleep(0.05)
+        assert bench.settled == [], "the old process has done it"
+        bench.controller_says(trigger_counter=4)
+        await until(lambda: bench.settled)
+
+
+async def test_an_observer_needs_no_ready_controller(tmp_path: Path) -> None:
+    """The old process keeps the machine busy; a contour can be made all the same."""
+    async with running(tmp_path, observe=True) as bench:
+        bench.controller_says(controller_state=2)
+        assert (await (await bench.executor.submit(TriggerStamp("serial"))).settled).outcome is Outcome.ACCEPTED
+
+
+# --- counters that do not behave --------------------------------------------------------------------------------
+
+
+async def test_a_counter_that_is_stuck_gives_one_job_a_session(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        for _ in range(5):
+            bench.controller_says(trigger_counter=77)
+            await asyncio.sleep(0.01)
+        await until(lambda: bench.settled)
+        assert len(bench.settled) == 1
+        for _ in range(5):
+            bench.controller_says(trigger_counter=77, session=10)
+            await asyncio.sleep(0.01)
+        await until(lambda: len(bench.settled) == 2)
+
+
+async def test_a_counter_that_falls_back_to_0_asks_for_nothing(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=5)
+        await until(lambda: bench.settled)
+        bench.controller_says(trigger_counter=0)
+        await asyncio.sleep(0.05)
+        assert len(bench.settled) == 1
+
+
+async def test_after_65535_comes_1(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=65535)
+        await until(lambda: len(bench.settled) == 1)
+        missed = bench.link.published.missed_triggers
+        bench.controller_says(trigger_counter=1)
+        await until(lambda: len(bench.settled) == 2)
+        assert bench.link.published.missed_triggers == missed

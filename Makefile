@@ -34,6 +34,11 @@ accuracy: install
 soak: install
 	$(BIN)/python -m tests.soak $(SOAK)
 
+# The protocol's suite on a real controller. Whole contours, which may make it move, only with MOVE=yes.
+hil: install
+	@test -n "$(CONTROLLER)" || { echo "which controller? make hil CONTROLLER=tcp://HOST:PORT [MOVE=yes]"; exit 2; }
+	$(BIN)/python -m pytest tests/hil -p no:cacheprovider -v --hil-controller='$(CONTROLLER)' $(if $(filter yes,$(MOVE)),--hil-move)
+
 check: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

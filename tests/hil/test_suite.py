@@ -1,0 +1,112 @@
+"""The suite itself: it finds a wrong controller wrong, moves nothing unless told, and says what it cannot work with."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from drivers.controller.simulated import SimulatedController
+from drivers.controller.simulated_contour import PageCopy
+from service.hil.bench import HilError, open_bench
+
+ROOT = Path(__file__).parents[2]
+
+
+@contextmanager
+def controller() -> Iterator[SimulatedController]:
+    """A simulated controller in a thread of its own."""
+    made = SimulatedController(scan_s=0.005)
+    listening, loop = threading.Event(), asyncio.new_event_loop()
+
+    async def serve() -> None:
+        async with made:
+            listening.set()
+            await asyncio.Event().wait()
+
+    def run() -> None:
+        task = loop.create_task(serve())
+        made.end = task.cancel  # type: ignore[attr-defined]
+        with suppress(asyncio.CancelledError):
+            loop.run_until_complete(task)
+        loop.close()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    assert listening.wait(10)
+    try:
+        yield made
+    finally:
+        loop.call_soon_threadsafe(made.end)  # type: ignore[attr-defined]
+        thread.join()
+
+
+def suite(port: int, *options: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "pytest", "tests/hil/test_controller.py", "-p", "no:cacheprovider"]
+    return subprocess.run(
+        [*command, f"--hil-controller=tcp://127.0.0.1:{port}", *options],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=ROOT,
+        timeout=120,
+        env={**os.environ, "CI": ""},
+    )
+
+
+def test_a_right_controller_passes_and_takes_no_contour_unless_told() -> None:
+    with controller() as right:
+        done = suite(right.port)
+        assert done.returncode == 0, done.stdout
+        assert "3 skipped" in done.stdout
+        assert right.verdict.accepted == 0
+        moved = suite(right.port, "--hil-move", "-k", "whole or once or two_pages")
+        assert moved.returncode == 0, moved.stdout
+        assert right.verdict.accepted == 2
+
+
+def test_a_controller_that_does_not_look_at_the_crc_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PageCopy, "crc_is_right", lambda _copy: True)
+    with controller() as careless:
+        done = suite(careless.port, "-k", "torn or withdrawal")
+        assert done.returncode == 1
+        assert "test_a_torn_page_is_answered_2[header]" in done.stdout
+        assert "test_a_withdrawal_is_answered_11" not in done.stdout.partition("short test summary")[2]
+        assert careless.verdict.accepted == 0
+
+
+def test_a_second_service_that_lives_is_left_alone() -> None:
+    with controller() as shared:
+        url = f"tcp://127.0.0.1:{shared.port}"
+        with open_bench(url, None) as first, pytest.raises(HilError, match="another service"), open_bench(url, None):
+            pytest.fail("two benches on one controller")
+        assert shared.verdict.clean or set(shared.verdict.counts) <= {"heartbeat-stalled"}
+        assert not first.simulated
+
+
+@pytest.mark.parametrize(
+    ("url", "told"),
+    [
+        ("127.0.0.1:502", "expected tcp://HOST:PORT"),
+        ("tcp://127.0.0.1:99999", "out of range"),
+        ("tcp://127.0.0.1:502?word_order=middle", "word_order"),
+        ("tcp://127.0.0.1:502?speed=9", "speed: unknown key"),
+        ("rtu://", "port"),
+    ],
+)
+def test_a_controller_that_cannot_be_named_so_is_told(url: str, told: str) -> None:
+    with pytest.raises(HilError, match=told):
+        open_bench(url, None)
+
+
+def test_a_controller_that_is_not_there_ends_the_suite_with_status_2() -> None:
+    done = suite(1)
+    assert done.returncode == 2
+    assert "hardware in loop: 127.0.0.1:1: no connection" in done.stdout + done.stderr

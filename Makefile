@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera bench accuracy soak hil check format clean
+.PHONY: install demo test test-camera bench-camera bench accuracy soak hil check format clean
 
 install: $(STAMP)
 
@@ -23,6 +23,9 @@ test: install
 test-camera: install
 	$(BIN)/python tests/camera_guest/guest.py --timeout 900 -- env COMBTRACE_CAMERA_GUEST=1 \
 		$(BIN)/python -m pytest tests/camera_guest tests/contracts/test_camera_contract.py -p no:cacheprovider
+
+bench-camera: install
+	$(BIN)/python tests/camera_guest/guest.py --timeout 3000 -- $(BIN)/python -m benchmarks.cameras
 
 bench: install
 	$(BIN)/python -m benchmarks.bench

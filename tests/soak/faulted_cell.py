@@ -175,7 +175,8 @@ class FaultedCell:
             "scan_s": 0.002,
             "memory_path": self.folder / "memory.json",
             "has_clock": terms.has_clock,
-            "clock_start_ms": 2**32 - 3000,  # it wraps while the campaign runs
+            "clock_start_ms": 2**32 - 3000,  # it wraps while the campaign runs, and so does the trigger counter
+            "first_trigger": 65535 - 9,
             "judge": self.judge,
             "faults": self.faults,
             "on_accepted": self.note_accepted,
@@ -231,7 +232,7 @@ class FaultedCell:
         """A daemon as wired for the shop floor, but for its camera and its measurer."""
         parts = wiring.build(self.config(), observe=self.note_seen)
         cycle: Any = parts.executor._runner
-        cycle._measurer = RandomContours(self.chance, 4 if self.terms.payload_capacity < 64 else 40)
+        cycle._measurer = RandomContours(self.chance, 12 if self.terms.payload_capacity < 64 else 40)
         cycle._camera = parts.camera = SimulatedCamera(self.picture)
         cycle._abort = lambda _job: None  # it is killed, not stopped: nobody tidies up
         self.parts = parts

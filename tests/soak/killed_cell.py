@@ -12,6 +12,7 @@ import random
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -23,10 +24,11 @@ from drivers.controller.layout import MailboxLayout
 from drivers.controller.simulated import AcceptedContour, FaultPlan, SimulatedController, TriggerNotPossible
 from drivers.controller.simulated_faults import Fault, targets_of
 from drivers.controller.simulated_frames import Request
+from tests.soak.faulted_cell import Transport, crossed_line
 from tests.soak.promises import Evidence, Findings, Rings, Taken, judge, logged_contours, micrometres
 from tests.system.processes import Process, combtrace, free_port, jobs, lines
 
-STEPS = ("service", "clear", "page", "readback", "commit", "link")
+STEPS = ("service", "owner", "clear", "page", "readback", "commit", "link")
 MOMENTS = ("before", "after", "replied")
 WAIT_S = 60.0
 
@@ -42,10 +44,11 @@ class Killing:
     word_order: Literal["big", "little"] = "big"
     payload_capacity: int = 1984
     forgetful: bool = False
+    transport: Transport = "tcp"
 
     def __str__(self) -> str:
         words = [f"seed {self.seed}", f"{self.kills} kills of the {self.victim}", f"risk {self.risk:g}"]
-        words += [f"word order {self.word_order}", f"{self.payload_capacity} registers"]
+        words += [self.transport, f"word order {self.word_order}", f"{self.payload_capacity} registers"]
         return ", ".join(words + ["forgetful"] * self.forgetful)
 
 
@@ -121,13 +124,14 @@ class KilledCell:
             "origin_px: [0, 0]\nrotation_deg: 0\n"
         )
 
-    def write_config(self, port: int) -> None:
+    def write_config(self, port: int | str) -> None:
         killing = self.killing
         (self.folder / "config.yaml").write_text(
             "camera: {kind: files, path: pictures, loop: true}\n"
             "calibration: {file: calibration.yaml}\n"
-            f"controller: {{kind: modbus-tcp, port: {port}, timeout_s: 0.3, poll_period_s: 0.01, ack_timeout_s: 1,"
-            f" word_order: {killing.word_order}, payload_capacity: {killing.payload_capacity}}}\n"
+            f"controller: {{kind: modbus-{killing.transport}, port: {port}, timeout_s: 0.3,"
+            f" poll_period_s: 0.01, ack_timeout_s: 1, word_order: {killing.word_order},"
+            f" payload_capacity: {killing.payload_capacity}}}\n"
             "triggers: [{kind: controller}]\n"
             "recipes: [{number: 1, name: comb, method: direct-scan, tolerance_mm: 0.5}]\n"
             "service: {state_dir: state}\njournal: {path: journal.sqlite}\n"
@@ -163,10 +167,18 @@ class KilledCell:
             killing.seed,
         )
         layout = MailboxLayout(payload_capacity=killing.payload_capacity, word_order=killing.word_order)
-        async with Sniper(scan_s=0.003, layout=layout, faults=plan, on_accepted=self._note) as controller:
+        options: dict[str, Any] = {"scan_s": 0.003, "layout": layout, "faults": plan, "on_accepted": self._note}
+        async with AsyncExitStack() as opened:
+            near, far = await opened.enter_async_context(crossed_line())
+            if killing.transport == "rtu":
+                controller = Sniper.on_serial(far, **options)
+            else:
+                controller = Sniper(framing="tcp" if killing.transport == "tcp" else "rtu", **options)
+            assert isinstance(controller, Sniper)
+            await opened.enter_async_context(controller)
             self.controller = controller
             controller.verdict.on_event = self.events.append
-            self.write_config(controller.port)
+            self.write_config(near if killing.transport == "rtu" else controller.port)
             self.service = self.start_service()
             asking = asyncio.ensure_future(self._ask())
             try:

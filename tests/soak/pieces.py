@@ -129,6 +129,7 @@ def killing_terms(campaign: str, number: int, kills: int) -> Killing:
         word_order="little" if number % 2 == 0 else "big",
         payload_capacity=(1984, 64)[number // 2 % 2],
         forgetful=campaign == "controller-kills" and number % 2 == 1,
+        transport={0: "rtu", 3: "rtu-over-tcp"}.get(number % 5, "tcp") if campaign == "service-kills" else "tcp",
     )
 
 

@@ -76,11 +76,11 @@ class Bench:
 
 
 @asynccontextmanager
-async def running(folder: Path, *, observe: bool = False) -> AsyncIterator[Bench]:
+async def running(folder: Path, *, observe: bool = False, counter: int = 0) -> AsyncIterator[Bench]:
     bench = Bench(folder, observe=observe)
     task = asyncio.ensure_future(bench.executor.run())
     bench.health.start()
-    bench.controller_says()
+    bench.controller_says(trigger_counter=counter)
     await asyncio.sleep(0)
     try:
         yield bench
@@ -403,8 +403,7 @@ async def test_a_service_whose_numbers_were_lower_leaves_ours_as_they_are(tmp_pa
 
 
 async def test_an_observer_takes_triggers_that_come_while_it_looks_and_not_the_one_before(tmp_path: Path) -> None:
-    async with running(tmp_path, observe=True) as bench:
-        bench.controller_says(trigger_counter=3)
+    async with running(tmp_path, observe=True, counter=3) as bench:
         await asyncio.sleep(0.05)
         assert bench.settled == [], "the old process has done it"
         bench.controller_says(trigger_counter=4)

@@ -11,7 +11,8 @@ from service.cli.errors import EXIT_UNUSABLE, UserError
 
 COMMANDS = (
     *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
-    *("board", "calibrate", "probe"),
+    *("board", "calibrate", "align", "verify", "repeat"),
+    *("probe",),
     *("schema", "reasons", "register-map"),
 )
 

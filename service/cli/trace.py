@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
+from service.cli.measuring import find_recipe, guard_of, load_config_or_default, thickness_of
 
 if TYPE_CHECKING:
     from contour.geometry import Contour
-    from service.calibration_guard import CalibrationGuard
     from service.config import Config, Recipe
     from service.measure import Measurement, Measurer
 
@@ -85,11 +85,10 @@ class _Setup:
 
         from service.measure import Measurer
 
-        config = _config(args.config)
+        config = load_config_or_default(args.config)
         recipe = _recipe(config, args)
-        guard = _guard(config, args)
-        if args.thickness_mm is not None and not 0 <= args.thickness_mm <= 10_000:
-            raise UserError(f"--thickness-mm {args.thickness_mm:g}: expected 0 to 10000")
+        guard = guard_of(config, args)
+        thickness_mm = thickness_of(args, recipe)
         work_area = np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
         overlay = args.overlay
         for image in args.images:
@@ -101,7 +100,7 @@ class _Setup:
         return cls(
             Measurer(guard.record.calibration if guard else None, guard=guard, work_area_mm=work_area),
             recipe,
-            recipe.thickness_mm if args.thickness_mm is None else args.thickness_mm,
+            thickness_mm,
             overlay,
             folder,
         )
@@ -113,42 +112,11 @@ class _Setup:
         return self.overlay / f"{image.stem}-contour.png" if self.overlay_is_folder else self.overlay
 
 
-def _config(path: Path | None) -> Config:
-    from service.config_file import ConfigError, default_config, load_config
-
-    try:
-        return default_config() if path is None else load_config(path)
-    except ConfigError as error:
-        raise UserError(str(error)) from error
-
-
-def _guard(config: Config, args: argparse.Namespace) -> CalibrationGuard | None:
-    """The calibration that the command line or a given configuration names, with its limits; None where none is."""
-    from service.calibration_file import CalibrationFileError, load_record
-    from service.calibration_guard import CalibrationGuard, GuardLimits
-
-    settings = config.calibration if args.config is not None else None
-    path = args.calibration or (settings.file if settings is not None else None)
-    if path is None:
-        return None
-    limits = GuardLimits()
-    if settings is not None:
-        limits = GuardLimits(settings.max_age_days, settings.sentinel_tolerance_px, settings.sentinels_required)
-    try:
-        return CalibrationGuard(load_record(path), limits)
-    except CalibrationFileError as error:
-        raise UserError(str(error)) from error
-
-
 def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
     """The recipe, by name, number or default, with what the command line says otherwise."""
     from service.config import Recipe
 
-    wanted = str(config.default_recipe) if args.recipe is None else args.recipe
-    found = next((recipe for recipe in config.recipes if wanted in (recipe.name, str(recipe.number))), None)
-    if found is None:
-        known = ", ".join(f"{recipe.name} ({recipe.number})" for recipe in config.recipes)
-        raise UserError(f"--recipe {wanted}: there is no such recipe, there are: {known}")
+    found = find_recipe(config, args.recipe)
     changes: dict[str, Any] = {
         name: getattr(args, name)
         for name in ("method", "polarity", "binarize", "edge")

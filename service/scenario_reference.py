@@ -12,6 +12,7 @@ from typing import Any
 
 from drivers.controller.simulated_faults import FAULT_KINDS, TARGETS
 from drivers.controller.simulated_scenario import EVENT_KINDS
+from drivers.controller.simulated_verdict import KINDS
 from service import scenario_file
 from service.config import Model
 from service.config_reference import rows
@@ -38,7 +39,8 @@ def tables() -> str:
         for key, meanings in words.items():
             text += f"\n| `{key}` | meaning |\n|---|---|\n"
             text += "".join(f"| {word} | {meaning} |\n" for word, meaning in meanings.items())
-    return text + "\n"
+    text += "\n### Kinds of violation in the verdict\n\n| kind | rule that was broken |\n|---|---|\n"
+    return text + "".join(f"| {kind} | {rule} |\n" for kind, rule in KINDS.items()) + "\n"
 
 
 def with_tables(page: str) -> str:

@@ -210,6 +210,11 @@ class SimulatedController:
         self.verdict.tell("trigger", session=self._program.session, trigger=counter, recipe=recipe)
         return counter
 
+    def write_as_another(self, owner: int, heartbeat: int) -> None:
+        """Write `owner` and `service_heartbeat` as another service would; the verdict is not told."""
+        start = self._layout.service_address
+        self._registers[start + 11], self._registers[start + 2] = owner, heartbeat
+
     @property
     def can_request(self) -> bool:
         """True while the protocol lets the controller request a measurement."""

@@ -15,7 +15,16 @@ from drivers.controller.simulated_faults import Fault
 from drivers.controller.simulated_program import Judge, Reply
 
 EventKind = Literal[
-    "trigger", "busy", "not-ready", "machine-fault", "refuse", "slow-scan", "halt", "restart", "switch-off"
+    "trigger",
+    "busy",
+    "not-ready",
+    "machine-fault",
+    "refuse",
+    "slow-scan",
+    "halt",
+    "restart",
+    "switch-off",
+    "foreign-service",
 ]
 EVENT_KINDS: dict[EventKind, str] = {
     "trigger": "asks for `burst` measurements with `recipe` and `thickness_mm`, one after the other",
@@ -27,11 +36,13 @@ EVENT_KINDS: dict[EventKind, str] = {
     "halt": "the program stands still for `for_s`, as a PLC in STOP; then it starts anew",
     "restart": "the program starts anew, `keep_registers` or not, `keep_memory` or not",
     "switch-off": "nothing listens for `for_s`; then it starts anew with empty registers",
+    "foreign-service": "for `for_s` another service writes the service block too: its `owner`, its heartbeat moving",
 }
 assert set(EVENT_KINDS) == set(get_args(EventKind))
 STATES = {"busy": 2, "not-ready": 0, "machine-fault": 3}
 JITTER = 0.2  # of every_s, so that what is periodic does not keep step with the client
 LOOK_S = 0.002
+FOREIGN_OWNER, FOREIGN_BEAT_S = 4711, 0.3
 
 
 @dataclass(frozen=True)
@@ -144,6 +155,7 @@ class Play:
                 "halt": self._halt,
                 "restart": self._restart,
                 "switch-off": self._switch_off,
+                "foreign-service": self._foreign_service,
             }
             await acts[event.do](event)
 
@@ -178,6 +190,14 @@ class Play:
 
     async def _restart(self, event: Event) -> None:
         self._controller.restart(keep_registers=event.keep_registers, forget=not event.keep_memory)
+
+    async def _foreign_service(self, event: Event) -> None:
+        loop = asyncio.get_running_loop()
+        until, beat = loop.time() + event.for_s, 0
+        while loop.time() < until:
+            beat += 1
+            self._controller.write_as_another(FOREIGN_OWNER, beat)
+            await asyncio.sleep(FOREIGN_BEAT_S)
 
     async def _switch_off(self, event: Event) -> None:
         async with self._off:

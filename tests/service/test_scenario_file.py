@@ -27,7 +27,7 @@ def test_every_example_is_loaded_and_told_of(example: Path) -> None:
 def test_the_examples_show_every_event_and_the_faults_that_were_asked_for() -> None:
     scenarios = [load_scenario(example) for example in EXAMPLES]
     shown = {event.do for scenario in scenarios for event in scenario.events}
-    assert set(EVENT_KINDS) - shown <= {"machine-fault"}
+    assert set(EVENT_KINDS) - shown <= {"machine-fault", "foreign-service"}
     faults = [fault for scenario in scenarios for fault in scenario.faults]
     wanted = {"lost-request", "lost-reply", "late-reply", "repeated-reply", "garbled-reply", "half-open", "late-write"}
     assert wanted <= {fault.kind for fault in faults}

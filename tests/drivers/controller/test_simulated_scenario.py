@@ -129,6 +129,13 @@ async def test_a_controller_that_is_switched_off_is_gone_and_comes_back_where_it
             await again.read(0, 16)
 
 
+async def test_another_service_shows_by_its_owner_and_a_moving_heartbeat() -> None:
+    async with played(Event("foreign-service", at_s=(0.0,), for_s=0.4)) as controller:
+        await until(lambda: controller.registers(27, 1) == (4711,))
+        before = controller.registers(18, 1)
+        await until(lambda: controller.registers(18, 1) != before)
+
+
 async def test_what_comes_periodically_comes_again() -> None:
     told: list[dict[str, object]] = []
     async with played(Event("restart", every_s=0.01)) as controller:

@@ -55,7 +55,7 @@ class Plan:
         self.result: Measurement | Exception = measured()
         self.calls: list[tuple[int, float]] = []
 
-    def measure(self, picture: object, recipe: Recipe, thickness_mm: float) -> Measurement:
+    def measure(self, picture: object, recipe: Recipe, thickness_mm: float, camera: str = "") -> Measurement:
         self.calls.append((recipe.number, thickness_mm))
         if isinstance(self.result, Exception):
             raise self.result

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera bench-camera bench accuracy soak hil check format clean
+.PHONY: install demo test test-camera bench-camera bench accuracy refusals soak hil check format clean
 
 install: $(STAMP)
 
@@ -41,6 +41,10 @@ soak: install
 hil: install
 	@test -n "$(CONTROLLER)" || { echo "which controller? make hil CONTROLLER=tcp://HOST:PORT [MOVE=yes]"; exit 2; }
 	$(BIN)/python -m pytest tests/hil -p no:cacheprovider -v --hil-controller='$(CONTROLLER)' $(if $(filter yes,$(MOVE)),--hil-move)
+
+# Pictures without a block, which must be refused by name, and traceable ones, which must not.
+refusals: install
+	$(BIN)/python -m benchmarks.refusals --write
 
 check: install
 	$(BIN)/ruff check .

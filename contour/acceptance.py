@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.comb_likeness import unlike_comb
 from contour.error_budget import ErrorBudget
 from contour.geometry import Contour, Ring, area, contour_defect
 from contour.polygon import Polygon
@@ -19,8 +20,6 @@ from contour.tracing import Trace
 
 # Of two blocks whose areas differ by less than this the larger one is a matter of chance.
 _EQUAL_SHARE = 0.8
-_WIDEST_DARK_WALL = 0.4
-_FINE_PITCH_PX = 15.0
 
 
 class Refusal(IntEnum):
@@ -143,20 +142,10 @@ def _goes_on(traced: Trace | None) -> Finding | None:
 
 
 def _no_comb(traced: Trace | None) -> Finding | None:
-    """The dark squares of a board are as wide as the light ones; no wall is. Those of fine cells look wide, and foam's
-    bright ones are.
-    """
-    if traced is None or traced.wall_px is None or not traced.pitch_px or traced.pitch_px <= _FINE_PITCH_PX:
+    if traced is None or traced.comb is None:
         return None
-    share = traced.wall_px / traced.pitch_px
-    if traced.polarity == "bright" or share <= _WIDEST_DARK_WALL:
-        return None
-    return Finding(
-        Refusal.NO_BLOCK_FOUND,
-        f"No block found: what lies between light patches {traced.pitch_px:.0f} px apart is {100 * share:.0f} % as "
-        f"wide as that, cell walls are {100 * _WIDEST_DARK_WALL:g} % at most. Check that a block lies in view, and set "
-        "edge: cells for a perforated plate.",
-    )
+    why = unlike_comb(traced.comb)
+    return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
 
 
 def _touches_border(outlines: list[Ring], frame_size: tuple[int, int], border_px: float) -> Finding | None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contour import binarize, direct_scan, find_contours, sliding_matrix
 from contour.cells import FEWEST_CELLS, Cells
+from contour.comb_likeness import Comb
 from contour.errors import NoBlockFound, ParameterError, PictureError
 from contour.geometry import Contour, oriented_contour
 from contour.pieces import Piece, pieces_beside
@@ -52,9 +53,8 @@ class TraceSettings:
 class Trace:
     """A traced contour in pixels: exterior counter-clockwise as seen in the work frame, so negative by the shoelace.
 
-    `others` are pieces of comb beside it, `quality` says how well its walls are seen, `wall_px` how wide those of a cut
-    block look (None where no method looked); `reaches_frame` where its walls go on
-    to the last pixels of what was looked at.
+    `others` are pieces of comb beside it, `quality` says how well its walls are seen, `comb` what a cut block's cells
+    look like (None where no method looked). `reaches_frame`: its walls go on to the last pixels of what was looked at.
     """
 
     method: Method
@@ -64,7 +64,7 @@ class Trace:
     uncertainty_px: float | None = None
     others: tuple[Piece, ...] = ()
     quality: Quality | None = None
-    wall_px: float | None = None
+    comb: Comb | None = None
     reaches_frame: bool = False
 
 

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.comb_likeness import Comb
 from contour.errors import NoBlockFound
 from contour.wall_mask import wall_mask
 
@@ -52,6 +53,11 @@ class Cells:
         # The light gaps of a comb of dark cells look like cells too, but leave less room between them.
         thin = min(1.0, (_WIDEST_WALL - self.wall / self.pitch) / _WIDE_WALL)
         return self.regularity * self.filled * self.connected * thin * min(1.0, self.count / 12)
+
+    @property
+    def comb(self) -> Comb:
+        """What tells a comb from other things that have patches side by side."""
+        return Comb(self.pitch, self.wall, self.bright, self.count, self.score, self.regularity * self.filled)
 
 
 def probe(light: Gray, polarity: str) -> Cells:

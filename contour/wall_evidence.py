@@ -10,6 +10,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.comb_likeness import Comb
 from contour.geometry import Ring
 from contour.pieces import Piece
 
@@ -49,7 +50,7 @@ class BlockEvidence:
 
     leaves_picture: whether the block runs out of the picture, so that its rings follow the picture's border there.
     others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
-    pixels.
+    pixels. comb: what its cells look like.
     """
 
     rings: tuple[RingEvidence, ...]
@@ -62,3 +63,4 @@ class BlockEvidence:
     leaves_picture: bool = False
     others: tuple[Piece, ...] = ()
     reaches_frame: bool = False
+    comb: Comb | None = None

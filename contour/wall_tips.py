@@ -84,7 +84,7 @@ def _told(seen: BlockEvidence, contour: Contour, *, uncertainty_px: float | None
         contour,
         uncertainty_px=uncertainty_px,
         others=seen.others,
-        wall_px=seen.wall_px,
+        comb=seen.comb,
         reaches_frame=seen.reaches_frame,
     )
 

@@ -77,7 +77,7 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
     coarse = coarse_block(seen.mask, small, cells.pitch / scale, cells.wall / scale)
     others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)
     evidence = _evidence(light, seen, coarse, cells, scale)
-    return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse))
+    return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
 
 
 def _darker_than_table(seen: WallMask, light: Gray, cells: Cells) -> WallMask:

@@ -41,6 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--polarity", choices=("auto", "bright", "dark"), help="walls against the table")
     parser.add_argument("--binarize", type=_binarize, metavar="flat|otsu|0…255", help="how walls are told from gaps")
     parser.add_argument("--edge", choices=("cut", "cells"), help="cells: the border cells are closed")
+    parser.add_argument(
+        "--roi-px", type=_box, metavar="LEFT,TOP,RIGHT,BOTTOM", help="region of interest: nothing is seen outside of it"
+    )
     parser.add_argument("--config", type=Path, metavar="FILE", help="configuration with recipes")
     parser.add_argument("--recipe", metavar="NAME", help="recipe by name or number")
     parser.add_argument("--calibration", type=Path, metavar="FILE", help="pixels to millimetres")
@@ -128,6 +131,8 @@ def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
         if getattr(args, name) is not None
     }
     method_changed = changes.get("method", found.method) != found.method
+    if args.roi_px is not None:
+        changes.update(roi_px=args.roi_px, roi_mm=())
     if given or method_changed:
         kept = {} if method_changed else found.parameters
         changes["parameters"] = {**kept, **given}
@@ -243,6 +248,14 @@ def _write_records(path: Path, records: list[dict[str, Any]]) -> None:
         path.write_text("".join(json.dumps(record, ensure_ascii=False) + "\n" for record in records), encoding="utf-8")
     except OSError as error:
         raise UserError(f"--json {path}: cannot be written: {error.strerror}. Name another file") from error
+
+
+def _box(text: str) -> tuple[float, ...]:
+    try:
+        left, top, right, bottom = (float(word) for word in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected four numbers, LEFT,TOP,RIGHT,BOTTOM") from None
+    return left, top, right, bottom
 
 
 def _binarize(text: str) -> str | int:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from contour.acceptance import Finding, Limits, Refusal, judge, judge_without_block
+from contour.comb_likeness import Comb
 from contour.error_budget import ErrorBudget
 from contour.geometry import Contour
 from contour.pieces import Piece
@@ -194,14 +195,12 @@ def test_of_two_nearly_equal_blocks_none_is_the_largest() -> None:
     assert "80 %" in finding.text
 
 
-@pytest.mark.parametrize(
-    ("wall_px", "pitch_px", "polarity", "refused"),
-    [(9.0, 24.0, "dark", False), (11.0, 24.0, "dark", True), (11.0, 24.0, "bright", False), (4.0, 8.0, "dark", False)],
-)
-def test_dark_squares_of_a_board_are_no_walls(wall_px: float, pitch_px: float, polarity: str, refused: bool) -> None:
-    seen = traced(wall_px=wall_px, pitch_px=pitch_px, polarity=polarity)
-    findings = judge(GOOD, FRAME, LIMITS, traced=seen)
-    assert [finding.refusal for finding in findings] == ([Refusal.NO_BLOCK_FOUND] if refused else [])
+def test_what_is_no_comb_is_no_block() -> None:
+    seen = traced(comb=Comb(86.0, 35.6, False, 42, 1.0, 1.0))
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=seen)
+    assert finding.refusal == Refusal.NO_BLOCK_FOUND
+    assert "41 % as wide" in finding.text
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(comb=Comb(24.0, 3.0, True, 300, 0.6, 0.6))) == ()
 
 
 def test_walls_that_go_on_to_the_last_pixels_touch_the_border() -> None:

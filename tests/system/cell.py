@@ -19,6 +19,7 @@ class Cell:
         triggers: str = "[{kind: controller}]",
         trigger_every_s: float | None = 0.05,
         camera: str = "",
+        more: str = "",
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
         camera = camera or f"{{kind: files, path: {SAMPLES}, loop: true}}"
@@ -33,6 +34,7 @@ class Cell:
             f"triggers: {triggers}\n"
             "service: {state_dir: state}\n"
             "journal: {path: journal.sqlite}\n"
+            f"{more}"
         )
         self.service = self.start_service()
         self.controller = self.start_controller()

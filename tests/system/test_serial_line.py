@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import os
-import pty
 import select
-import time
-import tty
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,35 +11,7 @@ import pytest
 
 from tests.system.cell import Cell
 from tests.system.processes import combtrace, until
-
-
-class Terminal:
-    """The far end of a pseudo-terminal that the daemon opens as its serial port."""
-
-    def __init__(self) -> None:
-        self.master, slave = pty.openpty()
-        tty.setraw(self.master)
-        self.name = os.ttyname(slave)
-        self._slave = slave  # kept open: the line does not hang up between two opens of the daemon's
-        self._rest = b""
-
-    def type(self, data: bytes) -> None:
-        os.write(self.master, data)
-
-    def line(self, bound_s: float = 10) -> str:
-        """The next line that the daemon sent."""
-        give_up_at = time.monotonic() + bound_s
-        while b"\n" not in self._rest:
-            left = give_up_at - time.monotonic()
-            assert left > 0, f"no line; so far {self._rest!r}"
-            if select.select([self.master], [], [], left)[0]:
-                self._rest += os.read(self.master, 4096)
-        line, _, self._rest = self._rest.partition(b"\n")
-        return line.decode("ascii").strip()
-
-    def close(self) -> None:
-        os.close(self._slave)
-        os.close(self.master)
+from tests.system.terminal import Terminal
 
 
 @pytest.fixture

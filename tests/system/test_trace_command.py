@@ -263,3 +263,16 @@ def test_bad_usage_is_told_and_has_status_2(arguments: list[str], expected: str)
     assert done.returncode == 2
     assert expected in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_region_of_interest_hides_what_lies_outside() -> None:
+    (whole,) = traced(RECTANGLE)
+    xs, ys = zip(*whole["pixels"]["exterior"], strict=True)
+    around = f"{min(xs) - 20},{min(ys) - 20},{max(xs) + 20},{max(ys) + 20}"
+    (seen,) = traced(f"--roi-px={around}", RECTANGLE)
+    assert seen["area_px2"] == pytest.approx(whole["area_px2"], rel=1e-3)
+    (cut,) = traced("--roi-px", "0,0,800,1199", RECTANGLE, status=3)
+    assert cut["reason"] == "touches_border"
+    assert "region of interest" in cut["details"][0]
+    for wrong in ("1,2,3", "9,9,1,1"):
+        assert combtrace("trace", f"--roi-px={wrong}", RECTANGLE).returncode == 2

@@ -1,0 +1,61 @@
+"""What has patches side by side, and is no honeycomb."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from contour.acceptance import Limits, Refusal, judge
+from contour.comb_likeness import Comb, unlike_comb
+from contour.errors import NoBlockFound
+from contour.polygon import cutting_polygon
+from contour.tracing import TraceSettings, trace
+from tests.contour.scenes import block
+
+
+@pytest.mark.parametrize(
+    "comb",
+    [
+        Comb(24.0, 3.0, True, 300, 0.6, 0.6),
+        Comb(8.0, 3.4, True, 900, 0.2, 0.2),  # fine cells look wide-walled
+        Comb(37.0, 17.0, True, 60, 0.21, 0.25),  # foam
+        Comb(23.0, 7.6, True, 150, 0.3, 0.25),  # a perforated plate
+        Comb(149.0, 6.0, True, 6, 0.4, 0.8),  # few cells, each large
+    ],
+)
+def test_combs_foams_and_plates_may_be_blocks(comb: Comb) -> None:
+    assert unlike_comb(comb) is None
+
+
+@pytest.mark.parametrize(
+    "comb",
+    [
+        Comb(86.0, 35.6, False, 42, 1.0, 1.0),  # a chessboard
+        Comb(38.0, 16.3, True, 169, 0.73, 0.75),  # lines of text
+        Comb(41.0, 12.8, False, 10, 0.2, 0.37),  # a square code
+    ],
+)
+def test_boards_prints_and_codes_are_none(comb: Comb) -> None:
+    assert unlike_comb(comb) is not None
+
+
+@pytest.mark.parametrize("side", [25, 40])
+def test_a_chessboard_on_the_table_is_no_block(side: int) -> None:
+    picture = np.full((720, 960), 60, np.uint8)
+    squares = (np.indices((600 // side, 800 // side)).sum(axis=0) % 2 * 180 + 25).astype(np.uint8)
+    picture[60:660, 80:880] = np.kron(squares, np.ones((side, side), np.uint8))
+    try:
+        found = trace(cv2.GaussianBlur(picture, (0, 0), 0.8), TraceSettings())
+    except NoBlockFound:
+        return
+    findings = judge(
+        cutting_polygon(found.contour, None, height_mm=0.0, tolerance_mm=0.1), (960, 720), Limits(), traced=found
+    )
+    assert findings[0].refusal == Refusal.NO_BLOCK_FOUND
+
+
+def test_a_block_looks_like_one() -> None:
+    found = trace(block("rectangle", "shop").picture, TraceSettings())
+    assert found.comb is not None
+    assert unlike_comb(found.comb) is None

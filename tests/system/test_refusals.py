@@ -1,0 +1,122 @@
+"""Each reason that a picture is refused for, provoked through the whole daemon: in register, log and FAIL line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import pytest
+from pymodbus.client import ModbusTcpClient
+
+from tests.system.cell import SAMPLES, Cell
+from tests.system.processes import until
+from tests.system.terminal import Terminal
+
+SERVICE_BLOCK, REJECT_REASON, SETTLED_JOB = 16, 5, 12
+SAMPLE = cv2.imread(str(SAMPLES / "1-rectangle.jpg"), cv2.IMREAD_GRAYSCALE)
+
+
+def shifted(x: float, y: float) -> np.ndarray:
+    """The sample's picture with everything moved by so many pixels."""
+    move = np.array([[1.0, 0.0, x], [0.0, 1.0, y]])
+    return cv2.warpAffine(SAMPLE, move, (1600, 1200), borderMode=cv2.BORDER_REPLICATE)
+
+
+def two_blocks() -> np.ndarray:
+    """The sample's block twice, smaller, both within the work area."""
+    small = cv2.resize(SAMPLE, (640, 480), interpolation=cv2.INTER_AREA)
+    picture = np.full_like(SAMPLE, int(np.median(small[:, :20])))
+    picture[360:840, 160:1440] = np.concatenate([small, small], axis=1)
+    return picture
+
+
+def empty_table() -> np.ndarray:
+    rng = np.random.default_rng(3)
+    return np.clip(rng.normal(35, 2, (1200, 1600)), 0, 255).astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class Provoked:
+    """A picture, the recipe it is measured by, and the reason that must come of it."""
+
+    picture: np.ndarray
+    recipe: str
+    code: int
+    name: str
+    words: str
+
+
+CASES = (
+    Provoked(cv2.GaussianBlur(SAMPLE, (0, 0), 5.0), "", 102, "image_quality", "blurred by"),
+    Provoked(np.zeros_like(SAMPLE), "", 102, "image_quality", "brightest parts reach"),
+    Provoked(empty_table(), "", 110, "no_block_found", "no block found"),
+    Provoked(shifted(-400, 0), "", 111, "touches_border", "left edge"),
+    Provoked(SAMPLE, "roi_px: [500, 0, 1599, 1199]", 111, "touches_border", "region of interest"),
+    Provoked(SAMPLE, "min_area_mm2: 90000", 112, "area_out_of_limits", "expects 90000 to"),
+    Provoked(SAMPLE, "method: sliding-matrix, max_uncertainty_mm: 0.5", 114, "uncertainty_too_large", "0.5 mm"),
+    Provoked(shifted(90, 0), "", 115, "outside_work_area", "leaves the work area"),
+    Provoked(two_blocks(), "", 116, "several_blocks", "Beside the traced block"),
+    Provoked(SAMPLE, "max_vertices: 3", 130, "too_many_points", "the recipe allows 3"),
+    Provoked(SAMPLE, "method: find-contours, max_vertices: 100000", 131, "self_intersecting", "meets itself"),
+    Provoked(SAMPLE[:, :1500], "", 141, "calibration_mismatch", "1500 x 1200 px"),
+)
+WORK_AREA = "work_area_mm: [[100, 60], [500, 60], [500, 390], [100, 390]]"
+
+
+@pytest.fixture(scope="module")
+def terminal() -> Iterator[Terminal]:
+    opened = Terminal()
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory, terminal: Terminal) -> Iterator[Cell]:
+    folder = tmp_path_factory.mktemp("refusals")
+    pictures = folder / "pictures"
+    pictures.mkdir()
+    for number, case in enumerate(CASES, 1):
+        assert cv2.imwrite(str(pictures / f"{number:02d}.png"), case.picture)
+    recipes = "".join(
+        f"  - {{number: {number}, name: provokes {number}{', ' if case.recipe else ''}{case.recipe}}}\n"
+        for number, case in enumerate(CASES, 1)
+    )
+    started = Cell(
+        folder,
+        triggers=f"[{{kind: serial, port: {terminal.name}}}]",
+        trigger_every_s=None,
+        camera=f"{{kind: files, path: {pictures}, loop: true}}",
+        more=f"recipes:\n{recipes}{WORK_AREA}\n",
+    )
+    try:
+        started.ready()
+        yield started
+    finally:
+        started.stop()
+
+
+def registers(cell: Cell) -> tuple[int, int]:
+    """reject_reason and settled_job as the controller holds them."""
+    with ModbusTcpClient("127.0.0.1", port=cell.port) as client:
+        words = client.read_holding_registers(SERVICE_BLOCK, count=16, device_id=1).registers
+    return words[REJECT_REASON], words[SETTLED_JOB] << 16 | words[SETTLED_JOB + 1]
+
+
+@pytest.mark.parametrize("number", range(1, len(CASES) + 1), ids=lambda number: f"{number}-{CASES[number - 1].name}")
+def test_a_reason_is_seen_in_the_fail_line_the_register_and_the_log(
+    cell: Cell, terminal: Terminal, number: int
+) -> None:
+    """The pictures come in the order of the cases: run together, not picked."""
+    case = CASES[number - 1]
+    terminal.type(f"TRIG recipe={number}\n".encode())
+    job = int(terminal.line(30).removeprefix("ACK "))
+    assert job == number, "the cases before this one must run too: each takes one picture"
+    assert terminal.line(60) == f"FAIL {job} {case.code} {case.name}"
+    until(lambda: registers(cell) == (case.code, job), what=f"reject_reason {case.code} of job {job}")
+    said = f"job {job} refused: {case.code} {case.name}: "
+    line = next(line for line in cell.service.text.splitlines() if said in line)
+    assert case.words in line
+    settled = cell.settled()[-1]
+    assert (settled["job_id"], settled["outcome"], settled["reason"]) == (job, "refused", case.code)

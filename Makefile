@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera bench-camera bench accuracy refusals soak hil check format clean
+.PHONY: install demo test test-camera bench-camera bench bench-link accuracy refusals soak hil check format clean
 
 install: $(STAMP)
 
@@ -29,6 +29,9 @@ bench-camera: install
 
 bench: install
 	$(BIN)/python -m benchmarks.bench
+
+bench-link: install
+	$(BIN)/python -m benchmarks.link --write
 
 accuracy: install
 	$(BIN)/python -m benchmarks.bench --random 300 --first 920000 --write

@@ -36,6 +36,7 @@ NEXT_STEPS = {
     10: "Check the gateway and device_id",
     11: "Check the gateway, the line behind it, and device_id",
 }
+TIMER_STEP_S = 0.001  # epoll waits whole milliseconds, rounded up; t3.5 is 1.75 ms
 MAY_BE_DONE_LATER = (5, 11)  # these say that the request went on its way, not that it was refused
 
 
@@ -75,7 +76,7 @@ class Connection:
         self._deadline = 0.0
         self._silent_from = 0.0
         self._alarm: asyncio.TimerHandle | None = None
-        self._rest: asyncio.TimerHandle | None = None
+        self._rest: asyncio.Handle | None = None
         self._listening = False
         self._channel = ByteChannel(*descriptor, self._receive, self._lost)
 
@@ -139,9 +140,10 @@ class Connection:
         if self._under_way is not None or not self._turns or self.fault is not None:
             return
         now = self._loop.time()
-        if now < self._silent_from + self._pace.silence_s:
+        left = self._silent_from + self._pace.silence_s - now
+        if left > 0:
             if self._rest is None:
-                self._rest = self._loop.call_at(self._silent_from + self._pace.silence_s, self._rested)
+                self._rest = self._rest_for(left)
             return
         exchange = self._under_way = self._turns.popleft()
         request = exchange.request
@@ -152,6 +154,12 @@ class Connection:
         if self._pace.echo:
             self._echo = data
         self._channel.write(data)
+
+    def _rest_for(self, left_s: float) -> asyncio.Handle:
+        """Come back after `left_s`, or a little earlier: the loop's timers are late by up to `TIMER_STEP_S`."""
+        if left_s > TIMER_STEP_S:
+            return self._loop.call_later(left_s - TIMER_STEP_S, self._rested)
+        return self._loop.call_soon(self._rested)
 
     def _rested(self) -> None:
         self._rest = None

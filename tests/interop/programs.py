@@ -22,8 +22,8 @@ MODBUS_SERIAL = "modbus-serial@8"
 
 
 @functools.cache
-def compiled(name: str) -> Path:
-    """The program of `tests/interop/NAME.c`, linked with libmodbus; compiled once a run."""
+def compiled(name: str, folder: Path = HERE) -> Path:
+    """The program of `NAME.c` in `folder`, linked with libmodbus; compiled once a run."""
     need_program("gcc", LIBMODBUS_INSTALL)
     need_program("pkg-config", LIBMODBUS_INSTALL)
     flags = subprocess.run(
@@ -33,7 +33,7 @@ def compiled(name: str) -> Path:
         missing(f"libmodbus is not here. Install it: {LIBMODBUS_INSTALL}")
     program = _folder() / name
     command = ["gcc", "-std=gnu11", "-O2", "-Wall", "-Wextra", "-Werror", "-o", str(program)]
-    subprocess.run([*command, str(HERE / f"{name}.c"), *flags.stdout.split()], check=True)
+    subprocess.run([*command, str(folder / f"{name}.c"), *flags.stdout.split()], check=True)
     return program
 
 

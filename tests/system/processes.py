@@ -64,6 +64,10 @@ class Process:
         return self._process.poll() is None
 
     @property
+    def process_id(self) -> int:
+        return self._process.pid
+
+    @property
     def text(self) -> str:
         return self.log.read_text(errors="replace")
 

@@ -1,0 +1,275 @@
+"""How fast a contour goes out: `python -m benchmarks.link [--write]` measures and compares in one run.
+
+1,000 vertices, read-back off. Over loopback TCP to a libmodbus server, beside a C client and a bare pymodbus loop that
+do the same writes; on a line of 115,200 baud beside what its bits and silences take; and what the service takes at
+rest. `--write` keeps the table in docs/link-speed.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import contextlib
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from pymodbus.client import AsyncModbusTcpClient
+
+from drivers.controller.chunks import page_starts, spans
+from drivers.controller.mailbox import ContourMessage, MailboxLayout, Page, encode_pages, micrometres
+from drivers.controller.modbus import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
+from drivers.controller.requests import LONGEST_WRITE
+from tests.interop.programs import compiled, libmodbus_rtu, libmodbus_tcp
+from tests.system.cell import Cell
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "link-speed.md"
+VERTICES = 1000
+BAUDRATE = 115_200
+TIMES_C, TIMES_PYMODBUS, WIRE_SHARE, REST_PERCENT = 4.0, 1.5, 95.0, 1.0
+TURNS, ROUNDS = 15, 20  # the three clients take turns, so that a busy moment meets all of them
+RTU_ROUNDS = 9
+REST_S = 30.0
+PRIORITY = 10
+LAYOUT = MailboxLayout()
+Write = tuple[int, int, tuple[int, ...]]
+"""Function code, address, values."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table. goal: None where the figure is only for comparison."""
+
+    what: str
+    figure: str
+    ratio: str
+    goal: str | None
+    met: bool
+
+
+def contour_pages() -> tuple[Page, ...]:
+    """A ring of 1,000 vertices, as the service would send it."""
+    angles = np.linspace(0, 2 * np.pi, VERTICES, endpoint=False)
+    ring = micrometres(np.stack([800 * np.cos(angles), 600 * np.sin(angles)], axis=1))
+    area = round(VERTICES / 2 * 800 * 600 * np.sin(2 * np.pi / VERTICES))
+    message = ContourMessage(1, (ring,), area, 200, 0, 1, False, False, 0, 9)
+    return encode_pages(message, LAYOUT.payload_capacity, LAYOUT.word_order)
+
+
+def writes_of(pages: Sequence[Page]) -> Iterator[Write]:
+    """The writes of a transfer, as the protocol asks for them."""
+    first = LAYOUT.contour_address
+    for number, page in enumerate(pages, start=1):
+        registers = (*page.header, *page.payload)
+        yield 6, first, (0,)
+        for offset, count in spans(page_starts(page.header, len(page.payload)), LONGEST_WRITE):
+            yield 16, first + offset, registers[offset - 1 : offset - 1 + count]
+        yield 6, first, (number,)
+
+
+async def send(controller: ModbusController, pages: Sequence[Page]) -> None:
+    """The same through our driver."""
+    for number, page in enumerate(pages, start=1):
+        await controller.write_transfer(0)
+        await controller.write_page(page)
+        await controller.write_transfer(number)
+
+
+async def send_by_pymodbus(client: AsyncModbusTcpClient, writes: Sequence[Write]) -> None:
+    """The same by the library's client, its replies believed."""
+    for function_code, address, values in writes:
+        if function_code == 6:
+            await client.write_register(address, values[0], device_id=1)
+        else:
+            await client.write_registers(address, list(values), device_id=1)
+
+
+def send_by_c(port: int, writes: Sequence[Write]) -> list[float]:
+    """Microseconds a round of the C client."""
+    lines = (
+        f"{code} {address} {values[0]}" if code == 6 else f"{code} {address} {len(values)} {' '.join(map(str, values))}"
+        for code, address, values in writes
+    )
+    client = compiled("link_client", Path(__file__).parent)
+    said = subprocess.run(
+        [client, str(port), str(ROUNDS)], input="\n".join(lines), capture_output=True, text=True, check=True
+    )
+    return [float(line) for line in said.stdout.split()]
+
+
+async def timed(send_once: Callable[[], Awaitable[None]]) -> list[float]:
+    """Microseconds a round."""
+    took = []
+    for _ in range(ROUNDS):
+        begun = time.perf_counter()
+        await send_once()
+        took.append(1e6 * (time.perf_counter() - begun))
+    return took
+
+
+async def over_tcp() -> list[Row]:
+    """The three clients, turn by turn, against one libmodbus server."""
+    pages = contour_pages()
+    writes = list(writes_of(pages))
+    took: dict[str, list[float]] = {"C": [], "pymodbus": [], "combtrace": []}
+    with libmodbus_tcp() as (_, port):
+        controller = ModbusTcpController("127.0.0.1", port, layout=LAYOUT)
+        library = AsyncModbusTcpClient("127.0.0.1", port=port, retries=0)
+        await controller.connect()
+        await library.connect()
+        for _ in range(TURNS):
+            took["C"] += await asyncio.to_thread(send_by_c, port, writes)
+            took["pymodbus"] += await timed(lambda: send_by_pymodbus(library, writes))
+            took["combtrace"] += await timed(lambda: send(controller, pages))
+        library.close()
+        await controller.close()
+    us = {name: median(values) for name, values in took.items()}
+    to_c, to_pymodbus = us["combtrace"] / us["C"], us["combtrace"] / us["pymodbus"]
+    return [
+        Row(f"C client on libmodbus, {len(writes)} writes", f"{us['C']:.0f} µs", "1", None, True),
+        Row(
+            "bare pymodbus loop",
+            f"{us['pymodbus']:.0f} µs",
+            f"{us['pymodbus'] / us['C']:.2f} × C",
+            None,
+            True,
+        ),
+        Row(
+            "combtrace",
+            f"{us['combtrace']:.0f} µs",
+            f"{to_c:.2f} × C, {to_pymodbus:.2f} × pymodbus",
+            f"at most {TIMES_C:g} × C, {TIMES_PYMODBUS:g} × pymodbus",
+            to_c <= TIMES_C and to_pymodbus <= TIMES_PYMODBUS,
+        ),
+    ]
+
+
+@contextmanager
+def paced_line() -> Iterator[tuple[str, str]]:
+    """The devices of a line of `BAUDRATE`."""
+    command = [sys.executable, "-m", "benchmarks.paced_line", str(BAUDRATE)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
+        try:
+            assert process.stdout is not None
+            _, near, far = process.stdout.readline().split()
+            yield near, far
+        finally:
+            process.kill()
+
+
+@contextmanager
+def before_all_else() -> Iterator[None]:
+    """This process and those that it starts run before others where that is allowed: line and server play hardware."""
+    normal = os.sched_getscheduler(0)
+    try:
+        with contextlib.suppress(PermissionError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        yield
+    finally:
+        os.sched_setscheduler(0, normal, os.sched_param(0))
+
+
+def wire_limit_s(writes: Sequence[Write], line: SerialLine) -> float:
+    """The time of all bits and of the silence before each request; the server's own silence is not counted."""
+    longest = 0.0
+    for function_code, _, values in writes:
+        request = 8 if function_code == 6 else 9 + 2 * len(values)
+        longest += (request + 8) * line.byte_s + line.silence_s
+    return longest
+
+
+async def over_rtu() -> list[Row]:
+    """Our driver on a line of 115,200 baud with a libmodbus server at its end."""
+    pages = contour_pages()
+    with before_all_else(), paced_line() as (near, far), libmodbus_rtu(far, baudrate=BAUDRATE):
+        line = SerialLine(near, BAUDRATE)
+        controller = ModbusRtuController(line, layout=LAYOUT)
+        await controller.connect()
+        took = []
+        for _ in range(RTU_ROUNDS):
+            begun = time.perf_counter()
+            await send(controller, pages)
+            took.append(time.perf_counter() - begun)
+        await controller.close()
+    limit_s = wire_limit_s(list(writes_of(pages)), line)
+    share = 100 * limit_s / min(took)
+    return [
+        Row(f"RTU at {BAUDRATE} baud: the wire's limit", f"{1000 * limit_s:.0f} ms", "100 %", None, True),
+        Row(
+            "RTU: combtrace",
+            f"{1000 * min(took):.0f} ms",
+            f"{share:.1f} % of the limit",
+            f"at least {WIRE_SHARE:g} %",
+            share >= WIRE_SHARE,
+        ),
+    ]
+
+
+def at_rest() -> list[Row]:
+    """The service's processor time while it waits for triggers, linked to a simulated controller."""
+    with tempfile.TemporaryDirectory() as folder:
+        cell = Cell(Path(folder), trigger_every_s=None)
+        try:
+            cell.ready()
+            time.sleep(2)
+            before, begun = _cpu_s(cell.service.process_id), time.perf_counter()
+            time.sleep(REST_S)
+            share = 100 * (_cpu_s(cell.service.process_id) - before) / (time.perf_counter() - begun)
+        finally:
+            cell.stop()
+    return [
+        Row("service at rest", f"{share:.2f} % of a core", "", f"below {REST_PERCENT:g} %", share < REST_PERCENT),
+    ]
+
+
+def _cpu_s(pid: int) -> float:
+    """User and system time of the process: fields 14 and 15 of proc(5)'s stat."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def table(rows: Sequence[Row]) -> str:
+    """The rows as Markdown."""
+    lines = ["| what | took | ratio | goal | |", "|---|---:|---:|---|---|"]
+    for row in rows:
+        verdict = "" if row.goal is None else "met" if row.met else "missed"
+        lines.append(f"| {row.what} | {row.figure} | {row.ratio} | {row.goal or ''} | {verdict} |")
+    return "\n".join(lines) + "\n"
+
+
+HEAD = f"""\
+# How fast the link is
+
+Measured by `make bench-link`, which writes this page: a contour of {VERTICES:,} vertices, read-back off, medians. The
+three TCP clients do the same writes to one libmodbus server on loopback, turn by turn. The serial line is a pair of
+pseudo-terminals that carry each byte at the line's pace; its limit counts all bits of requests and replies and 3.5
+characters of silence before each request, and the best of {RTU_ROUNDS} rounds counts: line and server are programs
+here, which others of the machine disturb.
+
+"""
+
+
+def main() -> int:
+    """Measure, print, and tell by the exit status whether all goals are met."""
+    parser = argparse.ArgumentParser(description="measure the link")
+    parser.add_argument("--write", action="store_true", help="keep the table in docs/link-speed.md")
+    parser.add_argument("--without-rest", action="store_true", help="leave out the service at rest, which takes 30 s")
+    args = parser.parse_args()
+    rows = asyncio.run(over_tcp()) + asyncio.run(over_rtu()) + ([] if args.without_rest else at_rest())
+    print(table(rows), end="")
+    if args.write:
+        PAGE.write_text(HEAD + table(rows), encoding="utf-8")
+    return 0 if all(row.met for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

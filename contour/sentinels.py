@@ -7,16 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contour._cv import grey
-from contour._cv_boards import find_marks, known_dictionaries
+from contour._cv import grey, shrunk
+from contour._cv_boards import find_marks, known_dictionaries, refined_corners
 from contour.errors import CalibrationError
 
 Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-REACH_SIDES, REACH_PX = 1.0, 40.0
-"""A mark is searched this far around its place: its side, and 40 px at least. Farther off it counts as not seen there,
-and a mark that is gone from its place is found by the search of the whole picture."""
+REACH_SIDES, REACH_PX = 0.75, 30.0
+"""A mark is searched this far around its place, 30 px at least. What was knocked farther is found by a search of the
+whole picture. With less than 0.6 sides around it the finder misses a mark that has not moved."""
+
+SEARCHED_SIDE_PX = 40
+"""Marks are recognised at about this size (an ArUco cell is then 5 to 7 px wide) and measured at full size: with marks
+of 160 px at 12 MP a look takes 2 ms instead of 13."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +101,9 @@ def see_sentinels(picture: Picture, dictionary: str, *, without: range = range(0
     found = find_marks(grey(picture), dictionary)
     numbers, counts = np.unique(found.ids, return_counts=True)
     single = set(numbers[counts == 1].tolist()) - set(without)
-    marks = [Mark(int(n), c) for n, c in zip(found.ids, found.corners_px, strict=True) if int(n) in single]
+    rough = [Mark(int(n), c) for n, c in zip(found.ids, found.corners_px, strict=True) if int(n) in single]
+    # Measured as each frame will be: what one way of measuring is off by then drops out of the comparison.
+    marks = [_around(picture, mark, dictionary) or mark for mark in rough]
     return Sentinels(dictionary, tuple(sorted(marks, key=lambda mark: mark.id))) if marks else None
 
 
@@ -122,9 +128,16 @@ def _around(picture: Picture, mark: Mark, dictionary: str) -> Mark | None:
     right, bottom = np.clip(np.ceil(mark.corners_px.max(axis=0) + reach) + 1, 0, [width, height]).astype(int)
     if right - left < 8 or bottom - top < 8:
         return None
-    found = find_marks(grey(np.ascontiguousarray(picture[top:bottom, left:right])), dictionary)
+    factor = max(int(mark.side_px / SEARCHED_SIDE_PX), 1)
+    bottom, right = bottom - (bottom - top) % factor, right - (right - left) % factor
+    window = grey(np.ascontiguousarray(picture[top:bottom, left:right]))
+    found = find_marks(shrunk(window, factor), dictionary)
     same = np.flatnonzero(found.ids == mark.id)
-    return Mark(mark.id, found.corners_px[same[0]] + np.array([left, top])) if len(same) == 1 else None
+    if len(same) != 1:
+        return None
+    corners = (found.corners_px[same[0]] + 0.5) * factor - 0.5
+    fine = refined_corners(window, corners, int(np.clip(mark.side_px / 16, 2, 8)))
+    return Mark(mark.id, fine + np.array([left, top]))
 
 
 def _offset(was: Mark, now: Mark) -> Offset:

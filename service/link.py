@@ -125,8 +125,8 @@ class Link:
     @property
     def starting(self) -> bool:
         """True until the link was well or failed for the first time, or that takes too long."""
-        if self._well_or_failed or self._since is None:
-            return not self._well_or_failed
+        if self._well_or_failed or self._since is None or self.ownership.conflict:
+            return not (self._well_or_failed or self.ownership.conflict)
         return self._now() - self._since < self.settings.heartbeat_timeout_s
 
     def fault(self) -> str | None:

@@ -1,0 +1,202 @@
+"""Whole daemons on a simulated controller over sockets: one service a controller, one journal a service."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from pathlib import Path
+
+import pytest
+
+from drivers.controller.simulated import SimulatedController
+from service.journal import Journal
+from service.reasons import Outcome, Reason
+from service.state import State
+from service.wiring import WiringError
+from tests.drivers.controller.fault_proxy import Fate, FaultProxy
+from tests.service.waiting import until
+from tests.system.wired_daemon import WiredDaemon, wired
+
+
+def tcp(port: int, **more: object) -> dict[str, object]:
+    return {"kind": "modbus-tcp", "port": port, **more}
+
+
+def other_door(controller: SimulatedController) -> FaultProxy:
+    """Another address of the same controller: the lock on this machine does not see that it is the same."""
+    return FaultProxy(controller.port, lambda _request: Fate.PASS)
+
+
+@pytest.fixture
+def short_watch(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.ownership.WATCH_S", 1.2)  # longer than a heartbeat's period
+
+
+async def test_a_second_daemon_of_this_machine_on_the_same_controller_does_not_start(tmp_path: Path) -> None:
+    async with SimulatedController() as controller, wired(tmp_path / "one", tcp(controller.port)) as one:
+        with pytest.raises(WiringError, match=r"another combtrace \(process \d+\) runs on it"):
+            WiredDaemon(tmp_path / "two", tcp(controller.port))
+        with pytest.raises(WiringError, match="runs on it"):
+            WiredDaemon(tmp_path / "two", tcp(controller.port, host="localhost"))
+        assert (await one.job()).outcome is Outcome.ACCEPTED
+
+
+async def test_two_state_folders_that_name_one_journal_are_noticed(tmp_path: Path) -> None:
+    journal = {"path": str(tmp_path / "shared.sqlite")}
+    async with (
+        SimulatedController() as controller,
+        SimulatedController() as another,
+        wired(tmp_path / "one", tcp(controller.port), journal=journal),
+    ):
+        with pytest.raises(WiringError, match="runs on this journal"):
+            WiredDaemon(tmp_path / "two", tcp(another.port), journal=journal)
+
+
+async def test_beside_a_living_service_a_second_one_stays_in_error_with_155_and_writes_nothing(
+    tmp_path: Path, short_watch: None
+) -> None:
+    writes: list[bytes] = []
+
+    def note(request: bytes) -> Fate:
+        writes.extend([request] if request[7] != 3 else [])
+        return Fate.PASS
+
+    async with SimulatedController() as controller, FaultProxy(controller.port, note) as door:
+        async with wired(tmp_path / "one", tcp(controller.port)) as one:
+            await one.ready()
+            async with wired(tmp_path / "two", tcp(door.port)) as two:
+                await until(lambda: "Stop one of the two" in two.reason)
+                assert two.reason.startswith("155 another service")
+                assert two.parts.health.state is State.ERROR
+                for _ in range(3):
+                    assert (await one.job()).outcome is Outcome.ACCEPTED
+            assert one.parts.health.state is State.READY, "the first never noticed"
+        assert writes == []
+        assert controller.verdict.counts == {}
+
+
+async def test_after_a_service_that_ended_another_takes_over_with_higher_numbers(tmp_path: Path) -> None:
+    async with SimulatedController() as controller, other_door(controller) as door:
+        async with wired(tmp_path / "one", tcp(controller.port)) as one:
+            last = await one.job()
+        async with wired(tmp_path / "two", tcp(door.port)) as two:
+            await two.ready(15)
+            job = await two.job()
+            assert job.outcome is Outcome.ACCEPTED
+            assert job.job_id > last.job_id
+            assert two.parts.link.published.owner != one.parts.link.published.owner  # type: ignore[union-attr]
+        assert controller.verdict.counts == {}, "it left the other's block alone for 3 s"
+
+
+async def test_a_service_that_another_one_drives_out_stops_writing_and_stays_in_error(
+    tmp_path: Path, short_watch: None
+) -> None:
+    async with (
+        SimulatedController() as controller,
+        other_door(controller) as door,
+        wired(tmp_path / "one", tcp(controller.port)) as one,
+    ):
+        await one.ready()
+        assert one.parts.link is not None
+        keep = one.parts.link._keep_service
+
+        async def frozen() -> None:
+            return
+
+        one.parts.link._keep_service = frozen  # type: ignore[method-assign]  # its heartbeat stands still
+        async with wired(tmp_path / "two", tcp(door.port)) as two:
+            await two.ready()
+            one.parts.link._keep_service = keep  # type: ignore[method-assign]
+            await until(lambda: "Stop one of the two" in one.reason)
+            assert (await two.job()).outcome is Outcome.ACCEPTED
+            assert one.parts.health.state is State.ERROR
+            assert one.reason.startswith("155")
+
+
+async def test_a_lost_journal_repeats_neither_a_trigger_nor_a_number(
+    tmp_path: Path, short_watch: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with SimulatedController() as controller:
+        async with wired(tmp_path, tcp(controller.port)) as before:
+            await before.ready()
+            await until(lambda: controller.can_request)
+            controller.request_measurement()
+            await until(lambda: before.parts.executor.settled_job)
+            last = before.parts.executor.settled_job
+        for file in tmp_path.glob("journal.sqlite*"):
+            file.unlink()
+        async with wired(tmp_path, tcp(controller.port)) as after:
+            await after.ready()
+            await asyncio.sleep(0.2)
+            assert after.parts.executor.settled_job == last, "the trigger was not taken again"
+            job = await after.job()
+            assert job.job_id == last + 1
+        assert "the journal is lost" in caplog.text
+        assert set(controller.verdict.counts) <= {"second-service"}, "of our short watch"
+        assert controller.verdict.accepted == 2
+
+
+async def test_a_damaged_journal_is_moved_aside_with_an_alarm_and_the_job_in_flight_is_settled(
+    tmp_path: Path, short_watch: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with SimulatedController() as controller:
+        async with wired(tmp_path, tcp(controller.port)) as before:
+            await before.job()
+        path = tmp_path / "journal.sqlite"
+        content = path.read_bytes()
+        path.write_bytes(bytes(100) + content[100:])
+        async with wired(tmp_path, tcp(controller.port)) as after:
+            assert (await after.job()).job_id == 2
+        assert [record.name for record in caplog.records if record.levelno == logging.CRITICAL] == ["combtrace.journal"]
+        (kept,) = (file for file in tmp_path.glob("journal.sqlite.damaged-*") if file.name.endswith("Z"))
+        assert kept.read_bytes()[100:] == content[100:]
+
+
+async def test_an_observer_beside_a_service_makes_every_contour_and_writes_no_register(
+    tmp_path: Path, short_watch: None
+) -> None:
+    writes: list[bytes] = []
+
+    def note(request: bytes) -> Fate:
+        writes.extend([request] if request[7] != 3 else [])
+        return Fate.PASS
+
+    async with SimulatedController() as controller, FaultProxy(controller.port, note) as door:
+        observing = tcp(door.port, mode="observe")
+        async with wired(tmp_path / "one", tcp(controller.port)) as one, wired(tmp_path / "two", observing) as two:
+            await one.ready()
+            await two.ready()
+            await until(lambda: controller.can_request)
+            controller.request_measurement()
+            await until(lambda: one.parts.executor.settled_job and two.parts.executor.settled_job)
+            seen = two.parts.journal.last_settled()
+            sent = one.parts.journal.last_settled()
+        assert seen is not None
+        assert sent is not None
+        assert (seen.outcome, seen.detail) == (Outcome.WRITTEN, "observed only: 1 page(s) made, nothing sent")
+        assert (seen.trigger.session, seen.trigger.counter) == (sent.trigger.session, sent.trigger.counter)
+        assert sent.outcome is Outcome.ACCEPTED
+        assert writes == []
+        assert controller.verdict.counts == {}
+
+
+async def test_an_observer_does_not_start_on_a_journal_with_a_job_in_flight(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "journal.sqlite")
+    journal.adopt(5, (9, 4), 9)
+    journal.close()
+    with pytest.raises(WiringError, match="job 5 is in flight at the controller, and mode observe cannot settle it"):
+        WiredDaemon(tmp_path, tcp(1, mode="observe"))
+
+
+async def test_a_job_in_flight_fails_with_155_and_the_journal_says_so(tmp_path: Path, short_watch: None) -> None:
+    async with SimulatedController() as controller, wired(tmp_path, tcp(controller.port)) as one:
+        await one.ready()
+        controller.halt()  # no answers from here on
+        link = one.parts.link
+        assert link is not None
+        running = asyncio.ensure_future(one.job())
+        await until(lambda: one.parts.journal.unsettled() and one.parts.journal.unsettled()[0].sent)
+        registers = controller._registers
+        registers[16 + 11] = (one.parts.journal.owner % 65535) + 1
+        job = await asyncio.wait_for(running, 10)
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.OTHER_SERVICE)

@@ -134,5 +134,5 @@ def _bumps(bumps: Bumps) -> str:
         f"{bumps.least_shift_px:.2f} px\n"
         f"- noisy repeats: {bumps.alarms} of {bumps.repeats} raised an alarm, the largest offset "
         f"{bumps.largest_still_px:.3f} px\n"
-        f"- a look at 4000 × 3000 px takes {bumps.look_ms:.1f} ms (median, one core)\n"
+        f"- a look at 4000 × 3000 px takes {bumps.look_ms:.1f} ms of one core (median)\n"
     )

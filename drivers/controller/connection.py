@@ -102,6 +102,8 @@ class Connection:
         """
         if self.fault is not None:
             raise _again(self.fault)
+        if not requests:
+            return []
         exchange = _Exchange(requests, self._loop.create_future())
         self._turns.append(exchange)
         self._send_next()

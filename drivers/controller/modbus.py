@@ -151,7 +151,7 @@ class ModbusController:
         header = registers_of(reply)
         starts = [start for start in page_starts(header, payload_length) if start >= PAYLOAD_OFFSET]
         reads = [read_registers(first + offset, count) for offset, count in spans(starts, self._limits.read)]
-        replies = await connection.run(reads) if reads else []
+        replies = await connection.run(reads)
         return Page(header, tuple(register for reply in replies for register in registers_of(reply)))
 
     # --- connection ---------------------------------------------------------------------------------------------

@@ -56,6 +56,8 @@ def check_rtu(request: Request, device_id: int, received: bytes) -> bytes | None
     if len(received) < 2:
         return None
     end = 1 + _pdu_length(request, received[1])
+    if received[1] == READ_REGISTERS and len(received) > 2:  # a shorter reply would be waited for until the time-out
+        _must_be("byte count", received[2], request.reply_head[1])
     if len(received) < end + _CRC_LENGTH:
         return None
     _must_be("frame's number of bytes", len(received), end + _CRC_LENGTH)

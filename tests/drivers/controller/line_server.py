@@ -16,6 +16,7 @@ class LineServer:
 
     delays_s: how long the next replies take, one after the other; then none. A reply shows the registers as they were
         when its request came.
+    behind: requests whose replies are kept back until later ones come.
     reply: makes the bytes to send of a request and its right reply, both whole frames.
     """
 
@@ -23,6 +24,8 @@ class LineServer:
         self.registers = [0] * 10_000
         self.requests: list[bytes] = []
         self.delays_s: list[float] = []
+        self.behind = 0
+        self._kept: list[bytes] = []
         self.reply: Callable[[bytes, bytes], bytes] = lambda request, right: right
         self._device_id = device_id
         self._line = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -53,8 +56,9 @@ class LineServer:
                 return
             request, self._received = self._received[:length], self._received[length:]
             self.requests.append(request)
-            delay_s = self.delays_s.pop(0) if self.delays_s else 0.0
-            self._replies.put_nowait((delay_s, self.reply(request, self._right(request))))
+            self._kept.append(self.reply(request, self._right(request)))
+            while len(self._kept) > self.behind:
+                self._replies.put_nowait((self.delays_s.pop(0) if self.delays_s else 0.0, self._kept.pop(0)))
 
     def _right(self, request: bytes) -> bytes:
         function_code, address, count = struct.unpack_from(">BHH", request, 1)

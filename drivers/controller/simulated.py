@@ -145,18 +145,25 @@ class SimulatedController:
         self._run_since = self._now()
         self._scanning = asyncio.create_task(self._scan_for_ever(), name="simulated controller")
 
+    async def unplug(self) -> None:
+        """Cut the line: connections end, nobody can connect; the program goes on."""
+        if self._server is not None:
+            self._used_port = self._server.port or self._used_port
+            await self._server.stop()
+
+    async def plug_in(self) -> None:
+        """Serve again where it did; raise ControllerUnavailable."""
+        if self._server is not None:  # else it was stopped for good meanwhile
+            await self._listen(self._server, self._used_port)
+
     async def switch_off(self) -> None:
         """Listen no more and stand still, as without power."""
         self._halted = True
-        if self._server is not None:
-            self._used_port = self._server.port or self._port
-            await self._server.stop()
+        await self.unplug()
 
     async def switch_on(self) -> None:
         """Power is back: listen where it did, and start the program anew; raise ControllerUnavailable."""
-        if self._server is None:  # stopped for good meanwhile
-            return
-        await self._listen(self._server, self._used_port)
+        await self.plug_in()
         self.restart()
 
     async def _listen(self, server: RegisterServer, port: int) -> None:

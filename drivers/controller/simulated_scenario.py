@@ -24,6 +24,7 @@ EventKind = Literal[
     "halt",
     "restart",
     "switch-off",
+    "unplug",
     "foreign-service",
 ]
 EVENT_KINDS: dict[EventKind, str] = {
@@ -36,6 +37,7 @@ EVENT_KINDS: dict[EventKind, str] = {
     "halt": "the program stands still for `for_s`, as a PLC in STOP; then it starts anew",
     "restart": "the program starts anew, `keep_registers` or not, `keep_memory` or not",
     "switch-off": "nothing listens for `for_s`; then it starts anew with empty registers",
+    "unplug": "the line is cut for `for_s`: connections end, nobody can connect; the program goes on",
     "foreign-service": "for `for_s` another service writes the service block too: its `owner`, its heartbeat moving",
 }
 assert set(EVENT_KINDS) == set(get_args(EventKind))
@@ -155,6 +157,7 @@ class Play:
                 "halt": self._halt,
                 "restart": self._restart,
                 "switch-off": self._switch_off,
+                "unplug": self._unplug,
                 "foreign-service": self._foreign_service,
             }
             await acts[event.do](event)
@@ -202,7 +205,11 @@ class Play:
     async def _switch_off(self, event: Event) -> None:
         async with self._off:
             await self._controller.switch_off()
-            try:
-                await asyncio.sleep(event.for_s)
-            finally:
-                await self._controller.switch_on()
+            await asyncio.sleep(event.for_s)
+            await self._controller.switch_on()
+
+    async def _unplug(self, event: Event) -> None:
+        async with self._off:
+            await self._controller.unplug()
+            await asyncio.sleep(event.for_s)
+            await self._controller.plug_in()

@@ -203,7 +203,9 @@ class ClientWatch:
         self._last_transfer, self._last_content = transfer, copy.content
         self._service_at_commit = self._service
         split = sorted(cut for cut in self._cuts if not _may_be_cut(cut, copy))
-        if split and own and copy.job_id:  # job 0: the program has restarted and cleared the page in between
+        if (
+            split and own and copy.layout in (0, 1) and copy.job_id
+        ):  # job 0: the program has restarted and cleared the page in between
             self._verdict.note("value-split", f"requests begin or end at offsets {split} of job {copy.job_id}")
 
     def _is_own(self, copy: PageCopy) -> bool:

@@ -259,7 +259,7 @@ class FaultedCell:
             self.controller.set_state(1)
             if self.chance.random() < 0.3:
                 self.controller.scan_s = 0.06
-                await asyncio.sleep(self.chance.uniform(0, 0.4))
+                await asyncio.sleep(self.chance.uniform(0, 1.2 if self.terms.slow_program else 0.4))
                 self.controller.scan_s = 0.002
 
     async def in_the_midst_of_a_transfer(self) -> None:
@@ -292,6 +292,18 @@ class FaultedCell:
         await self.controller.stop()
         await asyncio.sleep(self.chance.uniform(0, 0.3))
         await self.start_controller()
+
+    async def unplug(self) -> None:
+        """The cable is pulled just after a commit, or at any time; the program goes on, and may accept meanwhile."""
+        seen = self.controller.registers(32, 1)
+        for _ in range(300):
+            if self.controller.registers(32, 1) not in (seen, (0,)):
+                break
+            await asyncio.sleep(0.001)
+        self.restarts["line cut and restored"] += 1
+        await self.controller.unplug()
+        await asyncio.sleep(self.chance.uniform(0.1, 1.5))
+        await self.controller.plug_in()
 
     async def forget(self) -> None:
         await self.in_the_midst_of_a_transfer()
@@ -347,6 +359,7 @@ class FaultedCell:
 
     async def _until_enough(self, give_up_at: float) -> None:
         events: list[Callable[[], Awaitable[None]]] = [self.restart_service, self.restart_program, self.power_off]
+        events += [self.unplug] * 2
         events += [self.forget] * self.terms.forgetful
         while self._ended() < self.terms.jobs:
             await asyncio.sleep(self.chance.uniform(0.3, 3.0) + (0 if self.terms.has_clock else 1.2))

@@ -48,7 +48,7 @@ def report(results: list[dict[str, Any]]) -> str:
         "",
     ]
     parts += ["What was done to the line:", "", *_counts("fault", "times", results, "faults"), ""]
-    parts += ["Where the processes were killed and the programs restarted:", ""]
+    parts += ["Where processes were killed, programs restarted and lines cut:", ""]
     parts += [*_counts("instant", "times", results, "instants"), ""]
     found = [text for result in results for text in result["texts"]]
     if found:

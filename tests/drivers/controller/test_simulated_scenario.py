@@ -129,6 +129,26 @@ async def test_a_controller_that_is_switched_off_is_gone_and_comes_back_where_it
             await again.read(0, 16)
 
 
+async def test_an_unplugged_controller_cannot_be_reached_and_its_program_goes_on() -> None:
+    async with played(Event("unplug", at_s=(0.05,), for_s=0.2)) as controller:
+        client = Client(controller.port)
+        await client.__aenter__()
+        port = controller.port
+        assert await client.reader.read() == b""
+        client.writer.close()
+        with pytest.raises(OSError, match=str(port)):
+            await Client(port).__aenter__()
+        before = controller.registers(1, 1)
+        await until(lambda: controller.registers(1, 1) != before)
+        async with asyncio.timeout(10):
+            while True:
+                with suppress(OSError):
+                    async with Client(port) as again:
+                        assert (await again.read(13, 1)) == (SESSION,)
+                        break
+                await asyncio.sleep(0.01)
+
+
 async def test_another_service_shows_by_its_owner_and_a_moving_heartbeat() -> None:
     async with played(Event("foreign-service", at_s=(0.0,), for_s=0.4)) as controller:
         await until(lambda: controller.registers(27, 1) == (4711,))

@@ -147,9 +147,7 @@ class NoController(Model):
 class ModbusController(Model):
     """What all controllers on Modbus share."""
 
-    device_id: int = Field(
-        1, ge=1, le=255, description="Modbus device id (unit); 0, a broadcast, is never answered."
-    )
+    device_id: int = Field(1, ge=1, le=255, description="Modbus device id (unit); 0, a broadcast, is never answered.")
     word_order: Literal["big", "little"] = Field(
         "big", description="Order of the two registers of a 32-bit value: big = ABCD, little = CDAB."
     )

@@ -231,6 +231,13 @@ def test_the_check_reads_a_number_of_registers_that_nothing_else_reads(rings: in
 # --- noise ------------------------------------------------------------------------------------------------------------
 
 
+async def test_another_devices_reply_is_nonsense(controller: Controller, server: LineServer) -> None:
+    server.reply = lambda request, right: frame(b"\2" + right[1:-2])
+    with pytest.raises(ControllerNonsense, match="device id is 2, expected 1"):
+        await controller.read_link()
+    assert not controller.connected
+
+
 async def test_a_reply_shorter_than_asked_for_is_nonsense_and_not_waited_with(
     line: PtyLine, server: LineServer
 ) -> None:

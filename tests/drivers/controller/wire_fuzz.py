@@ -88,7 +88,14 @@ def received(draw: st.DrawFn, sent: bytes, request: Request, frame: Callable[[by
         st.binary(min_size=1, max_size=253),
         st.integers(0, 255).map(lambda code: bytes([request.pdu[0] | 0x80, code])),
     )
-    data = draw(st.one_of(st.binary(max_size=300), pdus.map(lambda pdu: frame(sent, pdu))))
+    another = bytes(byte ^ 1 for byte in sent)  # its transaction and device are others
+    data = draw(
+        st.one_of(
+            st.binary(max_size=300),
+            pdus.map(lambda pdu: frame(sent, pdu)),
+            pdus.map(lambda pdu: frame(another, pdu)),
+        )
+    )
     for _ in range(draw(st.integers(0, 3))):
         at = draw(st.integers(0, len(data)))
         new = draw(st.binary(max_size=3))

@@ -206,7 +206,7 @@ async def test_where_the_contour_block_cannot_be_read_late_replies_are_waited_ou
         return right if request[3] != 32 else frame(bytes([1, 0x83, 2]))
 
     server.reply = refuse_the_check
-    controller = ModbusRtuController(SerialLine(line.near), timeout_s=2 * SILENCE_S)
+    controller = ModbusRtuController(SerialLine(line.near), timeout_s=8 * SILENCE_S)
     connecting = asyncio.create_task(controller.connect())
     while not server.requests:
         await asyncio.sleep(0.001)

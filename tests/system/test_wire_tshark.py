@@ -14,7 +14,7 @@ import pytest
 
 from drivers.controller import ServiceBlock
 from drivers.controller.mailbox import ContourMessage, MailboxLayout, WordOrder, encode_pages, micrometres
-from drivers.controller.modbus import ModbusTcpController
+from drivers.controller.modbus import ModbusController, ModbusRtuOverTcpController, ModbusTcpController
 from drivers.controller.simulated import SimulatedController
 from tests.protocol_decoder import decode_contour
 from tests.real_parts import missing, need_program
@@ -44,7 +44,7 @@ class Frame:
 
 
 @contextlib.asynccontextmanager
-async def captured(port: int, file: Path, controller: ModbusTcpController) -> AsyncIterator[None]:
+async def captured(port: int, file: Path, controller: ModbusController) -> AsyncIterator[None]:
     """Capture loopback's `port` into `file` while the block runs; no packet of the block is missed."""
     shown, said = file.with_suffix(".shown"), file.with_suffix(".said")
     command = [need_program("tshark", INSTALL), "-i", "lo", "-f", f"tcp port {port}", "-w", str(file), "-P", "-l"]
@@ -73,9 +73,14 @@ async def captured(port: int, file: Path, controller: ModbusTcpController) -> As
         await tshark.wait()
 
 
-def tshark_reads(file: Path, port: int, display_filter: str, *fields: str) -> list[list[str]]:
+TCP, RTU = "mbtcp", "mbrtu"
+"""Wireshark's names of the two framings."""
+
+
+def tshark_reads(file: Path, port: int, framing: str, display_filter: str, *fields: str) -> list[list[str]]:
     """A row of `fields` for each packet of the capture that the filter lets through."""
-    command = [need_program("tshark", INSTALL), "-r", str(file), "-o", f"mbtcp.tcp.port:{port}", "-Y", display_filter]
+    command = [need_program("tshark", INSTALL), "-r", str(file), "-o", f"{framing}.tcp.port:{port}"]
+    command += ["-o", "mbrtu.crc_verification:TRUE", "-Y", display_filter]
     command += ["-T", "fields", "-E", "separator=;", "-E", "aggregator=,"]
     for field in fields:
         command += ["-e", field]
@@ -88,8 +93,8 @@ def in_hexadecimal(data: str) -> tuple[int, ...]:
     return tuple(int(digits[start : start + 4], 16) for start in range(0, len(digits), 4))
 
 
-def frames_in(file: Path, port: int) -> list[Frame]:
-    rows = tshark_reads(file, port, "modbus", *FIELDS)
+def frames_in(file: Path, port: int, framing: str) -> list[Frame]:
+    rows = tshark_reads(file, port, framing, "modbus", *FIELDS)
     return [
         Frame(
             to_controller=int(destination) == port,
@@ -102,8 +107,10 @@ def frames_in(file: Path, port: int) -> list[Frame]:
     ]
 
 
-@pytest.mark.parametrize("word_order", ["big", "little"])
-async def test_wireshark_reads_a_transfer_as_the_protocol_tells_it(tmp_path: Path, word_order: WordOrder) -> None:
+@pytest.mark.parametrize(("framing", "word_order"), [(TCP, "big"), (TCP, "little"), (RTU, "big")])
+async def test_wireshark_reads_a_transfer_as_the_protocol_tells_it(
+    tmp_path: Path, framing: str, word_order: WordOrder
+) -> None:
     need_program("tshark", INSTALL)
     angles = np.linspace(0, 2 * np.pi, VERTICES, endpoint=False)
     ring = micrometres(np.stack([400 * np.cos(angles), 300 * np.sin(angles)], axis=1))
@@ -113,9 +120,13 @@ async def test_wireshark_reads_a_transfer_as_the_protocol_tells_it(tmp_path: Pat
     layout = MailboxLayout(word_order=word_order)
     file = tmp_path / "transfer.pcapng"
 
-    async with SimulatedController(layout=layout, session_source=lambda: SESSION) as simulated:
+    served = SimulatedController(
+        layout=layout, session_source=lambda: SESSION, framing="tcp" if framing == TCP else "rtu"
+    )
+    driver = ModbusTcpController if framing == TCP else ModbusRtuOverTcpController
+    async with served as simulated:
         port = simulated.port
-        controller = ModbusTcpController("127.0.0.1", port, layout=layout, timeout_s=30)
+        controller = driver("127.0.0.1", port, layout=layout, timeout_s=30)
         await controller.connect()
         while (await controller.read_link()).session != SESSION:
             await asyncio.sleep(0.01)
@@ -131,8 +142,11 @@ async def test_wireshark_reads_a_transfer_as_the_protocol_tells_it(tmp_path: Pat
     assert simulated.verdict.accepted == 1
     assert set(simulated.verdict.counts) <= {"heartbeat-stalled"}, simulated.verdict  # this client has none
 
-    assert tshark_reads(file, port, "_ws.malformed || _ws.short || modbus.exception_code", "frame.number") == []
-    frames = frames_in(file, port)
+    assert tshark_reads(file, port, framing, "mbrtu.crc16.status == 0", "frame.number") == []
+    assert (
+        tshark_reads(file, port, framing, "_ws.malformed || _ws.short || modbus.exception_code", "frame.number") == []
+    )
+    frames = frames_in(file, port, framing)
     asked = [frame for frame in frames if frame.to_controller]
     assert {frame.function_code for frame in frames} == {3, 6, 16}
     assert abs(len(frames) - 2 * len(asked)) <= 1  # the capture may begin or end between request and reply

@@ -103,6 +103,7 @@ class Link:
         self._heard_at = 0.0
         self._lost_at: float | None = None
         self._told_at = 0.0
+        self._failing = ""
         self._clock_ran_in = 0  # the session in which the clock was seen at another value than 0
         self._zero: tuple[int, float] = (0, 0.0)  # session, and when its clock was first seen at 0
         self._well_or_failed = False
@@ -351,9 +352,13 @@ class Link:
     def _lost(self, error: ControllerError) -> None:
         """Note why; one line of log from one success to the next, and one a minute, however often it is tried."""
         now = self._now()
+        attempt = "request" if self._up.is_set() else "connection"
+        if attempt != self._failing or self._lost_at is None or now - self._told_at >= REMINDER_S:
+            # Else the reason stays: two ways in which nobody answers would take turns in log and state all night.
+            self._failing, self._trouble = attempt, str(error)
         if self._lost_at is None:
             self._lost_at = self._told_at = now
-            log.warning("link: %s: the controller cannot be reached. It is tried again by itself", error)
+            log.warning("link: the controller cannot be reached; it is tried again by itself: %s", error)
         elif now - self._told_at >= REMINDER_S:
             self._told_at = now
             log.warning("link: still not reached after %.0f s: %s", now - self._lost_at, error)
@@ -362,7 +367,6 @@ class Link:
         self._up.clear()
         self._forget()
         self._served = False
-        self._trouble = str(error)
         self._well_or_failed = True
         self.on_look()
 

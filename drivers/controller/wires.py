@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -67,7 +68,7 @@ class TcpWire:
     port: int
 
     serial = False
-    missing = "Check device_id, whether the controller runs, and timeout_s"
+    missing = "Check cable and power, device_id, whether the controller runs, and timeout_s"
     mismatch = "Check what listens there, and for a second client"
 
     @property
@@ -102,7 +103,7 @@ class RtuOverTcpWire:
     baudrate: int = 9600
 
     serial = True
-    missing = "Check device_id, whether the controller runs, the serial server's baud rate and parity, and timeout_s"
+    missing = "Check cables and power, device_id, the controller, the serial server's baud rate, parity, and timeout_s"
     mismatch = "Check the serial server's baud rate and parity, the line's termination, and for a second client"
 
     @property
@@ -136,7 +137,7 @@ class RtuWire:
     line: SerialLine
 
     serial = True
-    missing = "Check device_id, whether the controller runs, baud rate, parity, the two wires' order, and timeout_s"
+    missing = "Check the two wires and their order, power, device_id, the controller, baud rate, parity, and timeout_s"
     mismatch = "Check baud rate, parity, termination, and for a second client on the line"
 
     @property
@@ -162,6 +163,13 @@ class RtuWire:
         return f"the port has gone ({reason}). Check that the adapter is plugged in"
 
 
+_IN_PLAIN_WORDS = {
+    errno.ECONNREFUSED: "the device is there and refuses, so nothing listens on this port",
+    errno.EHOSTUNREACH: "no device answers to this address",
+    errno.ENETUNREACH: "this machine has no way to that network",
+}
+
+
 async def _open_tcp(name: str, host: str, port: int, timeout_s: float, what_is_on: str) -> Descriptor:
     next_step = f"Check that {what_is_on}, the cable, host and port"
     try:
@@ -170,7 +178,8 @@ async def _open_tcp(name: str, host: str, port: int, timeout_s: float, what_is_o
     except TimeoutError as error:
         raise ControllerUnavailable(f"{name}: no connection in {timeout_s:g} s. {next_step}") from error
     except (OSError, UnicodeError) as error:
-        raise ControllerUnavailable(f"{name}: no connection: {error}. {next_step}") from error
+        plain = _IN_PLAIN_WORDS.get(getattr(error, "errno", None) or 0, str(error))
+        raise ControllerUnavailable(f"{name}: no connection: {plain}. {next_step}") from error
     return connected.fileno(), connected.close
 
 

@@ -12,9 +12,9 @@ from contour.geometry import Ring
 from contour.outline_chains import Chain, free_curves
 from contour.outline_curves import curve_points, within
 from contour.outline_joints import Flags, Joints, arc_points, thinned, without_reversed
-from contour.outline_labelling import FEW, label
+from contour.outline_labelling import label
 from contour.outline_models import Complex, Real, distance
-from contour.outline_proposals import gather, propose
+from contour.outline_proposals import FEW, gather, propose
 from contour.outline_segments import Segments, around, fitted, runs
 from contour.outline_spread import unseen_share, vertex_sigma
 from contour.outline_witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled

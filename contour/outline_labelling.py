@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contour.outline_models import Complex, Index, Real, distance, feet
-from contour.outline_proposals import Proposals
+from contour.outline_proposals import FEW, Proposals
+from contour.outline_reach import Reach, reach, supports
 from contour.outline_witnesses import Witnesses, cost
 
 # Nats for one more line or arc: its parameters at the precision the witnesses give, and where it begins.
@@ -20,13 +23,23 @@ _CORNER = 1.0
 _REFLEX = 5.0
 _REFLEX_PER_RADIAN = 6.0
 _JUMP = 16.0
+# Where a corner lies farther from its evidence than a witness's own distance, its cell must be missing: not unlikely,
+# but what hides more of a right angle than this many pitches, both edges together, is no single cell.
+_MISSING_CELL = 0.5
+_UNSEEN_CORNER = 4.4
+_UNSEEN_PER_PITCH = 4.0
+# A wall or a cell broken out of an edge hides so much of it; in longer gaps each outlier counts more.
+_UNSEEN_EDGE = 3.0
+_DEARER_PER_PITCH = 0.25
+_DEAREST = 2.0
 _REACH = 1.6
 _STATES = 8
-# A ring of so few witnesses is a small hole: twice the states, and all proposals anew in every round.
-FEW = 64
+_STATES_OF_FEW, _PLACES_OF_FEW = 64, 1500
 _NEARBY = 3
 # Gains above this mark models of the present labelling, which must stay available.
 _PRESENT = 5e3
+# Of what calling it an outlier costs, saved by a witness that lies on a model.
+_LIES = 0.5
 _FAR = 1e6
 
 
@@ -40,24 +53,29 @@ class Labelling:
 
 def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     """The cheapest labelling of the ring's witnesses by `proposals`, each within its own stretch."""
-    here = _states(witnesses, proposals)
+    here, last, following = _states(witnesses, proposals)
     count = len(witnesses)
     models = proposals.models.take(np.maximum(here, 0))
     points = witnesses.points[:, None]
     signed = distance(models, points)
     unary = cost(witnesses, signed, np.arange(count)[:, None])
+    foot, tangent = feet(models, points)
+    reached = reach(witnesses, models, foot, last=last, following=following)
+    hidden = (reached.back + reached.ahead) / witnesses.pitch
+    unary = unary * np.clip(1.0 + _DEARER_PER_PITCH * (hidden - _UNSEEN_EDGE), 1.0, _DEAREST)
     unary = np.where(here >= 0, unary, _FAR)
     unary = unary + _REFLEX_PER_RADIAN * np.maximum(witnesses.rare * models.curvature, 0.0) * witnesses.gap[:, None]
-    foot, tangent = feet(models, points)
     facing = (tangent * witnesses.normal.conj()[:, None]).imag
     unary = np.where(facing > -0.2, unary, unary + 20.0)
-    step = _steps(witnesses, proposals, here, foot, tangent) + np.roll(unary, -1, axis=0)[:, None, :]
+    step = _steps(witnesses, proposals, here, foot, tangent, reached)
+    step = step + np.roll(unary, -1, axis=0)[:, None, :]
     path, energy = _cheapest_cycle(step, unary)
     return Labelling(here[np.arange(count), path], energy)
 
 
-def _states(witnesses: Witnesses, proposals: Proposals) -> Index:
-    """The proposals that explain each witness's neighbourhood best, shape (N, A), -1 where fewer reach it."""
+def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Index, Index, Index]:
+    """The proposals that explain each witness's neighbourhood best, shape (N, A), -1 where fewer reach it; and the
+    nearest witness back and ahead that lies on the proposal, -1 where none does."""
     count = len(witnesses)
     margin = np.maximum(proposals.length // 2, 4)
     reach = np.minimum(proposals.length + 2 * margin, count)
@@ -67,6 +85,7 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> Index:
     saved = witnesses.cap_inside[place] - cost(
         witnesses, distance(proposals.models.take(which), witnesses.points[place]), place
     )
+    last, following = supports(saved > _LIES * witnesses.cap_inside[place], place, begin[which], (begin + reach)[which])
     running = np.concatenate([[0.0], np.cumsum(saved)])
     here = np.arange(len(which))
     low = np.maximum(here - _NEARBY, begin[which])
@@ -74,24 +93,33 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> Index:
     score = running[high] - running[low] + 0.1 * np.clip(proposals.gain[which], 0.0, 200.0)
     score = np.where(proposals.gain[which] > _PRESENT, 1e3 + score, score)
     order = np.lexsort((-score, place))
-    place, which = place[order], which[order]
-    rank = np.arange(len(place)) - np.searchsorted(place, place)
-    most = _STATES if count > FEW else 2 * _STATES
+    ordered = place[order]
+    rank = np.arange(len(place)) - np.searchsorted(ordered, ordered)
+    most = _STATES if count > FEW else min(_STATES_OF_FEW, _PLACES_OF_FEW // count)
     fits = rank < most
-    states = np.full((count, most), -1, dtype=np.intp)
-    states[place[fits], rank[fits]] = which[fits]
-    return states[:, : int(rank[fits].max()) + 1]
+    order, at, rank = order[fits], ordered[fits], rank[fits]
+    wide = int(rank.max()) + 1
+    states = np.full((3, count, wide), -1, dtype=np.intp)
+    states[:, at, rank] = which[order], last[order], following[order]
+    return states[0], states[1], states[2]
 
 
-def _steps(witnesses: Witnesses, proposals: Proposals, here: Index, foot: Complex, tangent: Complex) -> Real:
+def _steps(
+    witnesses: Witnesses, proposals: Proposals, here: Index, foot: Complex, tangent: Complex, reached: Reach
+) -> Real:
     """Price of going from state a at witness i to state b at witness i + 1, shape (N, A, A)."""
+
+    def after(of_next: NDArray[Any]) -> NDArray[Any]:
+        return np.roll(of_next, -1, axis=0)[:, None, :]
+
     following = np.roll(here, -1, axis=0)
     joint = joint_cost(
         foot[:, :, None],
         tangent[:, :, None],
-        np.roll(foot, -1, axis=0)[:, None, :],
-        np.roll(tangent, -1, axis=0)[:, None, :],
+        after(foot),
+        after(tangent),
         gap=witnesses.gap[:, None, None],
+        unseen=reached.back[:, :, None] + after(reached.ahead),
         sigma=np.maximum(witnesses.outer, np.roll(witnesses.outer, -1))[:, None, None],
         pitch=witnesses.pitch,
         rare=witnesses.rare,
@@ -108,6 +136,7 @@ def joint_cost(
     next_tangent: Complex,
     *,
     gap: Real,
+    unseen: Real,
     sigma: Real,
     pitch: float,
     rare: float,
@@ -115,7 +144,8 @@ def joint_cost(
     """Nats of a joint between two models, given their feet and tangents at the last and the next witness (shapes
     broadcast).
 
-    rare: sign of the turns that have to be earned.
+    unseen: pixels from the last witness that lies on the one model to `foot`, and from `next_foot` to the first that
+    lies on the other, together. rare: sign of the turns that have to be earned.
 
     A corner: the tangents meet ahead of the one and behind the other, within reach of the evidence. A smooth join:
     small turn, small step aside. Else a jump at a fixed price.
@@ -127,12 +157,16 @@ def joint_cost(
     safe = np.where(np.abs(sine) > 0.05, sine, 1.0)
     ahead = (way.conj() * next_tangent).imag / safe
     behind = (tangent.conj() * way).imag / safe
-    slack, reach = 0.3 * pitch, _REACH * pitch + gap
+    slack, most = 0.3 * pitch, _REACH * pitch + gap
     excess = (
-        np.maximum(np.maximum(-ahead - slack, ahead - reach), 0.0) ** 2
-        + np.maximum(np.maximum(-behind - slack, behind - reach), 0.0) ** 2
+        np.maximum(np.maximum(-ahead - slack, ahead - most), 0.0) ** 2
+        + np.maximum(np.maximum(-behind - slack, behind - most), 0.0) ** 2
     )
     corner = _CORNER + reflex + _REFLEX * (rare * sine > 0.0) + 8.0 * excess / pitch**2
+    # A cell in a corner touches its edges at a distance that goes with the cotangent of half the angle between them.
+    hidden = (unseen + ahead + behind) / pitch + 1.0 - np.abs(sine) / np.maximum(1.0 + turn.real, 0.2)
+    corner = corner + _MISSING_CELL * np.clip(hidden - _UNSEEN_CORNER + 2.0, 0.0, 1.0)
+    corner = corner + _UNSEEN_PER_PITCH * np.maximum(hidden - _UNSEEN_CORNER, 0.0)
     corner = np.where(np.abs(sine) > 0.05, corner, np.inf)
     middle = tangent + next_tangent
     aside = (middle.conj() * way).imag / np.maximum(np.abs(middle), 1e-6)

@@ -42,8 +42,9 @@ _TRIPLES = np.array(
 _LEAST_RADIUS_CONVEX = 1.25
 _LEAST_RADIUS_CONCAVE = 1.05
 _REDUNDANT = 2.0
-# Rings of fewer witnesses, holes mostly, are looked at from every place.
-_FEW = 48
+# Rings of so few witnesses, holes mostly, are looked at from every place.
+FEW = 64
+_SAME = 0.1
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,8 @@ def propose(witnesses: Witnesses) -> Proposals:
     """Lines and arcs on windows of 4, 8, 16, ... witnesses and on the whole ring, without those a longer window
     explains."""
     count = len(witnesses)
+    if count <= FEW:
+        return _propose_everywhere(witnesses)
     sizes = [size for size in (4, 6, *(8 * 2**k for k in range(11))) if size < count] + [count]
     levels = [
         level
@@ -105,15 +108,45 @@ def propose(witnesses: Witnesses) -> Proposals:
     return gather(kept)
 
 
+def _propose_everywhere(witnesses: Witnesses) -> Proposals:
+    """Lines and arcs on windows of 2, 3, 4, 6, ... witnesses from every one on, each different one once.
+
+    A ring of few witnesses has edges of two or three of them.
+    """
+    count = len(witnesses)
+    sizes = [size for size in (2, 3, 4, 5, 6, 8, 11, 16, 23, 32, 45) if size < count] + [count]
+    parts = []
+    for group in ([z for z in sizes if z <= 8], [z for z in sizes if z > 8]):
+        parts += [fits for level in _levels(witnesses, group) for fits in level]
+    fits = gather(parts)
+    fits = fits.take(fits.gain > 0.0)
+    return fits.take(_different(witnesses, fits))
+
+
+def _different(witnesses: Witnesses, fits: Proposals) -> Index:
+    """Indices of proposals, best first, without those that save about the same as a better one at every witness."""
+    order = np.argsort(-fits.gain, kind="stable")
+    signed = distance(fits.models.take((order, None)), witnesses.points[None, :])
+    saved = np.maximum(witnesses.cap_inside - cost(witnesses, signed), 0.0)
+    kept: list[int] = []
+    left = np.ones(len(order), dtype=bool)
+    for k in range(len(order)):
+        if left[k]:
+            kept.append(k)
+            left[k:] &= np.abs(saved[k:] - saved[k]).sum(axis=1) > _SAME * saved[k:].sum(axis=1)
+    return order[np.array(kept, dtype=np.intp)]
+
+
 def _levels(witnesses: Witnesses, sizes: list[int]) -> list[list[Proposals]]:
-    """Window fits of each size, lines and (from six witnesses on) arcs, all fitted in one batch."""
+    """Window fits of each size, lines and (from six witnesses on, five of few) arcs, all fitted in one batch."""
     if not sizes:
         return []
     count = len(witnesses)
+    least_bend = 5 if count <= FEW else 6
     plan = [
         (np.arange(0, count, _stride(size, count), dtype=np.intp), size, bend)
         for size in sizes
-        for bend in ((False, True) if size >= 6 else (False,))
+        for bend in ((False, True) if size >= least_bend else (False,))
     ]
     first = np.concatenate([begins for begins, _, _ in plan])
     length = np.concatenate([np.full(len(begins), size) for begins, size, _ in plan])
@@ -128,7 +161,7 @@ def _levels(witnesses: Witnesses, sizes: list[int]) -> list[list[Proposals]]:
 
 
 def _stride(size: int, count: int) -> int:
-    if count < _FEW:
+    if count <= FEW:
         return 1 if size < count else count
     return max(1, size // 4 if size != 6 else 2) if size < count else count
 

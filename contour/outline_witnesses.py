@@ -93,20 +93,23 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
 
 
 def cost(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
-    """Nats of signed distances (last axis: the witnesses at `index`, or index's own shape): half squares, capped
-    either side.
+    """Nats of signed distances (last axis: the witnesses at `index`, or index's own shape): half squares near the
+    outline, bent towards a cap either side.
 
-    Beyond a cell's depth the cap rises again: one missing cell or broken wall reaches no deeper.
+    They bend early, as Geman's and McClure's function does: about one wall end in five lies two to five standard
+    deviations off, and three of those in a row are no edge of their own. Beyond a cell's depth the cap rises again:
+    one missing cell or broken wall reaches no deeper.
     """
     outside = signed > 0.0
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
     cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
     beyond = np.clip(np.abs(signed) / witnesses.pitch - _DEEPEST, 0.0, 3.0)
-    return np.minimum(0.5 * (signed / sigma) ** 2, cap) + 4.0 * beyond**2
+    square = 0.5 * (signed / sigma) ** 2
+    return cap * square / (cap + square) + 4.0 * beyond**2
 
 
 def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
-    """Weights of a robust fit, 1/pixel^2: inverse variance, falling smoothly to 0 where the cost reaches its inner cap.
+    """Weights of a robust fit, 1/pixel^2: inverse variance, falling smoothly as the cost bends towards its inner cap.
 
     The same cap on both sides, or clean noise alone would pull the outline outwards.
     """
@@ -114,8 +117,7 @@ def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(Non
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
     cap = witnesses.cap_inside[index]
     inverse = 1.0 / sigma**2
-    within = np.maximum(1.0 - 0.5 * signed**2 * inverse / cap, 0.0)
-    return within**2 * inverse
+    return inverse / (1.0 + 0.5 * signed**2 * inverse / cap) ** 3
 
 
 def noise_from_neighbours(witnesses: Witnesses) -> float:

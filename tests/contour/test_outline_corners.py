@@ -1,0 +1,98 @@
+"""Short edges, lost corners, torn stretches and small holes: what is missing and what was cut so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from contour.outline_fit import FittedRing, fit_ring
+from contour.outline_reach import supports
+from contour.wall_evidence import RingEvidence
+from tests.contour.outline_scenes import PITCH, distances, errors, rectangle, witnesses
+
+CORNER = np.array([300.0, 300.0])
+
+
+def fitted(evidence: RingEvidence) -> FittedRing:
+    return fit_ring(evidence, pitch_px=PITCH, wall_px=3.0, rectifier=None)
+
+
+def cut_corner(length: float, size: float = 600.0) -> NDArray[np.float64]:
+    """A square whose first corner is cut off `length` px along either edge."""
+    low, high = 300.0, 300.0 + size
+    return np.array([[low + length, low], [high, low], [high, high], [low, high], [low, low + length]])
+
+
+@pytest.mark.parametrize("pitches", [2.6, 4.0, 6.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_cut_off_corner_is_no_missing_cell(pitches: float, seed: int) -> None:
+    truth = cut_corner(pitches * PITCH)
+    found = fitted(witnesses(truth, seed=seed, sigma=0.25, deep=0.03))
+    assert errors(found.ring, truth).max() < 0.5 * PITCH
+
+
+def lost_corner(seed: int) -> RingEvidence:
+    """A square with the walls about its first corner pushed in by about half a cell, each by another amount."""
+    evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
+    lost = np.abs(evidence.points - CORNER).sum(axis=1) < 1.3 * PITCH
+    inward = 0.4 * PITCH + 0.3 * PITCH * np.random.default_rng(seed).random((len(lost), 2))
+    return replace(evidence, points=evidence.points + np.where(lost[:, None], inward, 0.0))
+
+
+def test_a_corner_of_one_lost_cell_is_where_its_edges_meet_though_its_walls_stand_behind_it() -> None:
+    # Now and then the ends behind it lie in line: then nothing tells it from a cut.
+    missed = [distances(CORNER[None], fitted(lost_corner(seed)).ring)[0] > 0.2 * PITCH for seed in range(20)]
+    assert np.mean(missed) <= 0.15
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_torn_stretch_of_many_cells_is_followed(seed: int) -> None:
+    low, high, deep = 300.0, 1200.0, 1.7 * PITCH
+    torn = np.array(
+        [[low, low], [600, low], [660, low + deep], [800, low + deep], [860, low], [high, low], [high, 900], [low, 900]]
+    )
+    found = fitted(witnesses(torn, seed=seed, sigma=0.3, deep=0.05))
+    assert errors(found.ring, torn).max() < 0.5 * PITCH
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("side", [4.0, 5.5])
+def test_a_rectangular_hole_keeps_its_corners(side: float, seed: int) -> None:
+    truth = rectangle(side * PITCH, 0.85 * side * PITCH, angle=0.1 * seed)
+    found = fitted(witnesses(truth, seed=seed, sigma=0.3, spacing=0.7 * PITCH, hole=True))
+    assert len(found.ring) == 4
+    assert errors(found.ring, truth).max() < 0.15 * PITCH
+
+
+@pytest.mark.parametrize("seed", range(1, 8))
+def test_a_wall_broken_out_beside_a_rectangular_hole_does_not_round_it(seed: int) -> None:
+    truth = rectangle(4.4 * PITCH, 4.0 * PITCH)
+    evidence = witnesses(truth, seed=seed, sigma=0.3, hole=True)
+    broken = np.abs(evidence.position - 2.0 * PITCH) < 0.55 * PITCH
+    depth = np.where(broken, 0.8 * PITCH, 0.0)
+    found = fitted(replace(evidence, points=evidence.points - depth[:, None] * evidence.normal))
+    assert errors(found.ring, truth).max() < 0.4 * PITCH
+
+
+def test_many_moderate_errors_make_no_extra_edges() -> None:
+    truth = rectangle(900.0, 600.0)
+    vertices = []
+    for seed in range(12):
+        evidence = witnesses(truth, seed=seed, sigma=0.2)
+        rng = np.random.default_rng(seed)
+        wide = np.where(rng.random(len(evidence.points)) < 0.2, rng.normal(0.0, 0.8, len(evidence.points)), 0.0)
+        vertices.append(len(fitted(replace(evidence, points=evidence.points + wide[:, None] * evidence.normal)).ring))
+    assert np.median(vertices) == 4
+    assert max(vertices) <= 5
+
+
+def test_supports_are_the_nearest_witnesses_on_the_same_model() -> None:
+    lies = np.array([False, True, False, True, False, False, True])
+    place = np.array([5, 6, 7, 8, 2, 3, 4])
+    begin, end = np.array([0, 0, 0, 0, 4, 4, 4]), np.array([4, 4, 4, 4, 7, 7, 7])
+    back, ahead = supports(lies, place, begin, end)
+    assert back.tolist() == [-1, 6, 6, 8, -1, -1, 4]
+    assert ahead.tolist() == [6, 6, 8, 8, 4, 4, 4]

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-import os
 import random
 import time
-import tty
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from contour.geometry import Contour, area
 from drivers.camera import CameraUnavailable
 from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.layout import MailboxLayout
@@ -34,9 +31,10 @@ from service.cycle import Observation
 from service.daemon import Daemon
 from service.executor import TriggerRefused
 from service.journal import TriggerStamp
-from service.measure import Measurement
 from service.state import State
+from tests.soak.crossed_line import crossed_line
 from tests.soak.promises import Evidence, Findings, Taken, judge, micrometres
+from tests.soak.random_contours import RandomContours
 from tests.system.processes import jobs
 
 Transport = Literal["tcp", "rtu-over-tcp", "rtu"]
@@ -109,27 +107,6 @@ def fault_rules(risk: float) -> list[Fault]:
     rules += [Fault(kind, request="commit", chance=risk / 6) for kind in ("lost-reply", "reset-after")]  # type: ignore[arg-type]
     rules += [Fault("late-write", request="clear", chance=risk / 12, delay_s=0.15)]
     return rules
-
-
-class RandomContours:
-    """Stands in for the measurer: another contour each time, with or without a hole."""
-
-    def __init__(self, chance: random.Random, most_vertices: int) -> None:
-        self._chance = chance
-        self._most = most_vertices
-
-    def measure(self, *_: object, **__: object) -> Measurement:
-        exterior = self._ring(self._chance.randint(3, self._most), 50, 100)
-        holes = (self._ring(self._chance.randint(3, 6), 5, 15)[::-1],) if self._chance.random() < 0.3 else ()
-        contour = Contour(exterior, holes)
-        return Measurement("find-contours", pixels=contour, millimetres=contour, area_mm2=area(contour))
-
-    def _ring(self, vertices: int, least_mm: float, most_mm: float) -> np.ndarray:
-        """A star-shaped ring about the origin, counter-clockwise, in whole micrometres."""
-        turns = [number + self._chance.uniform(-0.3, 0.3) for number in range(vertices)]
-        angles = np.array(turns) * 2 * np.pi / vertices
-        radii = np.array([self._chance.uniform(least_mm, most_mm) for _ in range(vertices)])
-        return np.round(np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1), 3)
 
 
 class FaultedCell:
@@ -401,28 +378,3 @@ class FaultedCell:
             and not self.controller.trigger_open
             and self.parts.executor._pending() is None
         )
-
-
-@asynccontextmanager
-async def crossed_line() -> AsyncIterator[tuple[str, str]]:
-    """Two serial ports, crossed: what is written to one is read from the other."""
-    loop = asyncio.get_running_loop()
-    ends = [os.openpty(), os.openpty()]
-    for master, slave in ends:
-        tty.setraw(slave)
-        os.set_blocking(master, False)
-
-    def carry(source: int, target: int) -> None:
-        with suppress(BlockingIOError):
-            os.write(target, os.read(source, 4096))
-
-    (one, one_slave), (other, other_slave) = ends
-    loop.add_reader(one, carry, one, other)
-    loop.add_reader(other, carry, other, one)
-    try:
-        yield os.ttyname(one_slave), os.ttyname(other_slave)
-    finally:
-        for master, slave in ends:
-            loop.remove_reader(master)
-            os.close(master)
-            os.close(slave)

@@ -24,7 +24,8 @@ from drivers.controller.layout import MailboxLayout
 from drivers.controller.simulated import AcceptedContour, FaultPlan, SimulatedController, TriggerNotPossible
 from drivers.controller.simulated_faults import Fault, targets_of
 from drivers.controller.simulated_frames import Request
-from tests.soak.faulted_cell import Transport, crossed_line
+from tests.soak.crossed_line import crossed_line
+from tests.soak.faulted_cell import Transport
 from tests.soak.promises import Evidence, Findings, Rings, Taken, judge, logged_contours, micrometres
 from tests.system.processes import Process, combtrace, free_port, jobs, lines
 

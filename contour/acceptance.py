@@ -16,6 +16,7 @@ from contour.polygon import Polygon
 from contour.quality import QualityLimits, lost_in_noise, picture_faults, quality_faults
 from contour.region import Region
 from contour.segments import BoxTree, contains, first_meeting
+from contour.taught_table import TableLimits, TableLook
 from contour.tracing import Trace
 
 # Of two blocks whose areas differ by less than this the larger one is a matter of chance.
@@ -112,6 +113,38 @@ def judge_without_block(picture: NDArray[np.uint8], text: str) -> tuple[Finding,
     """
     faults = picture_faults(picture)
     return (*(_bad_picture(fault) for fault in faults), Finding(Refusal.NO_BLOCK_FOUND, text))
+
+
+def judge_table(look: TableLook, limits: TableLimits) -> tuple[Finding, ...]:
+    """Why the picture cannot be trusted: light or camera are not as they were when the table was taught."""
+    if look.shift_px is not None and look.shift_px > limits.max_shift_px:
+        return (
+            Finding(
+                Refusal.SCENE_MOVED,
+                f"The table's pattern has moved by {look.shift_px:.1f} px since it was taught, at most "
+                f"{limits.max_shift_px:g} px is allowed. If camera or table were moved, calibrate and teach the table "
+                "again.",
+            ),
+        )
+    low, high = limits.gain
+    if not low <= look.gain <= high:
+        return (
+            Finding(
+                Refusal.IMAGE_QUALITY,
+                f"The table's light is {100 * look.gain:.0f} % of what it was when it was taught, {100 * low:.0f} to "
+                f"{100 * high:.0f} % is allowed. Check lamp and exposure, or teach the table again.",
+            ),
+        )
+    if look.rim_share < limits.min_rim_share:
+        return (
+            Finding(
+                Refusal.IMAGE_QUALITY,
+                f"Of the picture's rim {100 * look.rim_share:.0f} % looks as the table was taught, at least "
+                f"{100 * limits.min_rim_share:.0f} % is needed. Clear the table, check that light and camera are as "
+                "they were, or teach the table again.",
+            ),
+        )
+    return ()
 
 
 def _quality(traced: Trace | None, limits: QualityLimits) -> list[Finding]:

@@ -342,6 +342,12 @@ class Recipe(Model):
         return value
 
 
+class Table(Model):
+    """The empty table as `combtrace teach-table` stores it."""
+
+    file: FilePath = Field(description="File of the taught table; used where it is there.")
+
+
 class Service(Model):
     """Where the service keeps its state, and how it queues."""
 
@@ -380,6 +386,7 @@ class Config(Model):
     default_recipe: int = Field(1, ge=1, le=65_535, description="Recipe of a trigger that names none.")
     recipes: tuple[Recipe, ...] = Field((Recipe(number=1, name="default"),), description="Block types.")
     work_area_mm: tuple[Point, ...] = Field((), description="Polygon in the machine frame, mm; empty = not checked.")
+    table: Table | None = Field(None, description="The taught table; none = blocks are told from any table.")
     service: Service = Field(default_factory=Service, description="The service itself.")
     journal: JournalSettings = Field(default_factory=JournalSettings, description="The durable list of jobs.")
     archive: ArchiveSettings = Field(default_factory=ArchiveSettings, description="Where evidence is kept.")

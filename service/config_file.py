@@ -16,6 +16,7 @@ from service.config import Config
 LARGEST_FILE = 1_000_000
 SAMPLES = Path(__file__).parent / "samples"
 PATH_KEYS = (
+    ("table", "file"),
     ("camera", "path"),
     ("camera", "move_to"),
     ("calibration", "file"),

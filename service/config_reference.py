@@ -34,6 +34,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`controller.rs485`", (config.Rs485,)),
     ("`triggers`", (config.IntervalTrigger, config.ControllerTrigger, config.SerialTrigger)),
     ("`recipes`", (config.Recipe,)),
+    ("`table`", (config.Table,)),
     ("`service`", (config.Service,)),
     ("`journal`", (config.JournalSettings,)),
     ("`archive`", (config.ArchiveSettings,)),

@@ -10,17 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.acceptance import Finding, Limits, judge, judge_without_block
+from contour.acceptance import Finding, Limits, judge, judge_table, judge_without_block
 from contour.calibration import Calibration
 from contour.error_budget import ErrorBudget, error_budget
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
 from contour.geometry import Contour, Ring, densified
 from contour.polygon import Polygon, cutting_polygon
 from contour.region import Region
+from contour.taught_table import TableLimits, look_at
 from contour.tracing import Trace, TraceSettings, check_picture, trace
 from service.calibration_guard import CalibrationGuard
 from service.config import Recipe
 from service.reasons import Reason
+from service.table_file import TableRecord
 
 _ROI_STEPS = 12
 
@@ -108,11 +110,13 @@ class Measurer:
         *,
         guard: CalibrationGuard | None = None,
         work_area_mm: Ring | None = None,
+        table: TableRecord | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._calibration = calibration
         self._guard = guard
         self._work_area_mm = work_area_mm
+        self._table = table
         self._clock = clock
 
     @property
@@ -132,7 +136,7 @@ class Measurer:
             aligned=self._calibration is not None and self._calibration.aligned,
         )
         try:
-            result = self._traced(picture, recipe, thickness_mm, result, watch)
+            result = self._traced(picture, recipe, thickness_mm, result, watch, camera)
         except NoBlockFound as error:
             result = replace(result, findings=_told(judge_without_block(picture, str(error))))
         except CalibrationError as error:
@@ -151,12 +155,25 @@ class Measurer:
         thickness_mm: float,
         result: Measurement,
         watch: _Stopwatch,
+        camera: str,
     ) -> Measurement:
         check_picture(picture)
         height, width = picture.shape[:2]
         calibration = self._calibration
         if calibration is not None:
             calibration.check_fits(width, height)
+        if self._table is not None:
+            if camera and self._table.camera not in ("", camera):
+                raise CalibrationError(
+                    f"The table was taught with camera {self._table.camera}, the picture is of {camera}. Use that "
+                    "camera, or teach the table again."
+                )
+            look = look_at(picture, self._table.table)
+            watch.lap("table")
+            changes = judge_table(look, TableLimits())
+            if changes:
+                return replace(result, findings=_told(changes))
+            picture = look.picture
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
         traced: Trace = trace(picture, trace_settings(recipe), region=region, rectifier=rectifier, on_stage=watch.lap)

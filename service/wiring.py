@@ -42,6 +42,7 @@ from service.measure import Measurer
 from service.reasons import Reason
 from service.state import State, StateMachine
 from service.status import status_line
+from service.table_file import TableFileError, TableRecord, load_table
 from service.transfer import TransferCounter, TransferSettings
 from service.triggers import SerialTrigger, interval_trigger
 
@@ -54,6 +55,7 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     """The daemon's parts; raise WiringError. Must be called in the event loop's thread."""
     guard, calibration_fault = find_guard(config)
     camera = make_camera(config)
+    table = find_table(config)
     lock, journal = _make_journal(config)
     link = _make_link(config)
     health = Health(StateMachine(_publisher(link)))
@@ -61,7 +63,9 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     pool = ThreadPoolExecutor(1, "camera")
     cycle = Cycle(
         camera,
-        Measurer(guard.record.calibration if guard else None, guard=guard, work_area_mm=_work_area(config)),
+        Measurer(
+            guard.record.calibration if guard else None, guard=guard, work_area_mm=_work_area(config), table=table
+        ),
         {recipe.number: recipe for recipe in config.recipes},
         journal,
         health,
@@ -227,6 +231,16 @@ def cycle_settings(config: Config) -> CycleSettings:
             poll_period_s=settings.poll_period_s,
         ),
     )
+
+
+def find_table(config: Config) -> TableRecord | None:
+    """The taught table, where there is one; raise WiringError where its file cannot be used."""
+    if config.table is None or not config.table.file.exists():
+        return None
+    try:
+        return load_table(config.table.file)
+    except TableFileError as error:
+        raise WiringError(str(error)) from error
 
 
 def _make_link(config: Config) -> Link | None:

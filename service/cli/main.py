@@ -11,7 +11,7 @@ from service.cli.errors import EXIT_UNUSABLE, UserError
 
 COMMANDS = (
     *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
-    *("board", "calibrate", "align", "verify", "repeat"),
+    *("board", "calibrate", "align", "verify", "repeat", "teach-table"),
     *("probe",),
     *("schema", "reasons", "register-map"),
 )

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from contour.geometry import Contour
     from service.config import Config, Recipe
     from service.measure import Measurement, Measurer
+    from service.table_file import TableRecord
 
 HELP = "trace the contour in pictures"
 DESCRIPTION = """\
@@ -101,7 +102,9 @@ class _Setup:
         if folder:
             _make_folder(overlay)
         return cls(
-            Measurer(guard.record.calibration if guard else None, guard=guard, work_area_mm=work_area),
+            Measurer(
+                guard.record.calibration if guard else None, guard=guard, work_area_mm=work_area, table=_table(config)
+            ),
             recipe,
             thickness_mm,
             overlay,
@@ -248,6 +251,15 @@ def _write_records(path: Path, records: list[dict[str, Any]]) -> None:
         path.write_text("".join(json.dumps(record, ensure_ascii=False) + "\n" for record in records), encoding="utf-8")
     except OSError as error:
         raise UserError(f"--json {path}: cannot be written: {error.strerror}. Name another file") from error
+
+
+def _table(config: Config) -> TableRecord | None:
+    from service.wiring import WiringError, find_table
+
+    try:
+        return find_table(config)
+    except WiringError as error:
+        raise UserError(str(error)) from error
 
 
 def _box(text: str) -> tuple[float, ...]:

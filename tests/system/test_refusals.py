@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 
 from tests.system.cell import SAMPLES, Cell
-from tests.system.processes import until
+from tests.system.processes import combtrace, until
 from tests.system.terminal import Terminal
 
 SERVICE_BLOCK, REJECT_REASON, SETTLED_JOB = 16, 5, 12
@@ -120,3 +121,38 @@ def test_a_reason_is_seen_in_the_fail_line_the_register_and_the_log(
     assert case.words in line
     settled = cell.settled()[-1]
     assert (settled["job_id"], settled["outcome"], settled["reason"]) == (job, "refused", case.code)
+
+
+def test_a_table_that_was_taught_tells_a_moved_camera_and_other_light(tmp_path: Path) -> None:
+    y, x = np.mgrid[:1200, :1600]
+    holes = np.hypot((x + 8) % 60 - 30, y % 60 - 30) < 9
+    table = np.where(holes, 25, 70) + np.random.default_rng(8).normal(0, 1.5, holes.shape)
+    table = np.clip(np.rint(table), 0, 255).astype(np.uint8)
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    cv2.imwrite(str(tmp_path / "empty.png"), table)
+    cv2.imwrite(str(pictures / "1.png"), np.roll(table, (7, 4), axis=(0, 1)))
+    cv2.imwrite(str(pictures / "2.png"), (table * 0.5).astype(np.uint8))
+    cv2.imwrite(str(pictures / "3.png"), table)
+    taught = combtrace("teach-table", tmp_path / "empty.png", "--output", tmp_path / "table.npz")
+    assert taught.returncode == 0, taught.stderr
+    terminal = Terminal()  # a line of its own: the other daemon listens on the other one
+    started = Cell(
+        tmp_path,
+        triggers=f"[{{kind: serial, port: {terminal.name}}}]",
+        trigger_every_s=None,
+        camera=f"{{kind: files, path: {pictures}, loop: true}}",
+        more="table: {file: table.npz}\n",
+    )
+    try:
+        started.ready()
+        for job, code, name in ((1, 103, "scene_moved"), (2, 102, "image_quality"), (3, 110, "no_block_found")):
+            terminal.type(b"TRIG\n")
+            assert terminal.line(30) == f"ACK {job}"
+            assert terminal.line(60) == f"FAIL {job} {code} {name}"
+            until(lambda code=code, job=job: registers(started) == (code, job), what=f"reject_reason {code}")
+            assert f"job {job} refused: {code} {name}: " in started.service.text
+        assert "pattern has moved by 8." in started.service.text
+    finally:
+        started.stop()
+        terminal.close()

@@ -48,7 +48,8 @@ class Refusal(IntEnum):
 class Limits:
     """What a contour must keep to. Limits in millimetres do not apply without a calibration.
 
-    `work_area_mm` is a polygon in the machine frame, None = not checked; `max_uncertainty_mm` None = not checked.
+    `work_area_mm` is a polygon in the machine frame, None = not checked; `max_uncertainty_mm` and
+    `max_disagreement_pitches` None = not checked.
     `pieces` one: no other block may be in view; largest: a smaller one may. `block_share` of the traced block's area
     makes another piece of comb a block, below that it is an offcut.
     """
@@ -59,6 +60,7 @@ class Limits:
     border_px: float = 2.0
     work_area_mm: Ring | None = None
     max_uncertainty_mm: float | None = None
+    max_disagreement_pitches: float | None = None
     pieces: Literal["one", "largest"] = "one"
     block_share: float = 0.04
     quality: QualityLimits = field(default_factory=QualityLimits)
@@ -96,6 +98,7 @@ def judge(
         _touches_border(outlines, frame_size, limits.border_px),
         _goes_on(traced),
         _area(polygon.area_mm2, limits),
+        _disagreement(traced, limits.max_disagreement_pitches),
         _uncertainty(polygon, budget, limits.max_uncertainty_mm),
         _work_area(polygon.millimetres, limits.work_area_mm),
         _several(traced, limits),
@@ -247,6 +250,19 @@ def _area(area_mm2: float | None, limits: Limits) -> Finding | None:
         Refusal.AREA_OUT_OF_LIMITS,
         f"The contour's area is {area_mm2:.0f} mm², the recipe expects {limits.min_area_mm2:.0f} to "
         f"{limits.max_area_mm2:.0f} mm². Check that the block is the recipe's, and the lighting.",
+    )
+
+
+def _disagreement(traced: Trace | None, limit: float | None) -> Finding | None:
+    if traced is None or traced.disagreement is None or limit is None or traced.disagreement.pitches <= limit:
+        return None
+    apart = traced.disagreement
+    what = "takes for block what looks like table" if apart.claimed else "leaves out what looks like block"
+    x, y = apart.place_px
+    return Finding(
+        Refusal.METHODS_DISAGREE,
+        f"The contour {what} near ({x:.0f}, {y:.0f}) px, {apart.pitches:.1f} cells wide, {limit:g} are allowed. "
+        "Look at the overlay; check light and table, and that nothing lies against the block.",
     )
 
 

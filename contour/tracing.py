@@ -12,11 +12,15 @@ from numpy.typing import NDArray
 from contour import binarize, direct_scan, find_contours, sliding_matrix
 from contour.cells import FEWEST_CELLS, Cells
 from contour.comb_likeness import Comb
+from contour.disagreement import Disagreement, disagreement
 from contour.errors import NoBlockFound, ParameterError, PictureError
-from contour.geometry import Contour, oriented_contour
+from contour.geometry import Contour, densified, oriented_contour
 from contour.pieces import Piece, pieces_beside
 from contour.quality import Quality, block_quality
 from contour.region import Region, shifted
+
+# A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
+_BENT_PITCHES = 5.0
 
 Method = Literal["wall-tips", "sliding-matrix", "direct-scan", "find-contours"]
 Polarity = Literal["bright", "dark"]
@@ -55,6 +59,7 @@ class Trace:
 
     `others` are pieces of comb beside it, `quality` says how well its walls are seen, `comb` what a cut block's cells
     look like (None where no method looked). `reaches_frame`: its walls go on to the last pixels of what was looked at.
+    `disagreement` is the widest one with the busy part of the picture, None without a pitch.
     """
 
     method: Method
@@ -66,6 +71,7 @@ class Trace:
     quality: Quality | None = None
     comb: Comb | None = None
     reaches_frame: bool = False
+    disagreement: Disagreement | None = None
 
 
 def trace(
@@ -94,12 +100,25 @@ def trace(
     # As seen is y up: counter-clockwise then is clockwise by the formula, whose y runs down in pixels.
     contour = oriented_contour(found.contour, counter_clockwise=False)
     quality = block_quality(picture, contour, found.pitch_px)
+    apart = None
+    if found.pitch_px is not None:
+        apart = disagreement(picture, _bent(contour, found, rectifier), found.pitch_px)
     on_stage("quality")
     if region is not None:
         x, y = first.astype(int).tolist()
         contour = shifted(contour, first)
         found = replace(found, others=tuple(piece.moved(x, y) for piece in found.others))
-    return replace(found, contour=contour, quality=quality)
+        apart = None if apart is None else apart.moved(x, y)
+    return replace(found, contour=contour, quality=quality, disagreement=apart)
+
+
+def _bent(contour: Contour, found: Trace, rectifier: Rectifier | None) -> Contour:
+    """The contour with vertices every few cells, on the curves that a lens makes of its straight edges."""
+    if rectifier is None or found.method != "wall-tips" or found.pitch_px is None:
+        return contour
+    step = _BENT_PITCHES * found.pitch_px
+    exterior, *holes = (rectifier.unrectify(densified(rectifier.rectify(ring), step)) for ring in contour.rings)
+    return Contour(exterior, tuple(holes))
 
 
 @dataclass(frozen=True)

@@ -287,6 +287,13 @@ class Recipe(Model):
     max_uncertainty_mm: float = Field(
         0, ge=0, le=1000, description="Largest accepted 95 % bound on the contour's position, mm; 0 = not checked."
     )
+    max_disagreement_pitches: float = Field(
+        2.0,
+        ge=0,
+        le=1000,
+        description="Widest place where the contour may differ from the busy part of the picture, cell pitches; "
+        "0 = not checked.",
+    )
     max_vertices: int = Field(4000, ge=3, le=1_000_000, description="Most vertices of all rings together.")
     min_area_mm2: float = Field(100, ge=0, le=4e9, description="Smallest accepted area, mm², holes taken off.")
     max_area_mm2: float = Field(4_000_000, gt=0, le=4e9, description="Largest accepted area, mm², holes taken off.")

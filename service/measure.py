@@ -236,6 +236,7 @@ class Measurer:
             work_area_mm=self._work_area_mm,
             pieces=recipe.pieces,
             max_uncertainty_mm=recipe.max_uncertainty_mm or None,
+            max_disagreement_pitches=recipe.max_disagreement_pitches or None,
         )
 
 

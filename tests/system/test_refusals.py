@@ -56,11 +56,25 @@ CASES = (
     Provoked(shifted(-400, 0), "", 111, "touches_border", "left edge"),
     Provoked(SAMPLE, "roi_px: [500, 0, 1599, 1199]", 111, "touches_border", "region of interest"),
     Provoked(SAMPLE, "min_area_mm2: 90000", 112, "area_out_of_limits", "expects 90000 to"),
+    Provoked(
+        SAMPLE,
+        "method: sliding-matrix, parameters: {core_px: 80, threshold: 30}",
+        113,
+        "methods_disagree",
+        "cells wide, 2 are",
+    ),
+    Provoked(SAMPLE, "max_uncertainty_mm: 0.05", 114, "uncertainty_too_large", "mm only (picture 0."),
     Provoked(SAMPLE, "method: sliding-matrix, max_uncertainty_mm: 0.5", 114, "uncertainty_too_large", "0.5 mm"),
     Provoked(shifted(90, 0), "", 115, "outside_work_area", "leaves the work area"),
     Provoked(two_blocks(), "", 116, "several_blocks", "Beside the traced block"),
     Provoked(SAMPLE, "max_vertices: 3", 130, "too_many_points", "the recipe allows 3"),
-    Provoked(SAMPLE, "method: find-contours, max_vertices: 100000", 131, "self_intersecting", "meets itself"),
+    Provoked(
+        SAMPLE,
+        "method: find-contours, max_disagreement_pitches: 0, max_vertices: 100000",
+        131,
+        "self_intersecting",
+        "meets itself",
+    ),
     Provoked(SAMPLE[:, :1500], "", 141, "calibration_mismatch", "1500 x 1200 px"),
 )
 WORK_AREA = "work_area_mm: [[100, 60], [500, 60], [500, 390], [100, 390]]"

@@ -42,7 +42,10 @@ class Controller(Protocol):
         """True while requests can be tried."""
 
     async def connect(self) -> None:
-        """Open a new connection, closing an old one first; raise ControllerUnavailable."""
+        """Open a new connection, closing an old one first; raise ControllerUnavailable.
+
+        It returns when no reply to a request on an earlier connection can be taken for one on this.
+        """
 
     async def close(self) -> None:
         """Close the connection; never raises."""

@@ -113,8 +113,6 @@ class Connection:
             if exchange is self._under_way:
                 what = f"{exchange.request} was cancelled on its way, its reply may still come"
                 self.end(ControllerUnavailable(f"{self.name}: {what}"))
-            elif exchange in self._turns:
-                self._turns.remove(exchange)
             raise
 
     async def wait_out(self, silence_s: float, longest_s: float) -> None:
@@ -139,6 +137,8 @@ class Connection:
 
     def _send_next(self) -> None:
         """Send the request whose turn it is, once the line has been silent; nothing while one is under way."""
+        while self._turns and self._turns[0].done.done():  # cancelled in the queue
+            self._turns.popleft()
         if self._under_way is not None or not self._turns or self.fault is not None:
             return
         now = self._loop.time()

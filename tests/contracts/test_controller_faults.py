@@ -400,14 +400,16 @@ async def test_a_request_cancelled_in_the_queue_leaves_the_one_before_it_alone(
     controller = await connect()
     first = asyncio.create_task(controller.read_link())
     await until(server.asked)
-    second = asyncio.create_task(controller.read_link())
+    second = asyncio.create_task(controller.write_transfer(7))
+    third = asyncio.create_task(controller.read_link())
     await asyncio.sleep(0)
     second.cancel()
     with pytest.raises(asyncio.CancelledError):
         await second
     release.set()
-    assert (await first).session == 3
+    assert (await first).session == (await third).session == 3
     assert controller.connected
+    assert [request[7] for request in server.requests] == [3, 3]
 
 
 @pytest.mark.parametrize("first", ["the cancellation", "the reply"])

@@ -118,12 +118,13 @@ class Journal:
         self,
         path: Path,
         *,
-        first_job: int = 1,
+        above: int = 0,
+        otherwise_from: int = 1,
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
     ) -> None:
-        """first_job: the lowest number that a new journal gives; one that is there already keeps its own."""
+        """above, otherwise_from: for a new journal, the highest number that is known, or where to begin without one."""
         self._path = path
-        self._first_job = first_job
+        self._begin = (above, otherwise_from)
         self._now = now
         self._lock = threading.Lock()
         with self._translated():
@@ -143,7 +144,7 @@ class Journal:
         if version == 0:
             self._db.executescript(
                 f"BEGIN IMMEDIATE; {SCHEMA} INSERT INTO meta VALUES ('owner', '{1 + secrets.randbelow(0xFFFF)}');"
-                f" INSERT INTO meta VALUES ('first_job', '{self._first_job}');"
+                f" INSERT INTO meta VALUES ('above', '{self._begin[0]}'), ('otherwise_from', '{self._begin[1]}');"
                 f" PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;"
             )
         elif version != SCHEMA_VERSION:
@@ -205,9 +206,9 @@ class Journal:
         taken_at = self._stamp()
         with self._transaction() as db:
             highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
-            job_id = max(highest, above, self._number("adopted_job")) + 1
+            job_id = max(highest, above, self._number("above"), self._number("adopted_job")) + 1
             if job_id == 1:  # nothing is known of any job of before
-                job_id = self._number("first_job") or 1
+                job_id = self._number("otherwise_from") or 1
             if job_id > LARGEST_JOB:
                 raise JournalError(
                     f"{self._path}: {job_id - 1} was the last number that a register can hold. Move it away"

@@ -47,11 +47,13 @@ def open_journal(
     if ran_before and not alarm:
         alarm = f"{path}: the journal is lost: the service ran here before. Look jobs in flight up at the controller. "
     highest = max([highest_archived(archive), *map(highest_job, set_aside(path))])
-    first = highest + 1 if highest or not alarm else int(now())
-    journal = Journal(path, first_job=min(first, LARGEST_JOB))
+    otherwise_from = int(now()) if alarm else 1
+    journal = Journal(path, above=highest, otherwise_from=otherwise_from)
     if kept is not None:
         alarm += _restore(kept, journal)
-    text = f"a new journal: jobs from {first} on, or above the controller's last_job"
+    text = (
+        f"a new journal: jobs from {highest + 1 if highest else otherwise_from} on, or above the controller's last_job"
+    )
     log.log(logging.CRITICAL if alarm else logging.INFO, "%s%s: %s", alarm, path, text)
     return journal
 

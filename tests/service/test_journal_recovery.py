@@ -72,6 +72,17 @@ def test_a_lost_journal_goes_on_above_the_controllers_last_job(tmp_path: Path) -
     journal.close()
 
 
+def test_what_was_moved_aside_counts_also_where_the_controller_knows_less(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 60)
+    content = bytearray(path.read_bytes())
+    content[:100] = bytes(100)
+    path.write_bytes(content)
+    journal = reopened(path)
+    assert journal.take(TriggerStamp("serial"), above=5).job_id == 62
+    journal.close()
+
+
 def test_a_lost_journal_goes_on_above_the_archive(tmp_path: Path) -> None:
     for name in ("17", "18.json", "notes.txt", "0", "99999999999"):
         (tmp_path / "archive" / "2026" / name).mkdir(parents=True)

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera bench-camera bench bench-link accuracy refusals soak hil check format clean
+.PHONY: install demo test test-camera bench-camera bench bench-link accuracy refusals rules soak hil check format clean
 
 install: $(STAMP)
 
@@ -35,6 +35,10 @@ bench-link: install
 
 accuracy: install
 	$(BIN)/python -m benchmarks.bench --random 300 --first 920000 --write
+
+# Each rule of the protocol taken out of a copy of the code: its test must fail then. Some minutes.
+rules: install
+	$(BIN)/python -m tests.rules.mutate
 
 # Hours of campaigns under faults and kills; resumes where it was broken off. Options: make soak SOAK='--fresh --workers 4'
 soak: install

@@ -59,6 +59,21 @@ async def test_after_a_lost_commit_reply_the_answer_is_looked_for_before_anythin
     assert controller.count("commit") == 1
 
 
+async def test_after_a_lost_commit_reply_a_slow_answer_is_waited_for() -> None:
+    """The commit may have been done: sending the page again would only be right after ack_timeout."""
+    controller = ScriptedController([None])
+    controller.faults["commit"] = ["reply"]
+
+    def answer_later() -> None:
+        accepted = replace(controller.link, last_job=JOB, last_result=1, ack_result=1, ack_transfer=controller.transfer)
+        asyncio.get_running_loop().call_later(0.3, lambda: setattr(controller, "link", accepted))
+
+    controller.before_commit = answer_later
+    async with transferring(controller, replace(QUICK, ack_timeout_s=5)) as run:
+        assert await run.end() == Settlement(Outcome.ACCEPTED)
+    assert (controller.count("clear"), controller.count("commit")) == (1, 1)
+
+
 async def test_every_attempt_commits_a_new_value_that_is_neither_0_nor_the_one_last_answered() -> None:
     controller = ScriptedController([Answer.BAD_CRC, None, Answer.ACCEPTED])
     async with transferring(controller) as run:

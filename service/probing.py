@@ -25,6 +25,7 @@ from drivers.controller.requests import (
     read_registers,
     registers_of,
     stream_of,
+    write_register,
     write_registers,
 )
 from service.link_signature import Registers, Signature, from_echo, from_movement
@@ -79,11 +80,15 @@ class Probe:
         readable = await self._readable(longest_read)
         yield self._window("readable", readable)
         yield self._moving(await self._movement())
-        if write and readable >= HEADER and served:
+        if not write:
+            return
+        if readable < HEADER or not served:
+            yield Finding("writing", False, "not tried: the service block or the contour block cannot be read")
+        elif self._renumbered:  # a neighbour's register would be written
+            yield Finding("writing", False, "not tried: change the addresses, then probe again")
+        else:
             async for finding in self._written(longest_read, readable):
                 yield finding
-        elif write:
-            yield Finding("writing", False, "not tried: the service block or the contour block cannot be read")
 
     # --- reading ------------------------------------------------------------------------------------------------
 
@@ -212,6 +217,11 @@ class Probe:
         order = f", 32-bit values are {way.word_order}" if way.word_order else ""
         return Finding(part, True, f"it {verb} where it should{order}")
 
+    @property
+    def _renumbered(self) -> bool:
+        """True where the controller was seen to number registers otherwise than configured."""
+        return "contour_address" in self.changes
+
     def _shifted(self, shift: int) -> str:
         """What another numbering asks to be changed, and in words."""
         addresses = {name: first + shift for name, (first, _) in self.layout.blocks.items()}
@@ -232,14 +242,18 @@ class Probe:
         layout = self.layout
         held = await self._held(longest_read, readable)
         served = await self._reads(read_registers(layout.service_address, BLOCK_REGISTERS))
+        longest_write, as_before = 1, False
         try:
-            await self.controller.write_transfer(0)
-            longest_write = await self._longest_write(readable)
-            yield self._longest("write", longest_write, LONGEST_WRITE)
-            yield self._window("writable", await self._writable(longest_write, longest_read, readable))
             yield await self._echo()
+            if not self._renumbered:
+                await self.controller.write_transfer(0)
+                longest_write = await self._longest_write(longest_read, readable)
+                yield self._longest("write", longest_write, LONGEST_WRITE)
+                yield self._window("writable", await self._writable(longest_write, longest_read, readable))
         finally:
-            await self._put_back(held, served)
+            as_before = await self._put_back(held, served, min(longest_write, longest_read))
+        if not as_before:
+            yield Finding("put back", False, "the contour block does not read as it did before. It is not committed")
 
     async def _obstacle(self) -> str | None:
         """Why nothing may be written now; None where it may."""
@@ -263,9 +277,9 @@ class Probe:
             registers += await self._reads(read_registers(self.layout.contour_address + 1 + start, count))
         return registers
 
-    async def _longest_write(self, readable: int) -> int:
+    async def _longest_write(self, longest_read: int, readable: int) -> int:
         most = min(LONGEST_WRITE, readable - 1)
-        return await self._largest(most, lambda count: self._writes(1, _pattern(count, 1), LONGEST_READ))
+        return await self._largest(most, lambda count: self._writes(1, _pattern(count, 1), longest_read))
 
     async def _writable(self, longest_write: int, longest_read: int, readable: int) -> int:
         """Registers of the contour block that read back as they were written, from its first on."""
@@ -313,15 +327,15 @@ class Probe:
             return Finding("test_echo", False, f"{text}. Check that the controller's program runs and computes it")
         return self._judged("test_echo", ways[0], "is computed")
 
-    async def _put_back(self, held: tuple[int, ...], served: tuple[int, ...]) -> None:
-        """What stood there before; `transfer` stays 0."""
-        if not self.controller.connected:
-            await self.controller.connect()
-        await self.controller.write_transfer(0)
-        limit = int(str(self.changes.get("longest_write", LONGEST_WRITE)))
-        for start, count in _pieces(len(held), limit):
-            await self._writes(1 + start, held[start : start + count], LONGEST_READ)
+    async def _put_back(self, held: tuple[int, ...], served: tuple[int, ...], longest: int) -> bool:
+        """Write what stood there before, `transfer` stays 0; True where it reads back so."""
+        alike = True
+        if not self._renumbered:
+            await self._run(write_register(self.layout.contour_address, 0))
+            for start, count in _pieces(len(held), longest):
+                alike = await self._writes(1 + start, held[start : start + count], longest) and alike
         await self._run(write_registers(self.layout.service_address, stream_of(served)))
+        return alike
 
 
 def _pieces(length: int, longest: int) -> Iterator[tuple[int, int]]:

@@ -16,11 +16,14 @@ FIRST_CLOCK = 70_000  # the higher half is not 0, as after a minute
 
 
 @contextlib.asynccontextmanager
-async def program(port: int, shift: int = 0, word_order: str = "big") -> AsyncIterator[None]:
-    """It runs on the server on loopback's `port`, its blocks `shift` registers higher than the protocol's default."""
+async def program(port: int, shift: int = 0, word_order: str = "big", *, alive: bool = True) -> AsyncIterator[None]:
+    """It runs on the server on loopback's `port`, its blocks `shift` registers higher than the protocol's default.
+
+    alive: False for one that has forgotten heartbeat and clock.
+    """
     client = ModbusTcpController("127.0.0.1", port, timeout_s=30)
     await client.connect()
-    scanning = asyncio.create_task(_scan_for_ever(client, shift, word_order))
+    scanning = asyncio.create_task(_scan_for_ever(client, shift, word_order, alive))
     try:
         yield
     finally:
@@ -30,10 +33,10 @@ async def program(port: int, shift: int = 0, word_order: str = "big") -> AsyncIt
         await client.close()
 
 
-async def _scan_for_ever(client: ModbusTcpController, shift: int, word_order: str) -> None:
+async def _scan_for_ever(client: ModbusTcpController, shift: int, word_order: str, alive: bool) -> None:
     beat = 0
     while True:
-        beat = (beat + 1) & 0xFFFF
+        beat = (beat + alive) & 0xFFFF
         (reply,) = await client.run([read_registers(SERVICE + shift, 16)])
         test_value = u32_from(registers_of(reply)[8:10], word_order)
         link = [0] * 16

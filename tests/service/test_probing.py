@@ -89,8 +89,11 @@ async def test_another_numbering_and_another_order_of_words_are_told(
     if order == "little":
         expected["word_order"] = "little"
     assert probe.changes == expected
-    parts = ("heartbeat", "test_echo") if write else ("heartbeat",)
+    parts = ("heartbeat", "test_echo") if write and not shift else ("heartbeat",)
     assert [findings[part].well for part in parts] == [not expected] * len(parts)
+    if shift:
+        assert "test_echo" not in findings
+        assert write == ("writing" in findings)
 
 
 async def test_a_numbering_below_0_is_told_in_words(client: ModbusTcpController) -> None:
@@ -114,6 +117,21 @@ async def test_a_contour_block_that_is_not_there_is_told() -> None:
     assert "Set contour_address" in findings["readable"].text
     assert "not tried" in findings["writing"].text
     assert "payload_capacity" not in probe.changes
+
+
+@pytest.mark.parametrize("shift", [0, 1, -1])
+@pytest.mark.parametrize("order", ["big", "little"])
+async def test_a_program_whose_heartbeat_stands_still_is_told_by_test_echo(
+    client: ModbusTcpController, shift: int, order: str
+) -> None:
+    layout = MailboxLayout(100, 116, 132)
+    async with program(port_of(client), 100 + shift, order, alive=False):
+        findings, probe = await probed(port_of(client), layout)
+    assert not findings["heartbeat"].well
+    assert findings["test_echo"].well == (shift == 0 and order == "big")
+    assert probe.changes.get("link_address", 100) == 100 + shift
+    assert probe.changes.get("word_order", "big") == order
+    assert ("writable" in findings) == (shift == 0)
 
 
 async def test_what_stood_there_is_put_back_and_nothing_else_is_touched(client: ModbusTcpController) -> None:

@@ -44,7 +44,8 @@ async def test_it_says_what_to_change(tmp_path: Path, server: str, shift: int, o
     told = [line.strip() for line in said.stdout.splitlines() if line.startswith("  ")]
     assert told == changes
     assert ("FAULT" in said.stdout) == bool(changes)
-    for part in ("round trip", "longest read", "longest write", "writable", "test_echo", "heartbeat"):
+    written = ("writing",) if shift else ("longest write", "writable", "test_echo")
+    for part in ("round trip", "longest read", "readable", "heartbeat", *written):
         assert f" {part} " in said.stdout
 
 

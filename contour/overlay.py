@@ -30,6 +30,9 @@ _FRACTION_BITS = 4
 _UNIT_PX = 800
 """Line widths and letters are made for a picture this wide and grow with it."""
 
+_VEIL = 0.35
+"""Share of the veil's colour over what the contour may be off by."""
+
 _MOST_MARKS = 400
 """More vertices than this are a line of dots: they are left out."""
 
@@ -41,11 +44,13 @@ def draw_overlay(
     caption: Sequence[str] = (),
     refused: bool = False,
     marks: bool = True,
+    uncertainty_px: float | None = None,
 ) -> Picture:
     """The picture as BGR, shape (H, W, 3), with the contour, its vertices and lines of text; the input stays as it is.
 
     Exterior green, or red where `refused`, holes blue, vertices yellow (without `marks` none). The first caption line
-    is the largest. Raises PictureError.
+    is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. Raises
+    PictureError.
     """
     check_picture(picture)
     canvas = _cv.bgr(picture)
@@ -53,6 +58,8 @@ def draw_overlay(
     text = _Caption.fitted(caption, canvas.shape[1], unit)
     text.darken(canvas)
     if contour_px is not None:
+        if uncertainty_px is not None:
+            _draw_band(canvas, contour_px, uncertainty_px, unit)
         for hole in contour_px.holes:
             _draw_ring(canvas, hole, HOLE, unit)
         _draw_ring(canvas, contour_px.exterior, REFUSED if refused else ACCEPTED, unit)
@@ -70,10 +77,27 @@ def _fixed_point(points: NDArray[np.float64]) -> NDArray[np.int32]:
 
 def _draw_ring(canvas: Picture, ring: Ring, colour: Colour, unit: float) -> None:
     points = _fixed_point(ring).reshape(-1, 1, 2)
-    width = max(round(1.5 * unit), 1)
+    width = _line_width(unit)
     # A dark line below keeps the colour visible on bright walls.
     for tone, thickness in (((0, 0, 0), width + 2), (colour, width)):
         cv2.polylines(canvas, [points], True, tone, thickness, cv2.LINE_AA, _FRACTION_BITS)
+
+
+def _draw_band(canvas: Picture, contour_px: Contour, half_px: float, unit: float) -> None:
+    width = round(2.0 * half_px)
+    if width <= _line_width(unit) + 2:
+        return
+    band = np.zeros(canvas.shape[:2], np.uint8)
+    for ring in contour_px.rings:
+        cv2.polylines(
+            band, [_fixed_point(ring).reshape(-1, 1, 2)], True, 255, min(width, 255), cv2.LINE_8, _FRACTION_BITS
+        )
+    inside = band > 0
+    canvas[inside] = (canvas[inside] * (1.0 - _VEIL) + np.array(VERTEX) * _VEIL).astype(np.uint8)
+
+
+def _line_width(unit: float) -> int:
+    return max(round(1.5 * unit), 1)
 
 
 def _mark_vertices(canvas: Picture, ring: Ring, unit: float) -> None:

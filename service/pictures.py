@@ -19,7 +19,13 @@ class PictureFileError(Exception):
 def write_overlay(path: Path, picture: NDArray[np.uint8], measurement: Measurement) -> None:
     """Write the picture with the contour over it; the format follows the ending. Raise PictureFileError."""
     refused = bool(measurement.findings)
-    drawn = draw_overlay(picture, measurement.pixels, caption=caption(measurement), refused=refused)
+    drawn = draw_overlay(
+        picture,
+        measurement.pixels,
+        caption=caption(measurement),
+        refused=refused,
+        uncertainty_px=measurement.uncertainty_px,
+    )
     write_picture(path, drawn)
 
 
@@ -48,4 +54,8 @@ def caption(measurement: Measurement) -> list[str]:
     if measurement.area_mm2 is not None and measurement.size_mm is not None:
         width, height = measurement.size_mm
         found += f", {measurement.area_mm2:.0f} mm2, {width:.1f} x {height:.1f} mm"
+    if measurement.uncertainty_mm is not None:
+        found += f", within {measurement.uncertainty_mm:.2f} mm"
+    elif measurement.uncertainty_px is not None:
+        found += f", within {measurement.uncertainty_px:.1f} px"
     return [verdict, found]

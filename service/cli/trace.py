@@ -188,6 +188,10 @@ def _sentence(measurement: Measurement) -> str:
         text += f", {measurement.area_mm2:.0f} mm², {size[0]:.1f} x {size[1]:.1f} mm"
     else:
         text += f", {measurement.area_px2:.0f} px²"
+    if measurement.uncertainty_mm is not None:
+        text += f", within {measurement.uncertainty_mm:.2f} mm"
+    elif measurement.uncertainty_px is not None:
+        text += f", within {measurement.uncertainty_px:.2f} px"
     return f"{text}, {measurement.timings_ms['total']:.0f} ms"
 
 

@@ -83,3 +83,12 @@ def test_thousands_of_vertices_are_drawn_as_a_line_without_marks() -> None:
 def test_an_array_that_is_no_picture_is_refused() -> None:
     with pytest.raises(PictureError):
         draw_overlay(np.zeros((5, 5), np.uint16), None)
+
+
+def test_a_veil_covers_what_the_contour_may_be_off_by_where_it_is_wider_than_the_line() -> None:
+    grey = np.full((600, 800), 100, np.uint8)
+    plain, narrow, wide = (draw_overlay(grey, OUTLINE, marks=False, uncertainty_px=px) for px in (None, 0.5, 12.0))
+    np.testing.assert_array_equal(narrow, plain)
+    assert near(plain, 400, 160, (100, 100, 100), reach=0)
+    assert near(wide, 400, 160, tuple(round(0.65 * 100 + 0.35 * part) for part in VERTEX), reach=0)
+    assert near(wide, 400, 175, (100, 100, 100), reach=0)

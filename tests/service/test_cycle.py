@@ -14,6 +14,7 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
+from contour.error_budget import ErrorBudget
 from contour.errors import ParameterError, PictureError
 from contour.geometry import Contour, area
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable, SceneMoved
@@ -133,6 +134,15 @@ async def test_a_good_job_is_accepted_and_its_page_says_what_the_protocol_says(t
         assert built.plan.calls == [(2, 25.0)], "the controller's thickness goes before the recipe's"
         assert job.report["vertices"] == 4
         assert job.report["transfer_ms"] > 0
+
+
+async def test_how_sure_a_contour_is_goes_to_the_register_and_to_the_journal(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        built.plan.result = measured(uncertainty=ErrorBudget(picture_mm=0.3, thickness_mm=0.4, calibration_mm=1.2))
+        job = await built.job()
+        (page,) = built.controller.accepted
+        assert decoded(page).header.uncertainty == 1300
+        assert job.report["uncertainty_mm"] == 1.3
 
 
 async def test_captured_at_was_read_before_the_exposure(tmp_path: Path) -> None:

@@ -158,8 +158,9 @@ def _tiles(picture: Picture, exterior: Ring, pitch: float) -> Picture:
 
 def _tails(light: Picture) -> tuple[Floats, Floats]:
     """Grey levels that _TAIL of each tile lies below and above, shape (N,) each."""
-    ordered = np.sort(light.reshape(len(light), -1), axis=1)
-    cut = max(1, round(_TAIL * ordered.shape[1]))
+    flat = light.reshape(len(light), -1)
+    cut = max(1, round(_TAIL * flat.shape[1]))
+    ordered = np.partition(flat, (cut, flat.shape[1] - 1 - cut), axis=1)
     return ordered[:, cut].astype(np.float32), ordered[:, -1 - cut].astype(np.float32)
 
 
@@ -169,7 +170,8 @@ def _noise(light: Picture) -> float:
     bent = part[:, :, :-2] - 2 * part[:, :, 1:-1] + part[:, :, 2:]
     second = np.abs(bent[:, :-2] - 2 * bent[:, 1:-1] + bent[:, 2:])
     # Differences are whole numbers: a fifth of them at 0 says no more than "below one".
-    return float((np.quantile(second, 0.2) + 0.5) / _SECOND_OF_NOISE)
+    fifth = np.partition(second.ravel(), second.size // 5)[second.size // 5]
+    return float((fifth + 0.5) / _SECOND_OF_NOISE)
 
 
 def _blur_px(light: Picture, contrast: Floats, noise: float) -> float:
@@ -182,8 +184,9 @@ def _blur_px(light: Picture, contrast: Floats, noise: float) -> float:
     dy = 0.5 * (smooth[:, 2:, 1:-1] - smooth[:, :-2, 1:-1])
     worst = 0.0
     for rise in (dx, dy, (dx + dy) * np.float32(0.7071), (dx - dy) * np.float32(0.7071)):
-        ordered = np.sort(np.abs(rise).reshape(len(rise), -1), axis=1)
-        steepest = ordered[:, -1 - max(1, ordered.shape[1] // 100)]
+        flat = np.abs(rise).reshape(len(rise), -1)
+        place = flat.shape[1] - 1 - max(1, flat.shape[1] // 100)
+        steepest = np.partition(flat, place, axis=1)[:, place]
         # Of noise alone the steepest hundredth is 2.6 of its deviations, a quarter of a pixel's after the smoothing.
         clean = np.sqrt(np.maximum(steepest**2 - (0.65 * noise) ** 2, 1e-6))
         worst = max(worst, float(np.median(_STEEPEST * contrast / clean)))

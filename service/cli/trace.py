@@ -53,6 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--overlay", type=Path, metavar="FILE", help="picture with contour; a folder for several images"
     )
+    parser.add_argument(
+        "--language", choices=("en", "ru"), default="en", help="ru: each reason also in Russian, with what to do"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -82,6 +85,7 @@ class _Setup:
     thickness_mm: float
     overlay: Path | None
     overlay_is_folder: bool
+    language: str
 
     @classmethod
     def of(cls, args: argparse.Namespace) -> _Setup:
@@ -109,6 +113,7 @@ class _Setup:
             thickness_mm,
             overlay,
             folder,
+            args.language,
         )
 
     def overlay_for(self, image: Path) -> Path | None:
@@ -173,10 +178,15 @@ def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
         _write_overlay(overlay, picture, measurement)
         note = f"  [{overlay}]"
     status = EXIT_REFUSED if measurement.findings else EXIT_OK
-    return _record(image, measurement), f"{image}: {_sentence(measurement)}{note}", status
+    return _record(image, measurement), f"{image}: {_sentence(measurement, setup.language)}{note}", status
 
 
-def _sentence(measurement: Measurement) -> str:
+def _sentence(measurement: Measurement, language: str) -> str:
+    from service.reasons import Language
+
+    if measurement.findings and language == Language.RUSSIAN:
+        told = (f"{int(code)} {code.label}: {code.explained(Language.RUSSIAN)}" for code in measurement.reasons)
+        return "отказ: " + "; ".join(told) + " [" + "; ".join(measurement.texts) + "]"
     if measurement.findings:
         return "refused: " + "; ".join(f"{int(code)} {code.label}: {text}" for code, text in measurement.findings)
     assert measurement.pixels is not None

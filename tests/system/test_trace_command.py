@@ -276,3 +276,11 @@ def test_a_region_of_interest_hides_what_lies_outside() -> None:
     assert "region of interest" in cut["details"][0]
     for wrong in ("1,2,3", "9,9,1,1"):
         assert combtrace("trace", f"--roi-px={wrong}", RECTANGLE).returncode == 2
+
+
+def test_a_refusal_is_told_in_russian_with_what_was_measured(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "black.png"), np.zeros((200, 300), np.uint8))
+    told = combtrace("trace", "--language", "ru", tmp_path / "black.png")
+    assert told.returncode == 3
+    assert "отказ: 102 image_quality: Снимок нерезкий" in told.stdout
+    assert "brightest parts reach 0 of 255" in told.stdout

@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, ParameterError
-from contour.geometry import Contour, Ring
+from contour.evidence_check import check_against_evidence
+from contour.geometry import Contour
 from contour.material_edge import material_edge
 from contour.outline_fit import FittedRing, fit_ring
 from contour.pieces import pieces_beside
-from contour.ring_depth import depth_inside
 from contour.tracing import OnStage, Rectifier, Trace, TraceSettings
 from contour.uncertainty import uncertainty
 from contour.wall_cells import probe
-from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
+from contour.wall_evidence import BlockEvidence, RingEvidence
 from contour.wall_light import wall_light
 from contour.wall_mask import wall_mask
 from contour.wall_witnesses import see_block
@@ -24,7 +24,6 @@ __all__ = ["see_block", "wall_tips"]
 _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
-_FAR_OFF_PITCHES = 0.5
 
 
 def wall_tips(
@@ -51,7 +50,7 @@ def wall_tips(
         return _cut_off(picture, seen, on_stage)
     rings = [_fitted(ring, seen, rectifier) for ring in seen.rings]
     for evidence, ring in zip(seen.rings, rings, strict=True):
-        _check_against_evidence(evidence, ring.ring, seen.pitch_px)
+        check_against_evidence(evidence, ring.ring, seen.pitch_px, rectifier)
     exterior = rings[0]
     if exterior.unseen_share > _MOST_UNSEEN:
         raise NoBlockFound(
@@ -109,19 +108,3 @@ def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None
             "Check focus and light"
         )
     return fit_ring(ring, pitch_px=seen.pitch_px, wall_px=seen.wall_px, rectifier=rectifier)
-
-
-def _check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float) -> None:
-    """Raise NoBlockFound where the ring passes several wall ends in a row far off on one side."""
-    ends = evidence.kind != WitnessKind.OUTERMOST
-    depth = depth_inside(ring, evidence.points)
-    # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
-    inside, outside = depth > _FAR_OFF_PITCHES * pitch, (depth < -_FAR_OFF_PITCHES * pitch)[ends]
-    for off, points in ((inside, evidence.points), (outside, evidence.points[ends])):
-        in_a_row = off & np.roll(off, 1) & np.roll(off, 2) & np.roll(off, 3)
-        if in_a_row.any():
-            x, y = points[np.argmax(in_a_row)]
-            raise NoBlockFound(
-                f"no block found: the outline that fits most wall ends passes those near ({x:.0f}, {y:.0f}) px by more "
-                "than half a cell. Check that nothing lies against the block, and that its edge is in focus"
-            )

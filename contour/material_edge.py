@@ -114,12 +114,22 @@ def _closed(material: Gray, gap: float) -> Gray:
 
 
 def _leaking_cells(material: Gray, pitch: float) -> Gray:
-    """Cells that only a broken or faint wall opens to the table: enclosed once gaps as long as a wall are closed."""
-    free = 1 - _closed(material, _WALL_PITCHES * pitch)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(free, connectivity=4)
+    """Cells that only a broken or faint wall opens to the table, up to the line across the gap.
+
+    Where walls are grown by half a gap, such cells lie apart from the table; what is nearer to a cell's rest than to
+    the table's is the cell.
+    """
+    away = cv2.distanceTransform(1 - material, cv2.DIST_L2, 5)
+    seeds = (away > 0.5 * _WALL_PITCHES * pitch).astype(np.uint8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=4)
     cell = stats[:, cv2.CC_STAT_AREA] < _CELL_AREA * pitch * pitch
     cell[0] = False
-    return np.asarray(cell[labels], np.uint8)
+    if not cell.any():
+        return np.zeros_like(material)
+    _, nearest = cv2.distanceTransformWithLabels(1 - seeds, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
+    of_cell = np.zeros(int(nearest.max()) + 1, np.uint8)
+    of_cell[nearest[cell[labels]]] = 1
+    return np.asarray(of_cell[nearest] & (material == 0), np.uint8)
 
 
 def _sub_pixel(difference: Gray, chain: Points) -> Ring:

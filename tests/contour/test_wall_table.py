@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from contour.coarse_block import coarse_block
+from contour.geometry import signed_area
+from contour.material_edge import material_edge
 from contour.wall_mask import wall_mask
 
 
@@ -45,7 +47,7 @@ def test_an_opening_behind_a_broken_strand_of_walls_is_a_hole() -> None:
     light[63:140, 240:320] = 5
     light[85:105, 318:326] = 5
     mask = np.where(light > 45, np.uint8(255), np.uint8(0))
-    rings = coarse_block(mask, light, 20.0, 3.0).rings
+    rings = coarse_block(mask, light, 20.0).rings
     assert [ring.is_hole for ring in rings] == [False, True]
 
 
@@ -53,17 +55,29 @@ def test_an_opening_with_a_wide_way_out_is_a_bay() -> None:
     light, _ = comb(5.0)
     light[63:140, 240:330] = 5
     mask = np.where(light > 45, np.uint8(255), np.uint8(0))
-    rings = coarse_block(mask, light, 20.0, 3.0).rings
+    rings = coarse_block(mask, light, 20.0).rings
     assert [ring.is_hole for ring in rings] == [False]
 
 
 def test_dust_that_encloses_table_makes_no_hole() -> None:
     light, _ = comb(5.0)
     mask = np.where(light > 45, np.uint8(255), np.uint8(0))
-    alone = coarse_block(mask, light, 20.0, 3.0).rings
+    alone = coarse_block(mask, light, 20.0).rings
     # Specks closer than a cell, from one side of the block to another, around half a dozen cells of table.
     for x, y in [(160, 50), (160, 38), (162, 26), (174, 18), (188, 14), (202, 14), (216, 20), (222, 32), (222, 46)]:
         mask[y : y + 3, x : x + 3] = 255
-    rings = coarse_block(mask, light, 20.0, 3.0).rings
+    rings = coarse_block(mask, light, 20.0).rings
     assert [ring.is_hole for ring in rings] == [False]
     assert abs(rings[0].length - alone[0].length) < 20.0
+
+
+def test_a_closed_cell_with_a_gap_in_its_outer_wall_stays_in_the_material() -> None:
+    whole, _ = comb(5.0)
+    torn = whole.copy()
+    torn[56:66, 126:137] = 5
+    areas = []
+    for light in (whole, torn):
+        edge = material_edge(light, 20.0, wall_mask(light, 20.0, bright=True).mask)
+        areas.append(abs(signed_area(edge.exterior)))
+    # A cell without its walls has 289 px².
+    assert areas[0] - areas[1] < 60.0

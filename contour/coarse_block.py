@@ -33,8 +33,6 @@ _WALL_COVERAGE = 0.12
 _PAD = 8
 # Grey levels between table and walls, averaged with their cells, below which an opening's own level says nothing.
 _LEAST_SHADE = 8.0
-_SHEET_WALLS = 2.5
-_SHEET_CELLS = 2.5
 
 
 @dataclass(frozen=True)
@@ -116,16 +114,15 @@ class CoarseBlock:
         return (points + 0.5) / self.step - 0.5 + _PAD
 
 
-def coarse_block(mask: Gray, light: Gray, pitch: float, wall: float) -> CoarseBlock:
-    """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch` and walls `wall`
-    pixels wide.
+def coarse_block(mask: Gray, light: Gray, pitch: float) -> CoarseBlock:
+    """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch` pixels wide.
 
     Raises NoBlockFound.
     """
     # A whole number of pixels a sample: averaging is several times faster so.
     step = max(1, round(pitch / _SAMPLES_PER_PITCH))
     small = _averaged(mask, step, cv2.BORDER_CONSTANT)
-    walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8) & (1 - _sheets(small, pitch / step, wall / step))
+    walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = _padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch / step
     kept = _main_piece(walls, samples)
@@ -139,19 +136,6 @@ def coarse_block(mask: Gray, light: Gray, pitch: float, wall: float) -> CoarseBl
             "Check that a block lies in view with table around it"
         )
     return _with_rings(filled, kept, step, samples)
-
-
-def _sheets(small: Gray, samples: float, wall: float) -> Gray:
-    """Areas too wide for walls and too large for skins of single cells: a table as bright as the walls. 0 or 1."""
-    size = max(2, int(np.ceil(_SHEET_WALLS * wall)))
-    full = (small > 250).astype(np.uint8)
-    kernel, back = np.ones((size, size), np.uint8), (size - 1 - size // 2,) * 2
-    wide = cv2.dilate(cv2.erode(full, kernel), kernel, anchor=back)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(wide, connectivity=4)
-    large = stats[:, cv2.CC_STAT_AREA] > _SHEET_CELLS * samples * samples
-    large[0] = False
-    # Their rims, partly covered samples, go with them.
-    return np.asarray(cv2.dilate(large.astype(np.uint8)[labels], np.ones((5, 5), np.uint8)), np.uint8)
 
 
 def _main_piece(walls: Gray, samples: float) -> Gray:

@@ -93,7 +93,9 @@ def _projected(picture: NDArray[np.uint8], direction: NDArray[np.float64]) -> ND
 
 def _contrast_direction(picture: NDArray[np.uint8]) -> NDArray[np.float64] | None:
     """Unit weights of B, G, R with the most local contrast, or None where lightness has nearly as much."""
-    rows = picture[:: max(1, picture.shape[0] // _SAMPLE_ROWS)].astype(np.float32)
+    # Means over 3 × 3 pixels: noise, which lightness has much of in a JPEG and colours little, counts a ninth.
+    first = np.arange(0, picture.shape[0] - 2, max(3, picture.shape[0] // _SAMPLE_ROWS))
+    rows = cv2.blur(picture[first[:, None] + np.arange(3)].astype(np.float32).mean(axis=1), (3, 1))
     local = rows - cv2.blur(rows, (2 * _HIGH_PASS_PX + 1, 1))
     flat = local.reshape(-1, 3)
     covariance = (flat.T @ flat / len(flat)).astype(np.float64)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -16,11 +16,11 @@ Levels = NDArray[np.uint8] | NDArray[np.uint16]
 
 # Standard deviations above the level that walls stand on, itself about 1.5 below the mean where there is nothing but
 # noise: lower, and the table fills with specks.
-NOISE_FLOOR = 4.0
+NOISE_FLOOR = 3.3
 # The maps of local light need no more than this many samples a pitch.
 _MAP_SAMPLES = 8
 # Foils side by side differ in brightness by a factor of three: a threshold any higher loses the dimmer ones.
-_RISE = 0.42
+_RISE = 0.44
 # Walls of fine cells run into each other at that height: cells to be counted are kept apart, but once they are known,
 # no faint wall may be lost, and blur takes most from thin ones.
 _FINE_RISE = (0.08, -0.05)
@@ -31,7 +31,10 @@ _PICTURE_RISE = 0.2
 _BESIDE_PITCHES = 0.8
 _BYTE_CONTRAST = 40.0
 FINE_PITCH = 12.0
-_LEAST_OVER_NOISE = 20.0
+_LEAST_OVER_NOISE = 14.0
+# Where walls stand out less, noise makes specks here and there on so large a picture.
+_CLEAR_OF_NOISE = 40.0
+_SPECK_LENGTH = 0.15
 # What a fifth of normal deviates stay below in size, in standard deviations.
 _FIFTH_OF_NORMAL = 0.2533
 
@@ -46,7 +49,7 @@ class WallMask:
 
     @property
     def may_be_noise(self) -> bool:
-        """Whether walls stand out so little that a fine comb cannot be told from noise alone, which makes 14."""
+        """Whether walls stand out so little that only its order tells a fine comb from noise alone, which makes 11."""
         return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
@@ -54,7 +57,7 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     """Walls of `light` (H, W) where cells are about `pitch` pixels apart and walls are brighter (or darker) than cells.
 
     Walls are what stands out on both sides over less than a cell, whatever the light: a table as light as the walls is
-    no wall, nor is the edge of a shadow or of a lamp's spot on it. The threshold lies at 0.42 of the local height of
+    no wall, nor is the edge of a shadow or of a lamp's spot on it. The threshold lies at 0.44 of the local height of
     walls, a mean weighted with itself, whatever share of the area is wall; it is never below NOISE_FLOOR times the
     noise. `contrast`, where it is known, sets one more floor, and above 40 levels allows a faster way.
     """
@@ -75,6 +78,16 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     mask = cv2.compare(smooth, threshold, cv2.CMP_GT if bright else cv2.CMP_LT)
     mask = np.asarray(mask, np.uint8)[: light.shape[0], : light.shape[1]]
     return WallMask(np.ascontiguousarray(mask), noise / unit, _typical(typical) / unit)
+
+
+def without_specks(seen: WallMask, pitch: float, wall: float) -> WallMask:
+    """The mask without pieces smaller than a stub of wall 0.15 pitch long, where there may be noise among them."""
+    if seen.contrast > _CLEAR_OF_NOISE * seen.noise:
+        return seen
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(seen.mask, connectivity=8)
+    kept = (stats[:, cv2.CC_STAT_AREA] > max(4.0, _SPECK_LENGTH * pitch * wall)).astype(np.uint8) * np.uint8(255)
+    kept[0] = 0
+    return replace(seen, mask=kept[labels])
 
 
 def _smoothed(light: Gray, step: int, contrast: float) -> tuple[Levels, int]:
@@ -118,7 +131,8 @@ def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
     tiles = rows[:, :, : columns * tile].reshape(rows.shape[0], tile, columns, tile)[:, :, ::hop]
     if tiles.size == 0:
         return 0.3 * unit
-    quiet = float(np.quantile(tiles.astype(np.float32).std(axis=(1, 3)), 0.2))
+    # Of noise alone, after the light blur, a fifth of all tiles of n pixels show no more than 1 − 1.5 / n.
+    quiet = float(np.quantile(tiles.astype(np.float32).std(axis=(1, 3)), 0.2)) / (1 - 1.5 / tile)
     if pitch < FINE_PITCH:
         # No tile of fine cells is quiet, but second differences both ways see little of a blurred structure, and keep
         # the noise that the light blur left as it is.

@@ -16,7 +16,7 @@ from contour.wall_cells import Cells, probe
 from contour.wall_ends import edge_chains, find_ends, outermost
 from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 from contour.wall_light import light_from_table, wall_light
-from contour.wall_mask import FINE_PITCH, WallMask, wall_mask
+from contour.wall_mask import FINE_PITCH, WallMask, wall_mask, without_specks
 from contour.wall_parallax import Parallax, parallax
 from contour.wall_profile import EndModel, centred_axes, fit_ends, true_width
 
@@ -24,6 +24,8 @@ Gray = NDArray[np.uint8]
 Points = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
+# Noise alone reaches a score of 0.18.
+_ORDERLY = 0.35
 _HALF_SIZE_ABOVE_PX = 6_000_000
 # Sharpest and softest blur that a lens in use leaves; outside of it the fit has seen something else.
 _BLUR_PX = (0.4, 3.0)
@@ -66,15 +68,16 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
         else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     )
     seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
-    if cells.pitch < FINE_PITCH and seen.may_be_noise:
+    if cells.pitch < FINE_PITCH and seen.may_be_noise and cells.score < _ORDERLY:
         raise NoBlockFound(
             f"no block found: cells of {cells.pitch:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
             "like noise. Check the light, and that a block lies in view"
         )
+    seen = without_specks(seen, cells.pitch / scale, cells.wall / scale)
     if not cells.bright:
         seen = _darker_than_table(seen, small, cells)
     on_mask()
-    coarse = coarse_block(seen.mask, small, cells.pitch / scale, cells.wall / scale)
+    coarse = coarse_block(seen.mask, small, cells.pitch / scale)
     others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)
     evidence = _evidence(light, seen, coarse, cells, scale)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
@@ -133,7 +136,7 @@ def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, sc
     tips = replace(tips, points=_raised(tips.points, coarse.feet((tips.points + 0.5) / scale - 0.5)[2], depth))
     outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch]
     normal = coarse.feet(outer)[2]
-    sides = _sides(light, (outer + 0.5) * scale - 0.5, normal, cells, model)
+    sides = _sides(light, (outer + 0.5) * scale - 0.5, normal, depth.width or cells.wall, model)
     sides = replace(sides, points=_raised(sides.points, normal, depth))
     polarity = "bright" if cells.bright else "dark"
     return BlockEvidence(
@@ -178,13 +181,15 @@ def _tips(light: Gray, ends: _Ends, cells: Cells, model: EndModel) -> _Witnesses
     return _Witnesses(fitted.point[good], kind[good], sigma[good])
 
 
-def _sides(light: Gray, place: Points, normal: Points, cells: Cells, model: EndModel) -> _Witnesses:
-    """Outermost wall points, moved along the outline's normal to half height where that is near."""
-    across = replace(model, width=1.0, reach=min(model.reach, cells.wall))
+def _sides(light: Gray, place: Points, normal: Points, wall: float, model: EndModel) -> _Witnesses:
+    """Outermost wall points, moved along the outline's normal to half height where that is near; `wall` is the width
+    of walls at half height.
+    """
+    across = replace(model, width=1.0, reach=min(model.reach, wall))
     fitted = fit_ends(light, place, normal, normal, across)
     near = np.abs(((fitted.point - place) * normal).sum(axis=1)) < _NEAR_PX
     # Beside a thin wall half height lies outside of it, at its corners and ends inside: a third of the way is left.
-    fat = (cells.wall - model.width) / 6
+    fat = (wall - model.width) / 6
     points = np.where(near[:, None], fitted.point, place) - fat * normal
     sigma = np.where(near, *_SIDE_SIGMA_PX)
     # The outer side of the block, where it is in view below its top, is fainter than any wall.

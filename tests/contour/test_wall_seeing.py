@@ -166,9 +166,25 @@ def test_walls_as_bright_as_the_table_are_seen_by_colour() -> None:
     assert np.mean(np.abs(signed_distance(rendered.truth_px, ring.points)) < 1.0) > 0.8
 
 
+def test_outermost_walls_of_a_thick_dark_block_are_not_drawn_in_by_the_sides_it_shows() -> None:
+    rendered = render(
+        Scene(
+            BLOCK,
+            camera(),
+            CellGeometry(pitch_mm=9.0, wall_mm=0.7, offset_mm=(1.0, 2.0)),
+            thickness_mm=20.0,
+            material=Material(top=0.12, side=0.09, glints=0.0),
+            table=Table(level=0.72),
+        )
+    )
+    ring = see_block(rendered.picture, "dark").rings[0]
+    outermost = ring.points[ring.kind == WitnessKind.OUTERMOST]
+    assert abs(np.median(signed_distance(rendered.truth_px, outermost))) < 0.6
+
+
 def test_an_empty_mask_is_no_block() -> None:
     with pytest.raises(NoBlockFound, match="no block found"):
-        coarse_block(np.zeros((300, 400), np.uint8), np.zeros((300, 400), np.uint8), 20.0, 3.0)
+        coarse_block(np.zeros((300, 400), np.uint8), np.zeros((300, 400), np.uint8), 20.0)
 
 
 @pytest.mark.parametrize("shape", [(600, 800, 4), (8, 800), (600,)])

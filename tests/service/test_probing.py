@@ -11,20 +11,24 @@ import pytest
 
 from drivers.controller import ServiceBlock
 from drivers.controller.mailbox import MailboxLayout
-from drivers.controller.modbus import ModbusTcpController
+from drivers.controller.modbus import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
 from drivers.controller.requests import read_registers, registers_of, stream_of, write_register, write_registers
 from drivers.controller.simulated import SimulatedController
 from service.probing import Finding, Probe
 from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply
 from tests.interop.programs import libmodbus_tcp
 from tests.interop.shifted_program import program
+from tests.pty_line import PtyLine
 
 FASTER = 8
 
 
 async def probed(port: int, layout: MailboxLayout | None = None, *, write: bool = True) -> tuple[dict[str, Any], Probe]:
     """What the probe said, by part, and the probe; its waits are `FASTER` times shorter."""
-    controller = ModbusTcpController("127.0.0.1", port, layout=layout, timeout_s=5)
+    return await probed_by(ModbusTcpController("127.0.0.1", port, layout=layout, timeout_s=5), write=write)
+
+
+async def probed_by(controller: ModbusController, *, write: bool) -> tuple[dict[str, Any], Probe]:
     probe = Probe(
         controller, 5, sleep=lambda pause_s: asyncio.sleep(pause_s / FASTER), now=lambda: FASTER * time.monotonic()
     )
@@ -72,6 +76,14 @@ async def test_the_simulated_controller_is_as_it_should_be() -> None:
     assert {"round trip", "longest read", "longest write", "writable", "test_echo", "heartbeat"} <= set(findings)
     restored = "service-block-content"  # all zero, as it was before
     assert set(simulated.verdict.counts) <= {"heartbeat-stalled", restored}, simulated.verdict
+
+
+async def test_over_a_serial_line_it_is_the_same() -> None:
+    async with PtyLine() as line, SimulatedController.on_serial(line.far, scan_s=0.001):
+        findings, probe = await probed_by(ModbusRtuController(SerialLine(line.near), timeout_s=5), write=True)
+    assert {part: finding.text for part, finding in findings.items() if not finding.well} == {}
+    assert probe.changes == {}
+    assert {"longest write", "writable", "test_echo"} <= set(findings)
 
 
 @pytest.mark.parametrize("shift", [0, 1, -1])

@@ -156,6 +156,11 @@ async def test_a_trigger_of_the_controller_is_acknowledged_with_its_pair_and_job
         assert block.missed_triggers == 0
 
 
+async def by_hand(bench: Bench) -> Job:
+    """A job by hand, settled."""
+    return await (await bench.executor.submit(TriggerStamp("serial"))).settled
+
+
 async def test_one_trigger_of_the_controller_gives_one_job_also_after_a_restart(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
         bench.controller_says(trigger_counter=4)
@@ -163,10 +168,10 @@ async def test_one_trigger_of_the_controller_gives_one_job_also_after_a_restart(
     async with running(tmp_path) as bench:
         assert bench.link.published.trigger_ack == 4
         bench.controller_says(trigger_counter=4)
-        await asyncio.sleep(0.05)
-        assert bench.settled == []
+        await by_hand(bench)  # it would be refused, were the controller's trigger still open
+        assert [job.trigger.kind for job in bench.settled] == ["serial"]
         bench.controller_says(trigger_counter=5)
-        await until(lambda: bench.settled)
+        await until(lambda: len(bench.settled) == 2)
 
 
 async def test_the_same_counter_in_another_session_is_another_trigger(tmp_path: Path) -> None:
@@ -343,14 +348,13 @@ async def test_a_trigger_that_a_lost_journal_held_is_not_taken_again(tmp_path: P
     async with running(tmp_path) as bench:
         await bench.link.on_found(left_behind())
         bench.controller_says(trigger_counter=6)
-        await asyncio.sleep(0.05)
-        assert bench.settled == []
         published = bench.link.published
         assert (published.trigger_ack, published.session_ack) == (6, 9)
         assert (published.job_id, published.settled_job) == (70, 70)
+        job = await by_hand(bench)  # it would be refused, were the controller's trigger still open
+        assert job.job_id == 71, "numbers go on above what was found"
         bench.controller_says(trigger_counter=7)
-        await until(lambda: bench.settled)
-        assert bench.settled[0].job_id == 71, "numbers go on above what was found"
+        await until(lambda: len(bench.settled) == 2)
 
 
 async def test_a_job_that_a_lost_journal_held_in_flight_is_settled_before_any_trigger(tmp_path: Path) -> None:

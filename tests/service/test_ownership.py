@@ -121,7 +121,7 @@ def test_a_foreign_owner_later_stops_all_writing() -> None:
         watched.ownership.check()
 
 
-@given(st.lists(st.tuples(st.sampled_from([0, OURS, THEIRS, 300]), st.integers(0, 2), st.floats(0, 1)), max_size=60))
+@given(st.lists(st.tuples(st.sampled_from([0, OURS, THEIRS, 300]), st.integers(0, 1), st.floats(0, 2.9)), max_size=60))
 def test_nothing_is_written_over_another_that_moved_or_was_watched_for_less_than_3_s(
     readings: list[tuple[int, int, float]],
 ) -> None:

@@ -231,7 +231,7 @@ async def test_nobody_answers_to_another_device_id(there: Cell) -> None:
     if there.way == "modbus-tcp":
         pytest.skip("over TCP a server may answer to any device id")
     controller = there.driver(device_id=2, timeout_s=0.2)
-    with pytest.raises(ControllerTimeout, match="Check device_id"):
+    with pytest.raises(ControllerTimeout, match=r"no reply to FC3 .* device_id"):
         await controller.connect()
     assert not controller.connected
 

@@ -40,7 +40,7 @@ accuracy: install
 rules: install
 	$(BIN)/python -m tests.rules.mutate
 
-# Hours of campaigns under faults and kills; resumes where it was broken off. Options: make soak SOAK='--fresh --workers 4'
+# Campaigns under faults and kills, an hour or so on two cores; resumes where it was broken off (SOAK=--fresh: anew).
 soak: install
 	$(BIN)/python -m tests.soak $(SOAK)
 

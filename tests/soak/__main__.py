@@ -52,7 +52,7 @@ def _arguments() -> argparse.Namespace:
         option = "--" + field.name.replace("_", "-")
         parser.add_argument(option, type=int, default=field.default, metavar="N", help=f"default {field.default}")
     parser.add_argument("--only", nargs="+", metavar="CAMPAIGN", help="only these campaigns")
-    parser.add_argument("--workers", type=int, default=max(2, os.cpu_count() or 2), help="pieces at a time")
+    parser.add_argument("--workers", type=int, default=2 * (os.cpu_count() or 1), help="pieces at a time")
     parser.add_argument("--state", type=Path, default=ROOT / "build" / "soak", help="where results are kept")
     parser.add_argument("--report", type=Path, default=REPORT, help="the page that gets the report")
     parser.add_argument("--no-report", action="store_true", help="write none")

@@ -221,3 +221,10 @@ def test_the_report_replaces_its_own_section_and_leaves_the_rest(tmp_path: Path)
     assert second.count("## Campaigns") == 1
     assert "stale: job 3" not in second
     assert second.endswith("\nAfter.\n")
+
+
+def test_a_session_that_was_drawn_twice_after_lost_memory_makes_no_repeated_trigger() -> None:
+    given = evidence()
+    given.events.append({"event": "trigger", "session": 9, "trigger": 2})
+    given.jobs.append(row(3, "refused", 110, trigger_counter=2))
+    assert judge(given).counts == Counter()

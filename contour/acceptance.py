@@ -153,7 +153,8 @@ def judge_table(look: TableLook, limits: TableLimits) -> tuple[Finding, ...]:
 def _quality(traced: Trace | None, limits: QualityLimits) -> list[Finding]:
     if traced is None or traced.quality is None:
         return []
-    return [_bad_picture(fault) for fault in quality_faults(traced.quality, limits)]
+    faults = quality_faults(traced.quality, limits)
+    return [_bad_picture(". Besides, ".join(faults))] if faults else []
 
 
 def _bad_picture(fault: str) -> Finding:

@@ -174,6 +174,13 @@ def test_a_bad_picture_is_told_before_what_was_traced_in_it() -> None:
     assert finding.text.startswith("The picture is not good enough: walls are blurred by 4.0 px")
 
 
+def test_all_that_is_wrong_with_a_picture_is_told_in_one_finding() -> None:
+    quality = Quality(12.0, 120.0, 1.5, 4.0, 24.0, 0.01)
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(quality=quality))
+    assert "12 of 255" in finding.text
+    assert ". Besides, walls are blurred by 4.0 px" in finding.text
+
+
 def test_another_block_is_refused_where_the_recipe_wants_one() -> None:
     other = Piece(3000.0, (400, 50, 460, 120))
     (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(others=(other,)))

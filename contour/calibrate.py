@@ -153,3 +153,14 @@ def check_plausible(solved: cv.Solved, size: tuple[int, int], board: Board, setu
             f"from the boards, expected {NEAREST_MM:g} to {FARTHEST_MM:g}. Check {square} (ten times too large or "
             "small?), or give the measured --camera-height-mm if it is right"
         )
+    _check_block(solved, setup)
+
+
+def _check_block(solved: cv.Solved, setup: Setup) -> None:
+    """Raise where the camera does not stand well above the block: the verdict looks up to twice its height."""
+    lowest = float(np.linalg.norm(solved.translations, axis=1).min())
+    if 2 * setup.block_mm >= 0.9 * lowest:
+        raise CalibrationFailed(
+            f"--block-mm {setup.block_mm:g} reaches up to the camera, which stands {lowest:.0f} mm from the nearest "
+            "board. Give the block's thickness, and check --square-mm"
+        )

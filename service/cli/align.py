@@ -50,6 +50,8 @@ def run(args: argparse.Namespace) -> int:
     from service.calibration_file import CalibrationFileError, load_record, save_record
     from service.points_file import PointsFileError, read_points
 
+    if not -1000 <= args.height_mm <= 10_000:
+        raise UserError(f"--height-mm {args.height_mm:g}: expected -1000 to 10000")
     if not 0 < args.accept_mm < 1e4:
         raise UserError(f"--accept-mm {args.accept_mm:g}: expected a number above 0")
     try:

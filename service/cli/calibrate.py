@@ -93,6 +93,9 @@ def run(args: argparse.Namespace) -> int:
         value = getattr(args, name)
         if value is not None and not 0 < value < 1e5:
             raise UserError(f"--{name.replace('_', '-')} {value:g}: expected a number above 0")
+    if not 0 <= args.board_thickness_mm <= 500:
+        raise UserError(f"--board-thickness-mm {args.board_thickness_mm:g}: expected 0 to 500")
+    _check_outputs(args)
     if ways[0] == "board":
         return _from_board(args)
     if args.images or args.plane is not None:
@@ -102,6 +105,24 @@ def run(args: argparse.Namespace) -> int:
     calibration = _from_points(args) if ways[0] == "points" else _from_scale(args)
     _write(args, calibration, _sentinels(args, None), {"made_from": ways[0]})
     return EXIT_OK
+
+
+def _check_outputs(args: argparse.Namespace) -> None:
+    """Raise UserError where the results could not be written: minutes of work would be lost."""
+    report = report_path(args)
+    if report == args.output:
+        raise UserError(f"--output {args.output}: the report would overwrite it. End it in .yaml, or name --report")
+    for option, path in (("--output", args.output), ("--report", report)):
+        if not path.parent.is_dir():
+            raise UserError(f"{option} {path}: there is no folder {path.parent}. Make it, or name another")
+        if path.is_dir():
+            raise UserError(f"{option} {path}: is a folder. Name a file")
+
+
+def report_path(args: argparse.Namespace) -> Path:
+    """Where the report goes."""
+    path: Path = args.report or args.output.with_suffix(".html")
+    return path
 
 
 # --- a board ----------------------------------------------------------------------------------------------------------
@@ -128,10 +149,10 @@ def _from_board(args: argparse.Namespace) -> int:
     )
     try:
         gathered = gather_views(args.plane, args.images, board, _progress)
+        sentinels = _sentinels(args, gathered)
         result = calibrate_camera(gathered.views, board, gathered.size, setup, _progress)
     except (PlaneViewError, CalibrationFailed) as error:
         raise UserError(str(error)) from error
-    sentinels = _sentinels(args, gathered)
     _tell(result, gathered)
     made = made_of(result, board, setup.block_mm)
     _report(args, result, gathered, board, setup, sentinels)
@@ -187,7 +208,7 @@ def _report(
 ) -> None:
     from service.calibration_report import write_report
 
-    path = args.report or args.output.with_suffix(".html")
+    path = report_path(args)
     try:
         write_report(path, result, gathered, board, setup, sentinels)  # type: ignore[arg-type]
     except OSError as error:

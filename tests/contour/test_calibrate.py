@@ -160,6 +160,11 @@ def test_a_square_size_off_by_ten_is_said_to_make_focal_length_and_distance_impl
     assert f"--square-mm {30 * factor:g}" in text
 
 
+def test_a_block_as_high_as_the_camera_is_refused() -> None:
+    views, _ = noisy_views()
+    assert "--block-mm 700 reaches up to the camera" in failure(views, setup=replace(PLANE, block_mm=700.0))
+
+
 def test_a_measured_height_finds_a_square_size_that_is_half_off() -> None:
     views, _ = noisy_views()
     wrong = Board("charuco", 11, 8, 60.0, 42.0, "DICT_5X5_250")

@@ -87,6 +87,9 @@ def test_a_verdict_that_is_not_good_writes_the_report_and_no_file(
         ),
         (["--output", "x.yaml", *BOARD, "--plane", "gone.png"], "gone.png: cannot be read"),
         (["--output", "x.yaml", *BOARD, "--plane", "a.png", "--accept-mm", "nan"], "--accept-mm nan"),
+        (["--output", "x.yaml", *BOARD, "--plane", "a.png", "--board-thickness-mm", "nan"], "--board-thickness-mm nan"),
+        (["--output", "gone/x.yaml", *BOARD, "--plane", "a.png"], "--output gone/x.yaml: there is no folder gone"),
+        (["--output", "x.html", *BOARD, "--plane", "a.png"], "the report would overwrite it"),
     ],
 )
 def test_wrong_usage_is_one_clear_line(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
@@ -29,27 +28,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cameras", type=int, default=20)
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed; others were never seen")
+    parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--write", action="store_true", help="write docs/calibration-accuracy.md")
     args = parser.parse_args()
-    started = time.perf_counter()
     seeds = range(args.first, args.first + args.cameras)
     campaigns: dict[str, list[Trial]] = {}
-    with ProcessPoolExecutor(2) as pool:
-        for name, tilt_deg, board in (
-            ("boards tilted to 8°", 8.0, "charuco"),
-            ("boards tilted to 20°", 20.0, "charuco"),
-            ("chessboard, tilted to 20°", 20.0, "chessboard"),
+    with ProcessPoolExecutor(args.workers) as pool:
+        for name, tilt_deg, board, count in (
+            ("boards tilted to 8°", 8.0, "charuco", args.cameras),
+            ("boards tilted to 20°", 20.0, "charuco", args.cameras // 2),
+            ("chessboard, tilted to 20°", 20.0, "chessboard", args.cameras // 5),
         ):
-            jobs = list(seeds)[: 6 if board == "chessboard" else None]
-            campaigns[name] = list(pool.map(trial, jobs, [tilt_deg] * len(jobs), [board] * len(jobs)))
-            _note(f"{name}: {len(jobs)} cameras")
+            jobs = list(seeds)[:count]
+            campaigns[name] = list(pool.map(trial, jobs, [tilt_deg] * count, [board] * count))
+            _note(f"{name}: {count} cameras")
         chain: list[ChainTrial] = [
             one for some in pool.map(chain_trial, range(args.first, args.first + CHAIN_CAMERAS)) for one in some
         ]
-    _note("whole chain")
-    bumps: Bumps = measure_bumps(np.random.default_rng(args.first))
-    command = "python -m " + " ".join(["benchmarks.calibration", *sys.argv[1:]])
-    text = page(campaigns, chain, bumps, command, time.perf_counter() - started)
+        _note("whole chain")
+        bumps: Bumps = measure_bumps(np.random.default_rng(args.first), pool)
+    command = f"python -m benchmarks.calibration --cameras {args.cameras} --first {args.first} --write"
+    text = page(campaigns, chain, bumps, command)
     print(text)
     if args.write:
         PAGE.write_text(text, encoding="utf-8")

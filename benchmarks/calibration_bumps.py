@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import cv2
@@ -16,7 +17,7 @@ from contour.synthetic.board_view import render_flat
 TOLERANCE_PX = 1.0
 MARK_MM = 24.0
 PLACES_MM = ((20.0, 30.0), (555.0, 20.0), (25.0, 390.0), (550.0, 395.0))
-BUMPS, REPEATS = 40, 50
+BUMPS, REPEATS = 30, 50
 
 
 @dataclass(frozen=True)
@@ -35,14 +36,16 @@ class Bumps:
     look_ms: float
 
 
-def measure_bumps(rng: np.random.Generator) -> Bumps:
+def measure_bumps(rng: np.random.Generator, pool: Executor) -> Bumps:
     """All of it, over one camera of 1600 x 1200 px and one of 4000 x 3000."""
+    look = pool.submit(_look_ms)
     camera = camera_above(1600, 1200, 0.375, plane_mm=0.0, tilt_deg=(2.0, -1.5), distortion=(-0.12, 0.0, 0.0, 0.0, 0.0))
     seen = see_sentinels(_marked(camera, 1), "DICT_4X4_50")
     assert seen is not None
-    turns = [_largest(_marked(_turned(camera, rng), 2 + n), seen) for n in range(BUMPS)]
-    shifts = [_largest(_marked(_shifted(camera, rng), 500 + n), seen) for n in range(BUMPS)]
-    still = [_largest(_marked(camera, 1000 + n), seen) for n in range(REPEATS)]
+    cameras = [_turned(camera, rng) for _ in range(BUMPS)] + [_shifted(camera, rng) for _ in range(BUMPS)]
+    cameras += [camera] * REPEATS
+    offsets = list(pool.map(_largest, cameras, range(2, 2 + len(cameras)), [seen] * len(cameras)))
+    turns, shifts, still = offsets[:BUMPS], offsets[BUMPS : 2 * BUMPS], offsets[2 * BUMPS :]
     return Bumps(
         BUMPS,
         sum(one > TOLERANCE_PX for one in turns),
@@ -52,12 +55,13 @@ def measure_bumps(rng: np.random.Generator) -> Bumps:
         REPEATS,
         sum(one > TOLERANCE_PX for one in still),
         max(still),
-        _look_ms(),
+        look.result(),
     )
 
 
-def _largest(picture: np.ndarray, seen: Sentinels) -> float:
-    found = check_sentinels(picture, seen).largest_px
+def _largest(camera: CameraModel, seed: int, seen: Sentinels) -> float:
+    cv2.setNumThreads(1)
+    found = check_sentinels(_marked(camera, seed), seen).largest_px
     return 0.0 if found is None else found
 
 

@@ -12,7 +12,7 @@ from benchmarks.calibration_trials import HEIGHTS_MM, VIEWS, ChainTrial, Trial
 HEAD = """\
 # Accuracy of calibrations
 
-This page is written by `{command}`; do not edit it by hand ({minutes:.0f} minutes on 2 cores).
+This page is written by `{command}`; do not edit it by hand.
 
 Boards (11x8 squares of 30 mm) are rendered by exact area coverage through cameras that are known exactly: {views} views
 of 1600 × 1200 px over a table 600 mm wide, the camera 1.0 to 1.4 m up, tilted by up to 3°, k1 −0.15 to −0.09, k2, p1
@@ -30,11 +30,9 @@ Both hold for so many of all places of all cameras. All in mm.
 """
 
 
-def page(
-    campaigns: dict[str, list[Trial]], chain: Sequence[ChainTrial], bumps: Bumps, command: str, seconds: float
-) -> str:
+def page(campaigns: dict[str, list[Trial]], chain: Sequence[ChainTrial], bumps: Bumps, command: str) -> str:
     """The page's text."""
-    text = HEAD.format(command=command, views=VIEWS, minutes=max(seconds / 60, 1))
+    text = HEAD.format(command=command, views=VIEWS)
     text += _stated(campaigns)
     text += "\n## Goals\n\n" + _goals(campaigns, chain, bumps)
     text += "\n## Each camera, boards tilted to 8°, on the table\n\n" + _each(next(iter(campaigns.values())))

@@ -39,7 +39,8 @@ def main() -> None:
         1600, 1200, 0.375, plane_mm=0.0, tilt_deg=(1.5, -2.0), roll_deg=1.0, distortion=(-0.12, 0.0, 0.0, 0.0, 0.0)
     )
     board = BOARDS[args.board]
-    for number, pose in enumerate(board_poses(board, camera, args.count, rng, tilt_deg=args.tilt)):
+    whole = args.board == "chessboard"  # it is not found unless all of it is seen
+    for number, pose in enumerate(board_poses(board, camera, args.count, rng, tilt_deg=args.tilt, whole=whole)):
         picture = render_board(board, board_camera(camera, *pose), sensor=Sensor(), seed=args.seed * 1000 + number)
         name = "flat.png" if number == 0 else f"view-{number:02d}.png"
         cv2.imwrite(str(args.folder / name), picture)

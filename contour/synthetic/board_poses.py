@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.board import Board
+from contour.synthetic.board_view import board_camera
 from contour.synthetic.camera import CameraModel
 
 Floats = NDArray[np.float64]
+
+_STEPS_INWARDS = 40
 
 
 class BoardPose(NamedTuple):
@@ -22,11 +25,18 @@ class BoardPose(NamedTuple):
 
 
 def board_poses(
-    board: Board, camera: CameraModel, count: int, rng: np.random.Generator, *, tilt_deg: float = 20.0
+    board: Board,
+    camera: CameraModel,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    tilt_deg: float = 20.0,
+    whole: bool = False,
 ) -> list[BoardPose]:
     """Poses of `count` views; in the first the board lies flat, its frame's axes along the table's.
 
-    The others lie up to `tilt_deg` from flat, at any turn, their middles spread over the view.
+    The others lie up to `tilt_deg` from flat, at any turn, their middles spread over the view; with `whole` so far only
+    that all of the board stays in the picture.
     """
     corners = np.array([[0.0, 0.0], [camera.width - 1.0, camera.height - 1.0]])
     low, high = np.sort(camera.back_project(corners, 0.0), axis=0)
@@ -36,10 +46,20 @@ def board_poses(
     for place in cells:
         direction, tilt = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(0.4, 1.0) * tilt_deg)
         lean = cv2.Rodrigues(tilt * np.array([np.cos(direction), np.sin(direction), 0.0]))[0]
-        turn = cv2.Rodrigues(np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]))[0]
+        angle = rng.uniform(-np.pi, np.pi)
+        # A board that must be wholly seen lies along the picture, one way up or the other.
+        angle = np.pi * np.round(angle / np.pi) + 0.08 * angle if whole else angle
+        turn = cv2.Rodrigues(np.array([0.0, 0.0, angle]))[0]
         rotation = np.asarray(lean @ turn, np.float64)
         middle = np.array([*(low + (high - low) * (0.18 + 0.64 * place)), rng.uniform(20.0, 80.0)])
-        poses.append(BoardPose(rotation, middle - rotation @ half))
+        pose = BoardPose(rotation, middle - rotation @ half)
+        centre = np.array([*((low + high) / 2), middle[2]])
+        for _ in range(_STEPS_INWARDS if whole else 0):
+            if _in_view(board, camera, pose):
+                break
+            middle = middle + 0.1 * (centre - middle)
+            pose = BoardPose(rotation, middle - rotation @ half)
+        poses.append(pose)
     return poses
 
 
@@ -50,3 +70,14 @@ def _spread(count: int, rng: np.random.Generator) -> Floats:
     cells = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2)
     chosen = rng.permutation(cells)[:count]
     return np.asarray((chosen + rng.uniform(0.0, 1.0, chosen.shape)) / np.array([columns, rows]))
+
+
+def _in_view(board: Board, camera: CameraModel, pose: BoardPose) -> bool:
+    """True where the sheet, a margin of half a square around the board, lies in the picture."""
+    width, height = board.size_mm
+    margin = 0.5 * board.square_mm
+    x = np.linspace(-margin, width + margin, 5)
+    y = np.linspace(-margin, height + margin, 5)
+    sheet = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    seen = board_camera(camera, *pose).project(sheet, 0.0)
+    return bool(((seen >= 0) & (seen <= [camera.width - 1, camera.height - 1])).all())

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.board import Board
-from contour.synthetic.camera import CameraModel, densified
+from contour.synthetic.camera import CameraModel
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.scene import Sensor
 from contour.synthetic.sensor import expose
@@ -71,9 +71,13 @@ def _coverage(camera: CameraModel, boxes: Floats) -> NDArray[np.float32]:
     step = _STEP_PX * camera.mm_per_px((x, y), 0.0)
     left, bottom, right, top = boxes.T
     corners = np.stack([left, bottom, right, bottom, right, top, left, top], axis=1).reshape(-1, 4, 2)
-    rings = [camera.project(densified(ring, step), 0.0) for ring in corners]
-    limit = [camera.width + 1, camera.height + 1]
-    seen = [ring for ring in rings if (ring.max(axis=0) > -1).all() and (ring.min(axis=0) < limit).all()]
-    if not seen:
+    count = max(1, int(np.ceil(float((boxes[:, 2:] - boxes[:, :2]).max()) / step)))
+    share = (np.arange(count) / count)[None, None, :, None]
+    ends = np.roll(corners, -1, axis=1)
+    dense = (corners[:, :, None] * (1 - share) + ends[:, :, None] * share).reshape(-1, 2)
+    rings = camera.project(dense, 0.0).reshape(len(boxes), -1, 2)
+    limit = np.array([camera.width + 1, camera.height + 1])
+    seen = (rings.max(axis=1) > -1).all(axis=1) & (rings.min(axis=1) < limit).all(axis=1)
+    if not seen.any():
         return np.zeros((camera.height, camera.width), dtype=np.float32)
-    return area_coverage(seen, camera.width, camera.height)
+    return area_coverage(list(rings[seen]), camera.width, camera.height)

@@ -20,7 +20,9 @@ def area_coverage(rings: Sequence[Ring], width: int, height: int) -> NDArray[np.
 
     Rings are in pixels with (0, 0) the centre of the top-left pixel; the exterior comes first, holes run the other way.
     """
-    pieces = np.concatenate([_pieces(np.asarray(ring, dtype=np.float64) + 0.5, width, height) for ring in rings])
+    start = np.concatenate([np.asarray(ring, dtype=np.float64) for ring in rings]) + 0.5
+    end = np.concatenate([np.roll(np.asarray(ring, dtype=np.float64), -1, axis=0) for ring in rings]) + 0.5
+    pieces = _pieces(start, end, width, height)
     total = np.zeros((height, width + 2), dtype=np.float32)
     middle = 0.5 * (pieces[:, 1] + pieces[:, 3])
     row = np.floor(middle).astype(np.int64)
@@ -42,17 +44,16 @@ def _signed_area(ring: Ring) -> float:
     return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
 
 
-def _pieces(ring: Ring, width: int, height: int) -> NDArray[np.float64]:
-    """Edges cut at every pixel border they cross, as x0, y0, x1, y1, shape (M, 4)."""
-    start, end = ring, np.roll(ring, -1, axis=0)
-    edges = [np.arange(len(ring)), np.arange(len(ring))]
-    shares = [np.zeros(len(ring)), np.ones(len(ring))]
+def _pieces(start: Ring, end: Ring, width: int, height: int) -> NDArray[np.float64]:
+    """Edges from `start` to `end` cut at every pixel border they cross, as x0, y0, x1, y1, shape (M, 4)."""
+    edges = [np.arange(len(start)), np.arange(len(start))]
+    shares = [np.zeros(len(start)), np.ones(len(start))]
     for axis, limit in ((0, width), (1, height)):
         low = np.floor(np.minimum(start[:, axis], end[:, axis])) + 1.0
         high = np.ceil(np.maximum(start[:, axis], end[:, axis])) - 1.0
         low, high = np.clip(low, 0, limit + 1), np.clip(high, -1, limit)
         counts = np.maximum(0, high - low + 1).astype(np.int64)
-        edge = np.repeat(np.arange(len(ring)), counts)
+        edge = np.repeat(np.arange(len(start)), counts)
         line = np.repeat(low, counts) + np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
         edges.append(edge)
         shares.append((line - start[edge, axis]) / (end[edge, axis] - start[edge, axis]))

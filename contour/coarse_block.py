@@ -238,7 +238,7 @@ def _averaged(picture: Gray, step: int, border: int) -> Gray:
 
 
 def _fill_missing_cells(filled: Gray, walls: Gray, shade: Gray, radius: float) -> Gray:
-    """The block with every inner opening filled in which no disc of `radius` fits, or that is as light as its walls.
+    """The block with every inner opening filled in which no disc of `radius` fits, or that is as dark as dark walls.
 
     Looked into at a slant, black cells show nothing but wall: no mask of walls against cells, and no hole either.
     """
@@ -253,10 +253,9 @@ def _fill_missing_cells(filled: Gray, walls: Gray, shade: Gray, radius: float) -
         wall = float(np.median(shade[walls > 0]))
         for number in np.flatnonzero(opening):
             inside = float(np.median(shade[labels == number]))
-            # Glare on the table in a hole of a bright block is darker than walls and cells together at least.
-            darker = inside < wall and table < wall
+            # What is lighter than a light block's walls and cells together is a lamp's spot on the table in a hole.
             like_table = abs(inside - table) < abs(inside - wall)
-            opening[number] = darker or like_table or abs(table - wall) < _LEAST_SHADE
+            opening[number] = table < wall or like_table or table - wall < _LEAST_SHADE
     opening[outside] = True
     return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
 

@@ -51,6 +51,14 @@ def test_an_opening_behind_a_broken_strand_of_walls_is_a_hole() -> None:
     assert [ring.is_hole for ring in rings] == [False, True]
 
 
+@pytest.mark.parametrize("spot", [5, 60, 100])
+def test_a_lamp_mirrored_by_the_table_in_a_hole_leaves_it_a_hole(spot: int) -> None:
+    light, _ = comb(5.0)
+    light[103:180, 183:260] = spot
+    rings = coarse_block(wall_mask(light, 20.0, bright=True).mask, light, 20.0).rings
+    assert [ring.is_hole for ring in rings] == [False, True]
+
+
 def test_an_opening_with_a_wide_way_out_is_a_bay() -> None:
     light, _ = comb(5.0)
     light[63:140, 240:330] = 5

@@ -16,7 +16,7 @@ log = logging.getLogger("combtrace.camera_watch")
 
 RETRY_S = 0.5  # a camera that returns is back within two seconds, opening included
 CHECK_S = 1.0
-WATCH_PERIOD_S = 0.1
+WATCH_PERIOD_S = 0.25
 
 
 class CameraWatch:

@@ -23,7 +23,7 @@ log = logging.getLogger("combtrace.link")
 
 # The last one again and again: with 1 s for an attempt that meets nobody, back within 2 s of the controller's return.
 RETRY_PAUSES_S = (0.1, 0.2, 0.5)
-HEARTBEAT_PERIOD_S = 0.4  # the protocol wants a change at least once a second
+HEARTBEAT_PERIOD_S = 0.5  # the protocol wants a change at least once a second
 REMINDER_S = 60.0  # how often a loss that lasts is told again
 CLOCK_TOLERANCE_MS = 1000  # protocol: a clock reading counts only if it fits the one before within 1 s
 READS_FOR_TWO_ALIKE = 20

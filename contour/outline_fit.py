@@ -95,9 +95,11 @@ def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
             noise = max(noise_from_residuals(witnesses, residuals(witnesses, segments)), least)
             witnesses, least = scaled(witnesses, noise), least / noise
         proposals = around(witnesses, segments)
-        if round_ == 1 or len(witnesses) <= FEW:
+        if round_ == 1:
             # With the noise known, and free of what the first labelling took for granted.
-            proposals = gather([proposals, propose(witnesses)])
+            fresh = propose(witnesses)
+        if round_ == 1 or (round_ > 1 and len(witnesses) <= FEW):
+            proposals = gather([proposals, fresh])
         found = runs(label(witnesses, proposals), proposals)
         settled = round_ >= 1 and len(found) == len(segments) and bool((found.first == segments.first).all())
         segments = found

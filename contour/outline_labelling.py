@@ -34,7 +34,7 @@ _DEARER_PER_PITCH = 0.25
 _DEAREST = 2.0
 _REACH = 1.6
 _STATES = 8
-_STATES_OF_FEW, _PLACES_OF_FEW = 64, 1500
+_STATES_OF_FEW, _PLACES_OF_FEW = 48, 1500
 _NEARBY = 3
 # Gains above this mark models of the present labelling, which must stay available.
 _PRESENT = 5e3

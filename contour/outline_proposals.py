@@ -114,7 +114,7 @@ def _propose_everywhere(witnesses: Witnesses) -> Proposals:
     A ring of few witnesses has edges of two or three of them.
     """
     count = len(witnesses)
-    sizes = [size for size in (2, 3, 4, 5, 6, 8, 11, 16, 23, 32, 45) if size < count] + [count]
+    sizes = [size for size in (2, 3, 4, 6, 8, 12, 16, 24, 32) if size < count] + [count]
     parts = []
     for group in ([z for z in sizes if z <= 8], [z for z in sizes if z > 8]):
         parts += [fits for level in _levels(witnesses, group) for fits in level]
@@ -128,13 +128,14 @@ def _different(witnesses: Witnesses, fits: Proposals) -> Index:
     order = np.argsort(-fits.gain, kind="stable")
     signed = distance(fits.models.take((order, None)), witnesses.points[None, :])
     saved = np.maximum(witnesses.cap_inside - cost(witnesses, signed), 0.0)
+    total = saved.sum(axis=1)
     kept: list[int] = []
-    left = np.ones(len(order), dtype=bool)
-    for k in range(len(order)):
-        if left[k]:
-            kept.append(k)
-            left[k:] &= np.abs(saved[k:] - saved[k]).sum(axis=1) > _SAME * saved[k:].sum(axis=1)
-    return order[np.array(kept, dtype=np.intp)]
+    while len(order):
+        kept.append(int(order[0]))
+        other = np.abs(saved - saved[0]).sum(axis=1) > _SAME * total
+        other[0] = False
+        order, saved, total = order[other], saved[other], total[other]
+    return np.array(kept, dtype=np.intp)
 
 
 def _levels(witnesses: Witnesses, sizes: list[int]) -> list[list[Proposals]]:

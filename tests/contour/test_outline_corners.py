@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from contour.outline_fit import FittedRing, fit_ring
 from contour.outline_reach import supports
-from contour.wall_evidence import RingEvidence
+from contour.outline_witnesses import cost, prepare
+from contour.wall_evidence import RingEvidence, WitnessKind
 from tests.contour.outline_scenes import PITCH, distances, errors, rectangle, witnesses
 
 CORNER = np.array([300.0, 300.0])
@@ -58,6 +59,28 @@ def test_a_torn_stretch_of_many_cells_is_followed(seed: int) -> None:
     assert errors(found.ring, torn).max() < 0.5 * PITCH
 
 
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("deep", [1.2, 1.5])
+def test_a_torn_stretch_without_wall_ends_is_followed_too(deep: float, seed: int) -> None:
+    low, high, floor = 300.0, 1200.0, 300.0 + deep * PITCH
+    begin, end = 560.0, 560.0 + 7.0 * PITCH
+    tear = [[begin, low], [begin + 2.0 * PITCH, floor], [end - 2.0 * PITCH, floor], [end, low]]
+    torn = np.array([[low, low], *tear, [high, low], [high, 900.0], [low, 900.0]])
+    evidence = witnesses(torn, seed=seed, sigma=0.4, spacing=0.9 * PITCH)
+    along_tear = (evidence.points[:, 1] > low + 4.0) & (evidence.points[:, 1] < floor + 5.0)
+    kind = np.where(along_tear, WitnessKind.OUTERMOST, evidence.kind).astype(np.int8)
+    found = fitted(replace(evidence, kind=kind, sigma=np.where(along_tear, 1.0, evidence.sigma)))
+    assert errors(found.ring, torn).max() < 0.5 * PITCH
+
+
+@pytest.mark.parametrize("pitches", [2.2, 2.6])
+def test_a_cut_seen_by_two_or_three_wall_ends_is_no_missing_cell(pitches: float) -> None:
+    truth = cut_corner(pitches * PITCH)
+    for seed in range(10):
+        found = fitted(witnesses(truth, seed=seed, sigma=0.25, spacing=1.1 * PITCH))
+        assert errors(found.ring, truth).max() < 0.5 * PITCH, seed
+
+
 @pytest.mark.parametrize("seed", range(8))
 @pytest.mark.parametrize("side", [4.0, 5.5])
 def test_a_rectangular_hole_keeps_its_corners(side: float, seed: int) -> None:
@@ -87,6 +110,15 @@ def test_many_moderate_errors_make_no_extra_edges() -> None:
         vertices.append(len(fitted(replace(evidence, points=evidence.points + wide[:, None] * evidence.normal)).ring))
     assert np.median(vertices) == 4
     assert max(vertices) <= 5
+
+
+def test_a_wall_end_a_few_deviations_off_costs_less_than_its_square_and_a_far_one_its_cap() -> None:
+    ready = prepare(witnesses(rectangle(900.0, 600.0), seed=1), PITCH, None)
+    near, some, far = (cost(ready, -off * ready.inner) for off in (0.5, 3.0, 60.0))
+    assert (near > 0.9 * 0.125).all()
+    assert (some < 0.65 * 4.5).all()
+    assert (far < ready.cap_inside).all()
+    assert (far > 0.99 * ready.cap_inside).all()
 
 
 def test_supports_are_the_nearest_witnesses_on_the_same_model() -> None:

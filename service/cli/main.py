@@ -48,6 +48,8 @@ EXAMPLES
         Run the whole way once, with a simulated controller, and draw the result.
     combtrace trace block.png --overlay seen.png
         Trace one picture; no controller and no configuration needed.
+    combtrace calibrate --board charuco --squares 11x8 --square-mm 25 --plane flat.png --output calibration.yaml *.png
+        Make the calibration file from pictures of a board; `combtrace board` draws one.
     combtrace check --config config.yaml
         Say what is wrong with the configuration and every device it names.
     combtrace run --config config.yaml

@@ -34,17 +34,19 @@ def main() -> None:
     seeds = range(args.first, args.first + args.cameras)
     campaigns: dict[str, list[Trial]] = {}
     with ProcessPoolExecutor(args.workers) as pool:
-        for name, tilt_deg, board, count in (
-            ("boards tilted to 8°", 8.0, "charuco", args.cameras),
-            ("boards tilted to 20°", 20.0, "charuco", args.cameras // 2),
-            ("chessboard, tilted to 20°", 20.0, "chessboard", args.cameras // 5),
-        ):
-            jobs = list(seeds)[:count]
-            campaigns[name] = list(pool.map(trial, jobs, [tilt_deg] * count, [board] * count))
-            _note(f"{name}: {count} cameras")
-        chain: list[ChainTrial] = [
-            one for some in pool.map(chain_trial, range(args.first, args.first + CHAIN_CAMERAS)) for one in some
-        ]
+        running = {
+            name: pool.map(trial, list(seeds)[:count], [tilt_deg] * count, [board] * count)
+            for name, tilt_deg, board, count in (
+                ("boards tilted to 8°", 8.0, "charuco", args.cameras),
+                ("boards tilted to 20°", 20.0, "charuco", args.cameras // 4),
+                ("chessboard, tilted to 20°", 20.0, "chessboard", args.cameras // 10),
+            )
+        }
+        chains = pool.map(chain_trial, range(args.first, args.first + CHAIN_CAMERAS))
+        for name, trials in running.items():
+            campaigns[name] = list(trials)
+            _note(name)
+        chain: list[ChainTrial] = [one for some in chains for one in some]
         _note("whole chain")
         bumps: Bumps = measure_bumps(np.random.default_rng(args.first), pool)
     command = f"python -m benchmarks.calibration --cameras {args.cameras} --first {args.first} --write"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
@@ -60,7 +61,9 @@ def judged_traceable(scene: BenchScene) -> Verdict:
     recipe = Recipe(
         number=1, name="default", edge=scene.scene.edge, pieces="largest" if scene.name in _LARGEST else "one"
     )
-    seen = Measurer(calibration_for(rendered.camera)).measure(rendered.picture, recipe, rendered.thickness_mm)
+    seen = Measurer(calibration_for(rendered.camera), clock=time.process_time).measure(
+        rendered.picture, recipe, rendered.thickness_mm
+    )
     verdict = _verdict(scene.name, scene.tuned, not seen.findings, seen)
     if seen.pixels is None:
         return verdict
@@ -92,13 +95,6 @@ def report(refused: Sequence[Verdict], traceable: Sequence[Verdict]) -> str:
             ],
         ),
     ]
-    shares = [share for verdict in traceable if (share := _cost(verdict)) is not None]
-    if shares:
-        parts.append(
-            f"\nMeasuring the picture's quality takes {100 * float(np.median(shares)):.1f} % of the time of mask and "
-            "trace (median over the traceable pictures; 95th percentile "
-            f"{100 * float(np.quantile(shares, 0.95)):.1f} %)."
-        )
     far = sorted((v for v in traceable if v.right), key=lambda verdict: -verdict.off_pitches)[:1]
     for worst in far:
         parts.append(
@@ -111,6 +107,18 @@ def report(refused: Sequence[Verdict], traceable: Sequence[Verdict]) -> str:
     if wrong:
         parts.append("\n" + _plain_table(["traceable, but refused", "by", "in words"], map(_wrong_row, wrong)))
     return "\n".join(parts)
+
+
+def cost(traceable: Sequence[Verdict]) -> str:
+    """What measuring the picture's quality takes of the processor, besides mask and trace."""
+    shares = [share for verdict in traceable if (share := _cost(verdict)) is not None]
+    if not shares:
+        return "no picture was traced"
+    return (
+        f"Measuring the picture's quality takes {100 * float(np.median(shares)):.1f} % of the processor time of mask "
+        "and trace (median over the traceable pictures; 95th percentile "
+        f"{100 * float(np.quantile(shares, 0.95)):.1f} %)."
+    )
 
 
 def _summary(what: str, verdicts: Sequence[Verdict], *, traceable: bool) -> list[str]:
@@ -156,6 +164,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         traceable += _told(pool.map(_judged_random, seeds), len(seeds))
     text = report(refused, traceable)
     print(text)
+    print(f"\n{cost(traceable)}")
     if options.write:
         put_section("refusals", f"## {TITLE}\n\n{text}")
         print(f"\nwritten: {PAGE}")

@@ -22,6 +22,7 @@ from tests.contour.scenes import block
         Comb(37.0, 17.0, True, 60, 0.21, 0.25),  # foam
         Comb(23.0, 7.6, True, 150, 0.3, 0.25),  # a perforated plate
         Comb(149.0, 6.0, True, 6, 0.4, 0.8),  # few cells, each large
+        Comb(17.0, 6.2, False, 300, 0.5, 0.5),  # dark walls under blur
     ],
 )
 def test_combs_foams_and_plates_may_be_blocks(comb: Comb) -> None:

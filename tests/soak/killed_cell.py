@@ -32,6 +32,7 @@ from tests.system.processes import Process, combtrace, free_port, jobs, lines
 STEPS = ("service", "owner", "clear", "page", "readback", "commit", "link")
 MOMENTS = ("before", "after", "replied")
 WAIT_S = 60.0
+PATIENT_S = 300.0  # of what is waited out on a machine that has other work
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,9 @@ class KilledCell:
         """The contours that the pictures give."""
         pictures = sorted((self.folder / "pictures").iterdir())
         table = self.folder / "known.json"
-        done = combtrace("trace", *pictures, "--config", self.folder / "config.yaml", "--json", table)
+        done = combtrace(
+            "trace", *pictures, "--config", self.folder / "config.yaml", "--json", table, bound_s=PATIENT_S
+        )
         assert done.returncode == 0, done.stderr
         found = [contour["millimetres"] for contour in lines(table)]
         return frozenset(micrometres([contour["exterior"], *contour["holes"]]) for contour in found)
@@ -328,7 +331,7 @@ class KilledCell:
 
     def _stop(self, process: Process) -> None:
         if process.running:
-            status = process.stop()
+            status = process.stop(PATIENT_S)
             if status != 0:
                 self.life.add("ended", f"{process.log.name}: exit status {status} on SIGTERM")
 

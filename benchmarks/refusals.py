@@ -110,13 +110,13 @@ def report(refused: Sequence[Verdict], traceable: Sequence[Verdict]) -> str:
 
 
 def cost(traceable: Sequence[Verdict]) -> str:
-    """What measuring the picture's quality takes of the processor, besides mask and trace."""
+    """What measuring the picture's quality and the second look (stage `quality`) take beside mask and trace."""
     shares = [share for verdict in traceable if (share := _cost(verdict)) is not None]
     if not shares:
         return "no picture was traced"
     return (
-        f"Measuring the picture's quality takes {100 * float(np.median(shares)):.1f} % of the processor time of mask "
-        "and trace (median over the traceable pictures; 95th percentile "
+        f"Measuring the picture's quality, and the second look, take {100 * float(np.median(shares)):.1f} % of the "
+        "processor time of mask and trace (median over the traceable pictures; 95th percentile "
         f"{100 * float(np.quantile(shares, 0.95)):.1f} %)."
     )
 

@@ -86,8 +86,7 @@ def _level(difference: Gray, spread: float) -> float:
 
 def _region(apart: NDArray[np.bool_], pitch: float) -> Gray:
     """The largest piece with its cells filled; inner openings in which a disc of 1.1 pitches' radius fits stay open."""
-    material = apart.astype(np.uint8)
-    material = _closed(material, _GAP_PITCHES * pitch) | _leaking_cells(material, pitch)
+    material = _closed(apart.astype(np.uint8), _GAP_PITCHES * pitch)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(material, connectivity=8)
     area = (stats[:, cv2.CC_STAT_WIDTH] * stats[:, cv2.CC_STAT_HEIGHT]).astype(np.float64)
     area[0] = 0
@@ -96,6 +95,8 @@ def _region(apart: NDArray[np.bool_], pitch: float) -> Gray:
             "no block found: all that differs from the table is smaller than a block. Check that a block lies in view"
         )
     piece = (labels == int(np.argmax(area))).astype(np.uint8)
+    # Of the piece alone: specks of a table lie as close as walls, and enclose as much.
+    piece |= _leaking_cells(piece, pitch)
     padded = cv2.copyMakeBorder(piece, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     _, inner, _, _ = cv2.connectedComponentsWithStats(1 - padded, connectivity=4)
     room = cv2.distanceTransform(1 - padded, cv2.DIST_L2, 5)

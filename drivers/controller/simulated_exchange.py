@@ -44,6 +44,10 @@ class Outlet:
         self._held: deque[bytes] = deque()
         self._listener: Callable[[bytes], None] = lambda _frame: None
 
+    def forget(self) -> None:
+        """Drop what is held back: the server has stopped."""
+        self._held.clear()
+
     def listen(self, send: Callable[[bytes], None]) -> None:
         """From here on replies go to `send`."""
         self._listener = send
@@ -165,7 +169,8 @@ class Exchange:
             self._send(self._framing.frame(request, foreign(pdu)))
         elif kind == "repeated-reply":
             self._send(frame)
-            self._later(fault.delay_s, lambda: self._send(frame))
+            # On a line, where replies keep their order, the copy follows at once.
+            self._later(0.0 if self._serial_frames else fault.delay_s, lambda: self._send(frame))
         else:
             self._waiting += 1
             self._outlet.late(fault.delay_s, frame, self._sent_late)

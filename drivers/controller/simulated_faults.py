@@ -31,7 +31,7 @@ FAULT_KINDS: dict[FaultKind, str] = {
     "lost-request": "never done, never answered",
     "lost-reply": "done, the reply is lost",
     "late-reply": "done, answered only after delay_s; on a line, all that follows waits too",
-    "repeated-reply": "done, answered twice, the second time after delay_s",
+    "repeated-reply": "done, answered twice, the second time after delay_s; on a line at once",
     "garbled-request": "arrives with a wrong byte, so on RTU it is not done and not answered; on TCP it is lost",
     "garbled-reply": "done, the reply leaves with a wrong byte: on RTU its CRC is wrong; on TCP it is lost",
     "foreign-reply": "done, answered with the reply to another request: wrong address or count",

@@ -57,6 +57,7 @@ class RegisterServer:
         for timer in self._timers:
             timer.cancel()
         self._timers.clear()
+        self._outlet.forget()
         if self._line is not None:
             self._line.close()
             self._line = None

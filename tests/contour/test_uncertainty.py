@@ -152,7 +152,7 @@ def test_a_twentieth_of_the_outline_may_be_unknown() -> None:
 
 def test_a_hole_counts_by_its_length() -> None:
     outer = witnesses(WIDE, seed=3)
-    hole = witnesses(circle(60.0), seed=4, sigma=0.8, hole=True)
+    hole = witnesses(circle(60.0), seed=4, sigma=1.6, hole=True)
     assert stated(outer) < stated(outer, hole)
 
 

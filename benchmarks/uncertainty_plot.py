@@ -29,8 +29,8 @@ def write_plot(true_px: Sequence[float], stated_px: Sequence[float]) -> None:
         _text(canvas, f"{tick:g}", (MARGIN - 44, _at(LOW, tick)[1] + 5))
     for factor, name in ((1.0, "bound = error"), (2.0, "twice the error")):
         _line(canvas, (LOW, LOW * factor), (HIGH / factor, HIGH), INK)
-        x, y = _at(7.0 / factor, 7.0)
-        _text(canvas, name, (x - 150, y))
+        x, y = _at(12.0 / factor, 12.0)
+        _text(canvas, name, (x + 10, y) if factor == 1.0 else (x - 135, y))
     for true, stated in zip(true_px, stated_px, strict=True):
         colour = HELD if stated >= true else BROKEN
         cv2.circle(canvas, _at(true, stated), 4, colour, -1, cv2.LINE_AA)

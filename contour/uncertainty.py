@@ -45,11 +45,11 @@ class Coefficients:
     """Standard deviation that one pixel of each cause stands for."""
 
     blur: float = 0.31
-    leverage_blur: float = 0.39
-    leverage_spread: float = 0.26
+    leverage_blur: float = 0.46
+    leverage_spread: float = 0.20
     gap: float = 0.015
-    misfit: float = 0.33
-    outside: float = 0.18
+    misfit: float = 0.30
+    outside: float = 0.80
 
 
 @dataclass(frozen=True)

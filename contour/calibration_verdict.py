@@ -29,8 +29,8 @@ _TAKEN_BY_THE_CAMERA = 6
 is Student's for the rest, times the root of both axes' variances: 95 % where all error runs along one axis (a scale, a
 tilt), more where it runs all ways."""
 
-CORNER_BIAS_PX = 0.02
-"""What all corners of an area may be off by alike (rendered views: 0.01 px); more views do not take it away."""
+CORNER_BIAS_PX = 0.01
+"""What all corners of an area may be off by alike, as rendered views show it; more views do not take it away."""
 
 LEAST_COVERED = 0.5
 STRUCTURE_PX = 0.05

@@ -41,7 +41,7 @@ Random scenes of fresh seeds are the stricter test.
 
 def write_page(blocks: Sequence[tuple[str, str]], gallery: Gallery) -> list[str]:
     """Write the page and its pictures; their names. Sections that other commands wrote are kept."""
-    kept = kept_sections()
+    kept = kept_sections(PAGE)
     paths = gallery.write()
     machine = (
         f"{os.cpu_count()} cores, Python {platform.python_version()}, numpy {np.__version__}, OpenCV {cv2.__version__}"

@@ -34,7 +34,7 @@ bench-link: install
 	$(BIN)/python -m benchmarks.link --write
 
 accuracy: install
-	$(BIN)/python -m benchmarks.bench --random 300 --first 920000 --write
+	$(BIN)/python -m benchmarks.bench --random 300 --first 980000 --write
 
 # Each rule of the protocol taken out of a copy of the code: its test must fail then. Some minutes.
 rules: install

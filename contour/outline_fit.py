@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
 from contour.geometry import Ring
+from contour.outline_bevels import bevelled
 from contour.outline_chains import Chain, free_curves
 from contour.outline_curves import curve_points, within
 from contour.outline_joints import Flags, Joints, arc_points, thinned, without_reversed
@@ -71,6 +72,7 @@ def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifi
     for chain in chains:
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
+    found = bevelled(witnesses, segments, found, inlier)
     ring, owners = polygon(witnesses, segments, found, chains)
     spread = _spread(residual[inlier], wall_px)
     sigma = vertex_sigma(witnesses, segments, inlier, ring=ring, owners=owners, spread=spread)

@@ -35,6 +35,27 @@ def test_a_cut_off_corner_is_no_missing_cell(pitches: float, seed: int) -> None:
     assert errors(found.ring, truth).max() < 0.5 * PITCH
 
 
+def beside_a_cell(seed: int) -> RingEvidence:
+    """A corner cut off at two pitches, seen by one wall end and the side of a whole cell, both a little inside."""
+    evidence = witnesses(cut_corner(2.0 * PITCH), seed=seed, sigma=0.25)
+    middle = CORNER + PITCH
+    away = np.abs(evidence.points - middle).sum(axis=1) > 2.05 * PITCH
+    end, side = middle + [0.5 * PITCH, -0.5 * PITCH] + 2.0, middle + [-0.5 * PITCH, 0.5 * PITCH] + 4.0
+    points = np.vstack([evidence.points[away], side, end])
+    outwards = np.vstack([evidence.normal[away], np.full((2, 2), -np.sqrt(0.5))])
+    position = np.append(evidence.position[away], evidence.position[-1] + np.array([0.3, 0.6]) * PITCH)
+    sigma = np.append(evidence.sigma[away], [1.0, evidence.sigma[0]])
+    kind = np.append(evidence.kind[away], [WitnessKind.OUTERMOST, WitnessKind.CLEAN]).astype(np.int8)
+    return replace(evidence, points=points, normal=outwards, position=position, sigma=sigma, kind=kind)
+
+
+def test_a_corner_that_a_whole_cell_speaks_against_is_less_than_a_pitch_off_either_way() -> None:
+    for seed in range(4):
+        ring = fitted(beside_a_cell(seed)).ring
+        assert errors(ring, cut_corner(2.0 * PITCH)).max() < 0.7 * PITCH, seed
+        assert distances(CORNER[None], ring)[0] < PITCH, seed
+
+
 def lost_corner(seed: int) -> RingEvidence:
     """A square with the walls about its first corner pushed in by about half a cell, each by another amount."""
     evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)

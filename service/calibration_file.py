@@ -56,7 +56,10 @@ def load_record(path: Path) -> CalibrationRecord:
     model = MODELS.get(str(data.get("kind")))
     if model is None:
         expected = ", ".join(repr(kind) for kind in MODELS)
-        raise CalibrationFileError(f"{path}: kind is {data.get('kind')!r}, expected one of {expected}")
+        raise CalibrationFileError(
+            f"{path}: kind is {data.get('kind')!r}, expected one of {expected}. Is it a calibration file? "
+            "`combtrace calibrate` makes one"
+        )
     try:
         file = model.model_validate(data)
     except ValidationError as error:

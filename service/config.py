@@ -331,7 +331,8 @@ class Recipe(Model):
         for name, value in self.parameters.items():
             if name not in known:
                 there = ", ".join(known) or "none"
-                raise ValueError(f"parameters.{name} is none of {self.method}'s; there are: {there}")
+                owner = next((f"; {name} is {other}'s" for other, its in METHOD_PARAMETERS.items() if name in its), "")
+                raise ValueError(f"parameters.{name} is none of {self.method}'s; there are: {there}{owner}")
             low, high = known[name]
             if not low <= value <= high:
                 raise ValueError(f"parameters.{name} is {value:g}, expected {low:g} to {high:g}")

@@ -28,7 +28,7 @@ CLIPPED = 0.01
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The camera, and a bound for scripts."""
-    parser.add_argument("--frames", type=int, default=0, metavar="N", help="end after N frames; default never")
+    parser.add_argument("--frames", type=int, default=0, metavar="N", help="end after N frames; default 0: never")
     add_camera_arguments(parser)
 
 

@@ -26,6 +26,13 @@ every two seconds and at the end. docs/simulated-controller.md explains scenario
 The addresses are those of the default layout; --layout gives others."""
 
 VERDICT_PERIOD_S = 2.0
+RANGES = {
+    "device_id": (1, 255),
+    "scan_ms": (0.1, 10_000),
+    "trigger_every": (0.01, 86_400),
+    "recipe": (0, 65_535),
+    "baudrate": (300, 4_000_000),
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +63,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until stopped."""
+    _check_ranges(args)
     return asyncio.run(_serve(args))
+
+
+def _check_ranges(args: argparse.Namespace) -> None:
+    for name, (low, high) in RANGES.items():
+        value = getattr(args, name)
+        if value is not None and not low <= value <= high:
+            raise UserError(f"--{name.replace('_', '-')} {value:g}: expected {low:g} to {high:g}")
 
 
 async def _serve(args: argparse.Namespace) -> int:

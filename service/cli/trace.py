@@ -168,7 +168,8 @@ def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
         read_ms = (time.perf_counter() - started) * 1000
         measurement = setup.measurer.measure(picture, setup.recipe, setup.thickness_mm)
     except (CameraError, ContourError) as error:
-        return _error_record(image, setup, str(error)), f"{image}: {error}", EXIT_UNUSABLE
+        line = f"{image}: {str(error).removeprefix(f'{image}: ')}"  # drivers name the file, the tracing does not
+        return _error_record(image, setup, str(error)), line, EXIT_UNUSABLE
     times = {"read": read_ms, **measurement.timings_ms}
     times["total"] = sum(value for name, value in times.items() if name != "total")
     measurement = replace(measurement, timings_ms=times)

@@ -44,6 +44,12 @@ def test_a_device_without_a_size_is_refused(size, capsys):
     assert "such as 1280x720" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("option", [["--size", "640x480"], ["--format", "MJPG"], ["--rate", "5"]])
+def test_a_device_s_option_without_a_device_is_refused_and_not_passed_over(option, tmp_path, capsys):
+    assert main(["grab", "--output", str(tmp_path / "x.png"), *option]) == 2
+    assert f"{option[0]} goes with --device" in capsys.readouterr().err
+
+
 @pytest.mark.usefixtures("picture")
 def test_grab_to_an_unknown_kind_of_picture_says_which_there_are(tmp_path, capsys):
     assert main(["grab", "--config", str(tmp_path / "config.yaml"), "--output", str(tmp_path / "x.doc")]) == 2

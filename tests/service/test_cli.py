@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from service.cli.main import main
 from tests.system.processes import combtrace
 
 COMMANDS = ("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema")
@@ -70,6 +71,24 @@ def test_a_bad_address_is_a_usage_error(address: str) -> None:
     done = combtrace("simulate-controller", "--tcp", address)
     assert done.returncode == 2
     assert "expected HOST:PORT" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--trigger-every", "-1"],
+        ["--scan-ms", "0"],
+        ["--scan-ms", "nan"],
+        ["--recipe", "70000"],
+        ["--device-id", "300"],
+        ["--baudrate", "0"],
+    ],
+)
+def test_a_number_that_no_controller_has_is_refused_with_what_is_expected(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate-controller", "--tcp", "127.0.0.1:0", *arguments]) == 2
+    assert f"{arguments[0]} {arguments[1]}: expected" in capsys.readouterr().err
 
 
 def test_an_address_in_use_is_an_error_that_names_it() -> None:

@@ -248,6 +248,8 @@ def test_the_same_picture_in_another_form_gives_the_same_contour(tmp_path: Path,
         (["--method", "sliding-matrix", "--core-px", "0"], "core_px is 0"),
         (["--method", "sliding-matrix", "--threshold", "300"], "threshold is 300"),
         (["--method", "direct-scan", "--core-px", "5"], "parameters.core_px is none of direct-scan's"),
+        (["--core-px", "5"], "there are: none; core_px is sliding-matrix's"),
+        (["--calibration", "config.yaml"], "`combtrace calibrate` makes one"),
         (["--binarize", "fuzzy"], "expected flat, otsu, or a number 0 to 255"),
         (["--binarize", "256"], "expected flat, otsu, or a number 0 to 255"),
         (["--method", "magic"], "invalid choice: 'magic'"),
@@ -263,6 +265,12 @@ def test_bad_usage_is_told_and_has_status_2(arguments: list[str], expected: str)
     assert done.returncode == 2
     assert expected in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_picture_that_is_not_there_is_named_once(tmp_path: Path) -> None:
+    told = combtrace("trace", tmp_path / "none.png")
+    assert told.returncode == 2
+    assert told.stderr.startswith(f"{tmp_path / 'none.png'}: cannot be read")
 
 
 def test_a_region_of_interest_hides_what_lies_outside() -> None:

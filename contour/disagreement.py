@@ -1,6 +1,6 @@
 """How far a contour is from another account of the block: where the picture is busy at the scale of a cell.
 
-The other account knows the cell pitch and nothing else of what the tracing saw: the picture is reduced to about nine
+The other account knows the cell pitch and nothing else of what the tracing saw: the picture is reduced to about six
 pixels a pitch, what stands out from the mean over a pitch is averaged over a pitch, and the block is where that average
 is more than half of what it is in busy places nearby. Such an outline is good to about half a pitch, to one where a
 scratch or a shadow lies against the block, and has no sense of edges and corners; it is no contour to cut along, but it
@@ -20,7 +20,7 @@ from contour.geometry import Contour, Ring
 Picture = NDArray[np.uint8]
 Mask = NDArray[np.uint8]
 
-_PITCH_PX = 9
+_PITCH_PX = 6
 _SHARE_OF_LEVEL = 0.5
 _NEARBY_PITCHES = 8.0
 # Of the busiest places in the picture: less is table, however quiet its surroundings.

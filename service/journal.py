@@ -26,6 +26,10 @@ SCHEMA_VERSION = 1
 HEADER_REGISTERS = 31
 PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
 LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
+COLUMNS = (
+    "job_id, taken_at, trigger_kind, recipe, thickness_um, trigger_session, trigger_counter,"
+    " session, pages, withdraw_reason, outcome, reason, detail, settled_at, report"
+)
 RESTORED = (
     "job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
     " withdraw_reason"
@@ -278,20 +282,19 @@ class Journal:
         report: dict[str, Any] | None = None,
     ) -> Job:
         """The job with its final state, durable; its pages are dropped. A job settles once: raise JournalConflict."""
-        self._update(
+        return self._update(
             job_id,
             "outcome = ?, reason = ?, detail = ?, settled_at = ?, report = ?, pages = NULL",
             (str(outcome), None if reason is None else int(reason), detail, self._stamp(), json.dumps(report or {})),
         )
-        job = self.find(job_id)
-        assert job is not None
-        return job
 
-    def _update(self, job_id: int, assignments: str, values: tuple[Any, ...]) -> None:
+    def _update(self, job_id: int, assignments: str, values: tuple[Any, ...]) -> Job:
+        """The job as it is then; read in the same step: a failure after the commit would say that nothing was done."""
         with self._transaction() as db:
             cursor = db.execute(f"UPDATE jobs SET {assignments} WHERE job_id = ? AND {UNSETTLED}", (*values, job_id))
             if cursor.rowcount != 1:
                 raise JournalConflict(f"{self._path}: job {job_id} is not there, or has ended already")
+            return _job(db.execute(f"SELECT {COLUMNS} FROM jobs WHERE job_id = ?", (job_id,)).fetchone())
 
     def find(self, job_id: int) -> Job | None:
         """The job, or None."""
@@ -325,12 +328,8 @@ class Journal:
             return self._db.execute(query).fetchone()
 
     def _jobs(self, where: str, values: tuple[Any, ...] = ()) -> tuple[Job, ...]:
-        columns = (
-            "job_id, taken_at, trigger_kind, recipe, thickness_um, trigger_session, trigger_counter,"
-            " session, pages, withdraw_reason, outcome, reason, detail, settled_at, report"
-        )
         with self._lock, self._translated():
-            rows = self._db.execute(f"SELECT {columns} FROM jobs {where}", values).fetchall()
+            rows = self._db.execute(f"SELECT {COLUMNS} FROM jobs {where}", values).fetchall()
         return tuple(_job(row) for row in rows)
 
     def _stamp(self) -> str:
@@ -364,14 +363,21 @@ def pages_to_text(pages: tuple[Page, ...]) -> str:
 
 
 def pages_from_text(text: str) -> tuple[Page, ...]:
-    """The pages that `pages_to_text` wrote; each header says where its page ends."""
-    registers = array("H", bytes.fromhex(text))
+    """The pages that `pages_to_text` wrote; each header says where its page ends. None where the text was damaged."""
+    try:
+        registers = array("H", bytes.fromhex(text))
+    except ValueError:
+        return ()
     if sys.byteorder == "little":
         registers.byteswap()
     pages, start = [], 0
     while start < len(registers):
         body = start + HEADER_REGISTERS
+        if body > len(registers):
+            return ()
         end = body + registers[start + PAYLOAD_LENGTH]
+        if end > len(registers):
+            return ()
         pages.append(Page(tuple(registers[start:body]), tuple(registers[body:end])))
         start = end
     return tuple(pages)

@@ -168,3 +168,24 @@ def test_a_full_disk_is_called_so_and_the_journal_works_again_once_there_is_room
     before = journal.last_taken()
     assert journal.take(TriggerStamp("serial")).job_id == (before.job_id if before else 0) + 1
     journal.close()
+
+
+def test_a_job_is_settled_and_read_back_in_one_step(journal: Journal, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Were its reading to fail after the commit, trying again would meet a job that has ended already."""
+    job = journal.take(TriggerStamp("serial"))
+
+    def unreadable(*_: object) -> None:
+        raise JournalError("disk I/O error")
+
+    monkeypatch.setattr(journal, "_jobs", unreadable)
+    assert journal.settle(job.job_id, Outcome.ACCEPTED, None, None).outcome is Outcome.ACCEPTED
+
+
+@pytest.mark.parametrize("stored", ["no hexadecimal digits", "0001", "0" * 4 * 40, ""])
+def test_pages_that_cannot_be_read_any_more_are_none(journal: Journal, stored: str) -> None:
+    """A damaged disk may change a text that SQLite does not check; the job must be found all the same."""
+    job = journal.take(TriggerStamp("serial"))
+    journal.store_pages(job.job_id, 9, (PAGE,))
+    journal._db.execute("UPDATE jobs SET pages = ?", (stored,))
+    (found,) = journal.unsettled()
+    assert (found.pages, found.sent) == ((), True)

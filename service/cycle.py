@@ -127,6 +127,7 @@ class Cycle:
         except Exception as error:  # the one owner of defects: a job that was taken always ends
             log.exception("job %d: internal error", job.job_id)
             settlement = await self._end_defect(job, error)
+        self._health.report("in-flight", None)  # the controller has decided, however long it took
         report["total_ms"] = round((self._now() - started) * 1000, 1)
         return await self._settle(job, settlement, report)
 
@@ -140,6 +141,8 @@ class Cycle:
         transfer = self._transfer(self._link, job, job.session, job.pages, self._now() + self._lifetime_s, sent=True)
         if job.withdraw_reason is not None:
             settlement = await transfer.withdraw(job.withdraw_reason, "a withdrawal that the restart cut short")
+        elif not job.pages:
+            settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, "its pages cannot be read in the journal")
         elif job.pages[0].header[VALID_FOR] == NO_LIMIT:
             detail = "how old the contour is cannot be known after a restart, and the controller would not look"
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
@@ -172,10 +175,7 @@ class Cycle:
             return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
         transfer = self._transfer(self._link, job, stamp.session, pages, stamped_at + self._lifetime_s)
         before = self._now()
-        try:
-            settlement = await transfer.run()
-        finally:
-            self._health.report("in-flight", None)
+        settlement = await transfer.run()
         report["transfer_ms"] = round((self._now() - before) * 1000, 1)
         return settlement
 

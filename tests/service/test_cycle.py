@@ -545,3 +545,33 @@ async def test_a_job_that_was_found_and_had_been_accepted_is_accepted(tmp_path: 
         settled = await asyncio.wait_for(built.cycle.resume(job), 15)
         assert settled.outcome is Outcome.ACCEPTED
         assert built.controller.count("write_page") == 0
+
+
+async def test_a_withdrawal_after_a_defect_that_dragged_on_leaves_no_fault_behind(tmp_path: Path) -> None:
+    settings = replace(SETTINGS, transfer=replace(QUICK, max_repeats=1))
+    async with rig(tmp_path, settings, controller=ScriptedController([None])) as built:
+        read_page = built.controller.read_page
+
+        async def broken(payload_length: int) -> object:
+            built.controller.read_page = read_page  # type: ignore[method-assign]
+            raise ZeroDivisionError("a defect")
+
+        built.controller.read_page = broken  # type: ignore[method-assign,assignment]
+        taken = built.journal.take(TriggerStamp("serial"))
+        task = asyncio.ensure_future(built.cycle.run(taken))
+        while built.machine.state is not State.ERROR:
+            await asyncio.sleep(0.01)
+        built.controller.answers = [Answer.WITHDRAWN]
+        assert (await asyncio.wait_for(task, 10)).reason is Reason.INTERNAL_ERROR
+        assert built.machine.state is State.READY
+
+
+async def test_a_sent_job_whose_pages_cannot_be_read_any_more_is_withdrawn_with_154(tmp_path: Path) -> None:
+    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
+        taken = built.journal.take(TriggerStamp("serial"))
+        built.journal.store_pages(taken.job_id, 9, (Page((0,) * 31, ()),))
+        built.journal._db.execute("UPDATE jobs SET pages = 'rotten' || substr(pages, 7)")
+        (job,) = built.journal.unsettled()
+        settled = await asyncio.wait_for(built.cycle.resume(job), 15)
+        assert (settled.outcome, settled.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
+        assert built.controller.link.last_result == Answer.WITHDRAWN

@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import ParamSpec, Protocol
+from typing import ParamSpec, Protocol, TypeVar
 
 from drivers.controller.mailbox import TEST_VALUE, ServiceBlock
 from service.health import Fault, Health, journal_fault
@@ -18,6 +18,7 @@ from service.state import State
 log = logging.getLogger("combtrace.jobs")
 
 P = ParamSpec("P")
+R = TypeVar("R")
 
 JOURNAL_PAUSE_S = 1.0
 COUNTER_VALUES = 65535  # a trigger counter runs 1…65535; 0 means none yet
@@ -120,8 +121,8 @@ class Executor:
         in_flight = session if block.job_id > block.settled_job and session else None
         log.warning("job numbers go on above %d, which another journal's service gave here", block.job_id)
         await self._until_done(self._journal.adopt, block.job_id, pair, in_flight)
-        self._last_pair = self._journal.last_controller_trigger()
-        taken = self._journal.last_taken()
+        self._last_pair = await self._until_done(self._journal.last_controller_trigger)
+        taken = await self._until_done(self._journal.last_taken)
         if taken is None or taken.job_id <= block.job_id:
             self.settled_job = max(self.settled_job, block.settled_job)
             self._link.publish(job_id=block.job_id, settled_job=self.settled_job, reject_reason=block.reject_reason)
@@ -131,17 +132,17 @@ class Executor:
             self._found = True
             self._wake.set()
 
-    async def _until_done(self, write: Callable[P, None], *args: P.args, **kwargs: P.kwargs) -> None:
+    async def _until_done(self, access: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         while True:
             try:
-                await asyncio.to_thread(write, *args, **kwargs)
+                result = await asyncio.to_thread(access, *args, **kwargs)
             except JournalError as error:
                 self._tell(f"journal: {error}")
                 self._health.report("journal", journal_fault(error))
                 await asyncio.sleep(JOURNAL_PAUSE_S)
             else:
                 self._health.report("journal", None)
-                return
+                return result
 
     @property
     def missed(self) -> int:
@@ -217,7 +218,7 @@ class Executor:
         await self._settle_in_flight()
         while True:
             self._wake.clear()
-            if self._found:
+            if self._found and not self._taking:  # a job that is only being taken is none of before
                 self._found = False
                 await self._settle_in_flight()
             if self._submitted is not None:

@@ -99,6 +99,7 @@ class Link:
         self._written_at = -1e9
         self._trouble: str | None = "not connected yet"
         self._served = False
+        self.connections = 0  # opened so far: what was confirmed on one says nothing of the controller on the next
         self._connected_at = 0.0
         self._heard_at = 0.0
         self._lost_at: float | None = None
@@ -305,7 +306,11 @@ class Link:
         if not self.ownership.saw(found):
             return
         if self.ownership.is_foreign(found):
+            if self.settings.handshake and self.view is None:
+                return  # in which session its job is to be taken back is not known: watch anew
             await self.on_found(found)
+            if await self.controller.read_service() != found:  # making that durable may have taken long
+                return
         await self._write_service()
 
     async def _write_service(self) -> None:
@@ -335,6 +340,7 @@ class Link:
                 try:
                     await self.controller.connect()
                     self._forget()
+                    self.connections += 1
                     self._connected_at = self._now()
                     self._dirty = True
                     self._up.set()

@@ -262,11 +262,10 @@ class Transfer:
 
     async def _attempt(self, page: Page) -> Answer | None:
         """Steps 2 to 7 for one page: the controller's answer, None where there was none."""
-        controller, ownership = self._link.controller, self._link.ownership
-        ownership.check()
-        await controller.write_transfer(0)
+        controller = self._link.controller
+        clean = await self._clear()
         await self._about_to_send()
-        ownership.check()
+        self._check_may_go_on(clean)
         await controller.write_page(page)
         if self._settings.readback and await controller.read_page(len(page.payload)) != page:
             self._told("read-back differs from what was written: check contour_address and payload_capacity")
@@ -275,7 +274,7 @@ class Transfer:
             return None
         view = self._link.view or await self._look()
         transfer = self._counter.next(view.ack_transfer)
-        ownership.check()
+        self._check_may_go_on(clean)
         try:
             await controller.write_transfer(transfer)
         except ControllerUnavailable as error:  # it may have been done: go on with step 7
@@ -283,6 +282,18 @@ class Transfer:
             if not await self._reconnected():
                 return None
         return await self._answer(transfer)
+
+    async def _clear(self) -> int:
+        """Step 2: the number of the connection on which `transfer` = 0 was confirmed."""
+        self._link.ownership.check()
+        await self._link.controller.write_transfer(0)
+        return self._link.connections
+
+    def _check_may_go_on(self, clean: int) -> None:
+        """Raise ControllerError where steps 3 to 5 must not follow the step 2 confirmed on connection `clean`."""
+        self._link.ownership.check()
+        if self._link.connections != clean:
+            raise ControllerUnavailable("the connection was opened anew: it begins again with transfer = 0")
 
     def _too_old(self) -> bool:
         """True where the contour must not be committed any more; a withdrawal never ages."""
@@ -346,11 +357,14 @@ class Transfer:
         while in_vain < self._settings.max_repeats and self._now() < self._expires_at_s:
             self._check_owner()
             try:
-                self._link.ownership.check()
-                await controller.write_transfer(0)
+                clean = await self._clear()
                 await self._about_to_send()
+                self._check_may_go_on(clean)
                 await controller.write_page(page)
                 if not self._settings.readback or await controller.read_page(len(page.payload)) == page:
+                    if self._too_old():
+                        return Settlement(Outcome.FAILED, Reason.EXPIRED, self._trouble)
+                    self._check_may_go_on(clean)
                     await controller.write_transfer(transfer)
                     return Settlement(Outcome.WRITTEN)
                 self._told("read-back differs from what was written: check contour_address and payload_capacity")

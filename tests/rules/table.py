@@ -55,6 +55,13 @@ RULES = (
         "except ControllerUnavailable as error:  # it may have been done: go on with step 7",
         "except ZeroDivisionError as error:",
     ),
+    Rule(
+        "Conventions: on a new connection step 2 again, though none of the transfer's own writes was lost",
+        f"{TRANSFER}::Transfer._check_may_go_on",
+        f"{IN_TRANSFER}::test_a_connection_that_was_opened_anew_begins_again_with_transfer_0",
+        "if self._link.connections != clean:",
+        "if False:",
+    ),
     # --- link block ---
     Rule(
         "Link block: session 0 is disregarded",
@@ -116,9 +123,9 @@ RULES = (
     ),
     Rule(
         "Transfer 2: transfer = 0 before payload and header",
-        f"{TRANSFER}::Transfer._attempt",
+        f"{TRANSFER}::Transfer._clear",
         f"{IN_TRANSFER}::test_a_page_is_cleared_written_read_back_and_committed_in_this_order",
-        "await controller.write_transfer(0)",
+        "await self._link.controller.write_transfer(0)",
         "pass",
     ),
     Rule(

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox import Answer, ServiceBlock
+from drivers.controller.mailbox import Answer, LinkBlock, ServiceBlock
 from service.link import Link
 from service.ownership import ForeignOwner, Ownership
 from service.reasons import Outcome, Reason
@@ -282,3 +282,43 @@ async def test_an_observing_link_reads_and_never_writes() -> None:
         assert link.fault() is None
         assert isinstance(link, Link)
     assert written(controller) == set()
+
+
+async def test_another_that_writes_while_what_it_left_is_made_durable_is_not_overwritten(short_watch: None) -> None:
+    controller = ScriptedController()
+    Another(controller, alive=False)
+    async with linked(controller) as link:
+
+        async def slow_disk(block: ServiceBlock) -> None:
+            controller.service = replace(block, service_heartbeat=block.service_heartbeat + 1)
+
+        link.on_found = slow_disk
+        link.publish(owner=OURS)
+        await asyncio.sleep(0.6)
+    assert written(controller) == set()
+
+
+async def test_what_another_left_is_not_taken_over_before_the_controllers_block_holds_still(short_watch: None) -> None:
+    """In which session its job is to be taken back would not be known."""
+    controller = ScriptedController()
+    Another(controller, alive=False)
+    sessions: list[int | None] = []
+    async with linked(controller) as link:
+
+        async def on_found(_block: ServiceBlock) -> None:
+            sessions.append(link.view.session if link.view else None)
+
+        link.on_found = on_found
+        read_link, numbers, unsteady = controller.read_link, itertools.count(), True
+
+        async def changing() -> LinkBlock:
+            block = await read_link()
+            return replace(block, recipe=next(numbers) & 0xFFFF) if unsteady else block
+
+        link.publish(owner=OURS)
+        controller.read_link = changing  # type: ignore[method-assign]
+        await asyncio.sleep(0.8)
+        assert sessions == []
+        unsteady = False
+        await until(lambda: link.ownership.ours)
+    assert sessions == [9]

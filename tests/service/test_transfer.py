@@ -12,6 +12,7 @@ from service.reasons import Outcome, Reason
 from service.transfer import Settlement, TransferCounter, TransferSettings
 from tests.service.scripted_controller import ScriptedController
 from tests.service.transferring import JOB, QUICK, SESSION, page, transferring
+from tests.service.waiting import until
 
 
 async def test_a_page_is_cleared_written_read_back_and_committed_in_this_order() -> None:
@@ -407,3 +408,33 @@ async def test_no_contour_is_sent_before_the_service_block_is_confirmed() -> Non
         let_go.set()
         assert await task == Settlement(Outcome.ACCEPTED)
         assert controller.service.trigger_ack == 5
+
+
+async def test_without_handshake_a_contour_that_became_too_old_on_its_way_is_not_committed() -> None:
+    controller = ScriptedController()
+    async with transferring(controller, TransferSettings(handshake=False), lifetime_s=0.1) as run:
+
+        async def slow_disk() -> None:
+            await asyncio.sleep(0.2)
+
+        run.transfer._before_sending = slow_disk
+        settlement = await run.end()
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.EXPIRED)
+    assert controller.count("commit") == 0
+
+
+@pytest.mark.parametrize("handshake", [True, False])
+async def test_a_connection_that_was_opened_anew_begins_again_with_transfer_0(handshake: bool) -> None:
+    """What was confirmed before says nothing of a controller that may have started again meanwhile."""
+    controller = ScriptedController()
+    async with transferring(controller, replace(QUICK, handshake=handshake)) as run:
+
+        async def slow_disk() -> None:
+            await controller.close()  # a heartbeat finds it out, while the transfer waits for the disk
+            await until(lambda: controller.connects == 2 and run.link.fault() is None)
+
+        run.transfer._before_sending = slow_disk
+        settlement = await run.end()
+    assert settlement.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
+    steps = [name for name, _ in controller.requests if name in ("clear", "write_page", "commit")]
+    assert steps == ["clear", "clear", "write_page", "commit"]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.coarse_block import CoarseBlock, coarse_block
+from contour.dark_material import dark_beyond, midway_to_table
 from contour.errors import NoBlockFound
 from contour.pieces import pieces_beside, reaches_frame
 from contour.wall_cells import Cells, probe
@@ -41,6 +42,10 @@ _SIDE_SIGMA_PX = (0.5, 1.0)
 _NEAR_PX = 1.5
 _FAINT_HEIGHT = 0.45
 _FAINT_SIGMA_PX = 3.0
+# How far the edge of dark material is looked for from the last wall seen in it, and how near is the wall's own edge.
+_DARK_PITCHES = 4.0
+_INSIDE_PITCHES = 0.4
+_DARK_SIGMA_PX = 1.0
 # What the mask's own light blur (3 × 3) adds.
 _MASK_BLUR_PX = 0.8
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
@@ -74,27 +79,23 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
             "like noise. Check the light, and that a block lies in view"
         )
     seen = without_specks(seen, cells.pitch / scale, cells.wall / scale)
-    if not cells.bright:
-        seen = _darker_than_table(seen, small, cells)
+    midway = None if cells.bright else midway_to_table(small, cells.level, seen.contrast)
+    if midway is not None:
+        seen = _darker_than_table(seen, small, midway)
     on_mask()
     coarse = coarse_block(seen.mask, small, cells.pitch / scale)
     others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)
-    evidence = _evidence(light, seen, coarse, cells, scale)
+    evidence = _evidence(light, seen, coarse, cells, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
 
 
-def _darker_than_table(seen: WallMask, light: Gray, cells: Cells) -> WallMask:
+def _darker_than_table(seen: WallMask, light: Gray, midway: float) -> WallMask:
     """The mask without what is lighter than midway from dark walls to the table.
 
     Cells of a black block are nearly as dark as its walls. Against so small a contrast the table's own shades, beside a
     scratch or in the block's shadow, look like walls; but they are not dark.
     """
-    margin = max(1, min(light.shape) // 50)
-    rim = (light[:margin], light[-margin:], light[:, :margin], light[:, -margin:])
-    table = float(np.median(np.concatenate([part[::3, ::3].ravel() for part in rim])))
-    if table - cells.level < 2 * seen.contrast:
-        return seen
-    _, dark = cv2.threshold(light, 0.5 * (cells.level + table), 255, cv2.THRESH_BINARY_INV)
+    _, dark = cv2.threshold(light, midway, 255, cv2.THRESH_BINARY_INV)
     return replace(seen, mask=np.asarray(cv2.bitwise_and(seen.mask, dark), np.uint8))
 
 
@@ -115,7 +116,9 @@ class _Witnesses:
     sigma: Vector
 
 
-def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, scale: int) -> BlockEvidence:
+def _evidence(
+    light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, scale: int, midway: float | None
+) -> BlockEvidence:
     pitch, wall = cells.pitch / scale, max(1.0, cells.wall / scale)
     chains = edge_chains(seen.mask, coarse, pitch)
     found = find_ends(chains, coarse, pitch, wall)
@@ -135,8 +138,10 @@ def _evidence(light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, sc
     tips = _tips(light, ends, cells, model)
     tips = replace(tips, points=_raised(tips.points, coarse.feet((tips.points + 0.5) / scale - 0.5)[2], depth))
     outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch]
-    normal = coarse.feet(outer)[2]
-    sides = _sides(light, (outer + 0.5) * scale - 0.5, normal, depth.width or cells.wall, model)
+    normal, place = coarse.feet(outer)[2], (outer + 0.5) * scale - 0.5
+    sides = _sides(light, place, normal, depth.width or cells.wall, model)
+    if midway is not None and depth.width is None:
+        sides = _to_the_table(light, sides, place, normal, cells.pitch, midway)
     sides = replace(sides, points=_raised(sides.points, normal, depth))
     polarity = "bright" if cells.bright else "dark"
     return BlockEvidence(
@@ -196,6 +201,17 @@ def _sides(light: Gray, place: Points, normal: Points, wall: float, model: EndMo
     sigma = np.where(fitted.height < _FAINT_HEIGHT * (model.height or 1.0), _FAINT_SIGMA_PX, sigma)
     kind = np.full(len(place), WitnessKind.OUTERMOST, np.int8)
     return _Witnesses(points, kind, sigma)
+
+
+def _to_the_table(
+    light: Gray, sides: _Witnesses, place: Points, normal: Points, pitch: float, midway: float
+) -> _Witnesses:
+    """Sides, with those that lie inside of dark material, where its walls show no more, moved out to its edge."""
+    beyond = dark_beyond(light, place, normal, midway=midway, reach=_DARK_PITCHES * pitch)
+    moved = (sides.sigma >= _FAINT_SIGMA_PX) & (beyond > _INSIDE_PITCHES * pitch) & np.isfinite(beyond)
+    edge = place + np.where(moved, beyond, 0.0)[:, None] * normal
+    points = np.where(moved[:, None], edge, sides.points)
+    return replace(sides, points=points, sigma=np.where(moved, _DARK_SIGMA_PX, sides.sigma))
 
 
 def _raised(points: Points, normal: Points, depth: Parallax) -> Points:

@@ -1,0 +1,41 @@
+"""Dark blocks whose walls fade into their cells: their edge is where the table begins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.metrics import agreement
+from benchmarks.random_scenes import random_scene
+from benchmarks.trials import calibration_for
+from contour.dark_material import dark_beyond, midway_to_table
+from contour.synthetic import render
+from contour.tracing import TraceSettings, trace
+
+
+def test_a_corner_where_walls_fade_into_dark_cells_is_seen_against_the_table() -> None:
+    # Over ten pitches beside a corner no wall of this block is told from its cells.
+    rendered = render(random_scene(960208).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    found = trace(rendered.picture, TraceSettings(method="wall-tips"), rectifier=rectifier)
+    agreed = agreement(found.contour, rendered.truth_px, rectifier=rectifier)
+    assert agreed.hausdorff_px < 0.25 * rendered.pitch_px
+
+
+def ramp() -> np.ndarray:
+    """Columns of 50 up to x = 19, 100 at x = 20, 150 from there on."""
+    light = np.full((40, 60), 50, np.uint8)
+    light[:, 20], light[:, 21:] = 100, 150
+    return light
+
+
+@pytest.mark.parametrize(("x", "distance"), [(12.0, 7.5), (19.5, 0.0), (40.0, 0.0), (3.0, np.inf)])
+def test_dark_goes_on_to_where_the_light_first_rises_through_midway(x: float, distance: float) -> None:
+    found = dark_beyond(ramp(), np.array([[x, 9.0]]), np.array([[1.0, 0.0]]), midway=75.0, reach=12.0)
+    assert found == pytest.approx([distance], abs=0.01)
+
+
+def test_a_table_no_lighter_than_walls_in_their_cells_has_no_level_midway() -> None:
+    light = np.full((100, 100), 120, np.uint8)
+    assert midway_to_table(light, level=40.0, contrast=30.0) == 80.0
+    assert midway_to_table(light, level=40.0, contrast=41.0) is None

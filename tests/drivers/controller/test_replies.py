@@ -19,28 +19,9 @@ from drivers.controller.requests import (
     write_registers,
 )
 from tests.drivers.controller.rtu_frames import crc16
+from tests.drivers.controller.wire_fuzz import U16, requests, right_pdu
 
-U16 = st.integers(0, 0xFFFF)
 DEVICE = 7
-
-
-@st.composite
-def requests(draw: st.DrawFn) -> Request:
-    """Any request of the three kinds that the driver sends."""
-    function_code = draw(st.sampled_from([3, 6, 16]))
-    if function_code == 3:
-        return read_registers(draw(U16), draw(st.integers(1, 125)))
-    if function_code == 6:
-        return write_register(draw(U16), draw(U16))
-    return write_registers(draw(U16), draw(st.binary(min_size=1, max_size=123)) * 2)
-
-
-def right_pdu(request: Request) -> bytes:
-    """The reply's PDU as the standard asks for it, from the request's bytes."""
-    if request.pdu[0] == 3:
-        count = int.from_bytes(request.pdu[3:5], "big")
-        return bytes([3, 2 * count]) + stream_of([(number * 257) & 0xFFFF for number in range(count)])
-    return request.pdu[:5]
 
 
 class Tcp:

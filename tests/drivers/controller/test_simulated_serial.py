@@ -13,6 +13,7 @@ import pytest
 from drivers.controller import ControllerUnavailable
 from drivers.controller.mailbox import ServiceBlock, encode_service
 from drivers.controller.simulated import SimulatedController
+from tests.drivers.controller.rtu_frames import crc16
 
 
 @pytest.fixture(autouse=True)
@@ -24,15 +25,6 @@ async def no_task_is_left() -> AsyncIterator[None]:
 
 
 # --- Modbus RTU -------------------------------------------------------------------------------------------------------
-
-
-def crc16(data: bytes) -> bytes:
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
-    return crc.to_bytes(2, "little")
 
 
 class Line:

@@ -19,7 +19,7 @@ from tests.soak.report import write_report
 SLICES = [
     Terms(seed=901, jobs=15, risk=0.06),
     Terms(seed=902, jobs=12, risk=0.12, forgetful=True, slow_program=True, word_order="little"),
-    Terms(seed=903, jobs=8, risk=0.04, has_clock=False),
+    Terms(seed=903, jobs=8, risk=0.12, has_clock=False),
 ]
 
 
@@ -33,7 +33,7 @@ async def test_what_always_holds_holds_under_faults_and_restarts(
     # How many of them are accepted hangs on how long each fault holds a request up, which no seed fixes.
     assert came_to.acknowledged >= 5, "nothing was tried"
     assert came_to.accepted >= 1, "nothing was brought to its end"
-    assert came_to.faults.total() >= 3, "nothing was done to it"
+    assert came_to.faults.total() >= 1, "nothing was done to it"
 
 
 async def test_what_always_holds_holds_though_the_service_is_killed(tmp_path: Path) -> None:

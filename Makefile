@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera bench-camera bench bench-link accuracy refusals rules soak hil check format clean
+.PHONY: install demo test test-camera bench-camera bench bench-link bench-daemon accuracy refusals rules soak hil check format clean
 
 install: $(STAMP)
 
@@ -32,6 +32,9 @@ bench: install
 
 bench-link: install
 	$(BIN)/python -m benchmarks.link --write
+
+bench-daemon: install
+	$(BIN)/python -m benchmarks.daemon
 
 accuracy: install
 	$(BIN)/python -m benchmarks.bench --random 300 --first 980000 --write

@@ -1,0 +1,106 @@
+"""What the daemon takes when nothing is asked of it: `python -m benchmarks.daemon [--rest-s S]`.
+
+From its start to Ready with a warm disk, and at rest with the simulated controller on loopback: processor and memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+from tests.system.cell import Cell
+from tests.system.processes import until
+
+READY_S, REST_PERCENT, REST_MEGABYTES = 2.0, 2.0, 250.0
+STARTS = 5
+SETTLES_S = 2.0  # after a start, before the rest is measured
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One line of the table."""
+
+    what: str
+    value: float
+    unit: str
+    goal: float
+
+    @property
+    def met(self) -> bool:
+        """True where the value is not above its goal."""
+        return self.value <= self.goal
+
+    def __str__(self) -> str:
+        return f"| {self.what} | {self.value:.2f} {self.unit} | ≤ {self.goal:g} {self.unit} | {_yes(self.met)} |"
+
+
+def processor_s(process_id: int) -> float:
+    """Seconds of processor that a process has used, all threads: proc(5), fields 14 and 15."""
+    fields = Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def resident_megabytes(process_id: int) -> float:
+    """Memory that a process holds, in 10⁶ bytes."""
+    status = Path(f"/proc/{process_id}/status").read_text()
+    (line,) = (line for line in status.splitlines() if line.startswith("VmRSS:"))
+    return int(line.split()[1]) * 1024 / 1e6
+
+
+def seconds_to_ready(cell: Cell) -> float:
+    """From the start of a new process to its Ready, as its log says."""
+    seen = cell.service.text.count("-> Ready")
+    cell.service.stop()
+    begun = time.monotonic()
+    cell.service = cell.start_service()
+    until(lambda: cell.service.text.count("-> Ready") > seen, 60, "Ready")
+    return time.monotonic() - begun
+
+
+def measured(folder: Path, rest_s: float) -> list[Figure]:
+    """All figures; a moment's other load on the machine counts against them."""
+    cell = Cell(folder, triggers="[{kind: controller}]", trigger_every_s=None)
+    try:
+        cell.ready()
+        ready = [seconds_to_ready(cell) for _ in range(STARTS)]
+        time.sleep(SETTLES_S)
+        process = cell.service.process_id
+        used, begun = processor_s(process), time.monotonic()
+        time.sleep(rest_s)
+        share = (processor_s(process) - used) / (time.monotonic() - begun)
+        memory = resident_megabytes(process)
+    finally:
+        cell.stop()
+    return [
+        Figure(f"start to Ready, warm disk, median of {STARTS}", median(ready), "s", READY_S),
+        Figure(f"processor at rest, of one core, over {rest_s:g} s", 100 * share, "%", REST_PERCENT),
+        Figure("memory at rest", memory, "MB", REST_MEGABYTES),
+    ]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table; 1 where a goal is missed."""
+    parser = argparse.ArgumentParser(prog="benchmarks.daemon", description=__doc__)
+    parser.add_argument("--rest-s", type=float, default=30.0, metavar="S", help="how long rest is measured; default 30")
+    args = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        figures = measured(Path(folder), args.rest_s)
+    print("| what | measured | goal | met |\n|---|---|---|---|")
+    for figure in figures:
+        print(figure)
+    return 0 if all(figure.met for figure in figures) else 1
+
+
+def _yes(met: bool) -> str:
+    return "yes" if met else "**no**"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

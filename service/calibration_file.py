@@ -35,7 +35,8 @@ class CalibrationChanged(CalibrationFileError):
 class CalibrationRecord:
     """A calibration with what its file says besides: of which camera, when, by what means, and the fixed marks.
 
-    `created` None: the file does not say. `made` holds figures for people; nothing is decided by them.
+    `created` None: the file does not say. `made` holds figures for people; nothing is decided by them. `digest` and
+    `content`: hash and keys of the file it was read from, empty where it was not.
     """
 
     calibration: Calibration
@@ -43,6 +44,8 @@ class CalibrationRecord:
     created: datetime | None = None
     sentinels: Sentinels | None = None
     made: dict[str, str | float | None] = field(default_factory=dict)
+    digest: str = field(default="", compare=False)
+    content: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
 
 
 def load_calibration(path: Path) -> Calibration:
@@ -52,7 +55,11 @@ def load_calibration(path: Path) -> Calibration:
 
 def load_record(path: Path) -> CalibrationRecord:
     """All that a file says; raise CalibrationFileError."""
-    data = _read(path)
+    return record_of(_read(path), str(path))
+
+
+def record_of(data: dict[str, Any], path: str) -> CalibrationRecord:
+    """The same of a file's content; `path` is for messages. Raise CalibrationFileError."""
     model = MODELS.get(str(data.get("kind")))
     if model is None:
         expected = ", ".join(repr(kind) for kind in MODELS)
@@ -70,7 +77,15 @@ def load_record(path: Path) -> CalibrationRecord:
             "written. Restore it, calibrate again, or remove the line `hash` if the change was meant"
         )
     try:
-        return CalibrationRecord(calibration_of(file), file.camera_name, file.created, sentinels_of(file), file.made)
+        return CalibrationRecord(
+            calibration_of(file),
+            file.camera_name,
+            file.created,
+            sentinels_of(file),
+            file.made,
+            content_hash(data),
+            data,
+        )
     except CalibrationError as error:
         raise CalibrationFileError(f"{path}: {error}") from error
 

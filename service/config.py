@@ -369,13 +369,28 @@ class JournalSettings(Model):
     """Where jobs are kept."""
 
     path: FilePath = Field(Path("var/journal.sqlite"), description="SQLite file.")
+    max_jobs: int = Field(1_000_000, ge=1000, le=10**9, description="Most jobs kept; the oldest are let go.")
+    min_free_bytes: int = Field(
+        50_000_000,
+        ge=0,
+        le=10**15,
+        description="Free bytes of the journal's disk below which no trigger is taken (160 storage_full); 0 = none.",
+    )
 
 
 class ArchiveSettings(Model):
-    """Where evidence of jobs is kept. Read and checked; nothing is archived yet."""
+    """Where evidence of jobs is kept: frame, overlay, and a document with all that a replay needs."""
 
     path: FilePath = Field(Path("var/archive"), description="Folder.")
-    max_bytes: int = Field(2_000_000_000, ge=0, le=10**15, description="Most bytes kept.")
+    max_bytes: int = Field(
+        2_000_000_000, ge=0, le=10**15, description="Most bytes kept, the oldest are let go; 0 = nothing is kept."
+    )
+    min_free_bytes: int = Field(
+        500_000_000,
+        ge=0,
+        le=10**15,
+        description="Free bytes of the archive's disk that evidence leaves, whatever that costs it.",
+    )
 
 
 Camera = Annotated[FilesCamera | V4l2Camera, Field(discriminator="kind")]

@@ -13,18 +13,12 @@ from typing import Any, ParamSpec, TypeVar
 from contour.errors import ParameterError, PictureError
 from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
 from drivers.controller import ControllerError
-from drivers.controller.mailbox import (
-    ContourMessage,
-    ContourTooLarge,
-    MailboxError,
-    Page,
-    encode_pages,
-    micrometres,
-    withdrawal,
-)
+from drivers.controller.mailbox import ContourTooLarge, MailboxError, Page, crc32_of, withdrawal
 from service.config import Recipe
+from service.evidence import Evidence
 from service.health import Fault, Health, journal_fault
-from service.journal import Job, Journal, JournalError
+from service.job_pages import Envelope, contour_pages
+from service.journal import Job, Journal, JournalError, Terms
 from service.link import Link, Stamp
 from service.measure import Measurement, Measurer
 from service.reasons import Outcome, Reason
@@ -39,7 +33,6 @@ STAMP_WAIT_S = 1.5  # a lost connection is back within that
 JOURNAL_PAUSE_S = 1.0
 NO_LIMIT = (0, 0)
 VALID_FOR = slice(27, 29)  # in a page's header, which begins with offset 1
-UNCERTAINTY_FACTOR = 1000.0  # mm to µm
 
 
 @dataclass(frozen=True)
@@ -75,6 +68,22 @@ class Observation:
     measurement: Measurement
 
 
+@dataclass
+class _Course:
+    """What a job has come to so far; what it did not come to stays None."""
+
+    job: Job
+    report: dict[str, Any] = field(default_factory=dict)
+    recipe: Recipe | None = None
+    thickness_mm: float = 0.0
+    frame: Frame | None = None
+    measurement: Measurement | None = None
+    envelope: Envelope | None = None
+    pages: tuple[Page, ...] = ()
+    transfer: dict[str, Any] = field(default_factory=dict)
+    terms: Terms | None = None
+
+
 class _Stop(Exception):
     """The job ends here, before anything was sent."""
 
@@ -99,8 +108,10 @@ class Cycle:
         pool: ThreadPool,
         *,
         observe: Callable[[Observation], None] = lambda _observation: None,
+        keep: Callable[[Evidence], None] = lambda _evidence: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
+        """keep: is handed what an ended job leaves behind; called in the loop, so it must not block."""
         self._camera = camera
         self._measurer = measurer
         self._recipes = recipes
@@ -111,14 +122,15 @@ class Cycle:
         self._settings = settings
         self._pool = pool
         self._observe = observe
+        self._keep = keep
         self._now = now
 
     async def run(self, job: Job) -> Job:
         """The job, settled."""
-        report: dict[str, Any] = {}
+        course = _Course(job)
         started = self._now()
         try:
-            settlement = await self._carry_out(job, report, started)
+            settlement = await self._carry_out(course)
         except _Stop as stop:
             settlement = stop.settlement
         except asyncio.CancelledError:
@@ -128,15 +140,28 @@ class Cycle:
             log.exception("job %d: internal error", job.job_id)
             settlement = await self._end_defect(job, error)
         self._health.report("in-flight", None)  # the controller has decided, however long it took
-        report["total_ms"] = round((self._now() - started) * 1000, 1)
-        return await self._settle(job, settlement, report)
+        course.report["total_ms"] = self._since(started)
+        settled = await self._settle(job, settlement, course)
+        self._keep(
+            Evidence(
+                settled,
+                self._measurer,
+                course.recipe,
+                course.thickness_mm,
+                course.frame,
+                course.measurement,
+                course.envelope,
+                course.pages,
+            )
+        )
+        return settled
 
     async def resume(self, job: Job) -> Job:
         """A job that a restart found in flight, settled: sent again bit-identical, or withdrawn (154)."""
         handshake = self._settings.transfer.handshake
         if not job.sent or self._link is None or not handshake:
             detail = "nothing of it was sent" if not job.sent else "whether it was taken cannot be known"
-            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), {})
+            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), _Course(job))
         assert job.session is not None
         transfer = self._transfer(self._link, job, job.session, job.pages, self._now() + self._lifetime_s, sent=True)
         if job.withdraw_reason is not None:
@@ -148,36 +173,55 @@ class Cycle:
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
         else:
             settlement = await transfer.run()
-        return await self._settle(job, settlement, {})
+        return await self._settle(job, settlement, _Course(job))
 
     # --- the steps ----------------------------------------------------------------------------------------------
 
-    async def _carry_out(self, job: Job, report: dict[str, Any], started: float) -> Settlement:
-        recipe = self._recipe(job)
+    async def _carry_out(self, course: _Course) -> Settlement:
+        job = course.job
+        recipe = course.recipe = self._recipe(job)
+        course.thickness_mm = job.trigger.thickness_um / 1000 if job.trigger.thickness_um else recipe.thickness_mm
+        course.terms = Terms(recipe.model_dump(mode="json"), self._measurer.calibration_digest)
         stamp = await self._stamp(job)
         stamped_at = self._now()
-        frame = await self._frame(report)
-        measurement = await self._measure(frame, recipe, job)
-        report.update(measurement.summary())
+        frame = course.frame = await self._frame(course.report)
+        measurement = course.measurement = await self._measure(frame, recipe, course.thickness_mm)
+        course.report.update(measurement.summary())
         self._observe(Observation(job, frame, measurement))
         if measurement.reasons:
             raise _Stop(measurement.reasons[0], "; ".join(measurement.texts))
         if self._link is None:
             return Settlement(Outcome.WRITTEN, None, "no controller is configured")
+        before = self._now()
+        pages = await self._make_pages(course, stamp, frame, measurement)
+        course.report["pages_ms"] = self._since(before)
+        if self._settings.observe:
+            return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
+        expires_at_s = stamped_at + self._lifetime_s
+        transfer = self._transfer(self._link, job, stamp.session, pages, expires_at_s, terms=course.terms)
+        before = self._now()
+        settlement = await transfer.run()
+        course.report["transfer_ms"] = self._since(before)
+        course.transfer = _figures(stamp, pages)
+        return settlement
+
+    def _since(self, started: float) -> float:
+        """Milliseconds from then on, as they are told."""
+        return round((self._now() - started) * 1000, 1)
+
+    async def _make_pages(
+        self, course: _Course, stamp: Stamp, frame: Frame, measurement: Measurement
+    ) -> tuple[Page, ...]:
+        assert course.recipe is not None
+        course.envelope = self._envelope(course.job, course.recipe, stamp, frame)
         try:
             loop = asyncio.get_running_loop()  # in the pool: a large contour would hold the heartbeat up
-            pages = await loop.run_in_executor(self._pool, self._pages, job, recipe, stamp, frame, measurement)
+            course.pages = await loop.run_in_executor(self._pool, self._pages, measurement, course.envelope)
         except ContourTooLarge as error:
             raise _Stop(Reason.TOO_MANY_POINTS, str(error)) from error
         except MailboxError as error:  # what passed the checks in float64 degenerates in whole micrometres
             raise _Stop(Reason.SELF_INTERSECTING, str(error)) from error
-        if self._settings.observe:
-            return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
-        transfer = self._transfer(self._link, job, stamp.session, pages, stamped_at + self._lifetime_s)
-        before = self._now()
-        settlement = await transfer.run()
-        report["transfer_ms"] = round((self._now() - before) * 1000, 1)
-        return settlement
+        return course.pages
 
     @property
     def _lifetime_s(self) -> float:
@@ -239,8 +283,7 @@ class Cycle:
             raise _Stop(Reason.STALE_FRAME, f"{frame.source}: exposed {late_ms:.0f} ms before the trigger")
         return frame
 
-    async def _measure(self, frame: Frame, recipe: Recipe, job: Job) -> Measurement:
-        thickness_mm = job.trigger.thickness_um / 1000 if job.trigger.thickness_um else recipe.thickness_mm
+    async def _measure(self, frame: Frame, recipe: Recipe, thickness_mm: float) -> Measurement:
         loop = asyncio.get_running_loop()
         try:
             return await loop.run_in_executor(
@@ -251,43 +294,46 @@ class Cycle:
         except ParameterError as error:
             raise _Stop(Reason.INTERNAL_ERROR, f"recipe {recipe.number}: {error}. Correct the recipe") from error
 
-    def _pages(
-        self, job: Job, recipe: Recipe, stamp: Stamp, frame: Frame, measurement: Measurement
-    ) -> tuple[Page, ...]:
-        contour = measurement.millimetres
-        if contour is None:
-            raise _Stop(Reason.CALIBRATION_MISSING, "a contour in pixels cannot be sent to a controller")
-        assert measurement.area_mm2 is not None
-        sure = measurement.uncertainty_mm
-        message = ContourMessage(
+    def _envelope(self, job: Job, recipe: Recipe, stamp: Stamp, frame: Frame) -> Envelope:
+        return Envelope(
             job_id=job.job_id,
-            rings_um=tuple(micrometres(ring) for ring in contour.rings),
-            area_mm2=round(measurement.area_mm2),
-            uncertainty_um=None if sure is None else round(sure * UNCERTAINTY_FACTOR),
-            captured_at=stamp.clock_ms,
             recipe=recipe.number,
-            simulated=frame.simulated,
-            aligned=measurement.aligned,
+            captured_at=stamp.clock_ms,
             valid_for_ms=round(self._settings.valid_for_s * 1000) if stamp.clock_ms else 0,
             session=stamp.session,
             trigger=job.trigger.counter or 0 if self._settings.transfer.handshake else 0,
+            simulated=frame.simulated,
+            word_order=self._settings.mailbox.word_order,
+            payload_capacity=self._settings.mailbox.payload_capacity,
         )
-        mailbox = self._settings.mailbox
-        pages = encode_pages(message, mailbox.payload_capacity, mailbox.word_order)
+
+    def _pages(self, measurement: Measurement, envelope: Envelope) -> tuple[Page, ...]:
+        contour = measurement.millimetres
+        if contour is None:
+            raise _Stop(Reason.CALIBRATION_MISSING, "a contour in pixels cannot be sent to a controller")
+        pages = contour_pages(measurement, envelope)
         if len(pages) > 1 and not self._settings.transfer.handshake:
             # Without answers nobody knows when a page was read, so the next one would overwrite it unseen.
             raise _Stop(
                 Reason.TOO_MANY_POINTS,
-                f"{contour.point_count} vertices need {len(pages)} pages of {mailbox.payload_capacity} registers, "
+                f"{contour.point_count} vertices need {len(pages)} pages of {envelope.payload_capacity} registers, "
                 "a controller that cannot answer takes one: raise tolerance_mm or payload_capacity",
             )
         return pages
 
     def _transfer(
-        self, link: Link, job: Job, session: int, pages: tuple[Page, ...], expires_at_s: float, *, sent: bool = False
+        self,
+        link: Link,
+        job: Job,
+        session: int,
+        pages: tuple[Page, ...],
+        expires_at_s: float,
+        *,
+        sent: bool = False,
+        terms: Terms | None = None,
     ) -> Transfer:
         async def before_sending() -> None:
-            await self._durably(self._journal.store_pages, job.job_id, session, pages)
+            await self._durably(self._journal.store_pages, job.job_id, session, pages, terms)
 
         async def before_withdrawal(reason: Reason) -> None:
             await self._durably(self._journal.store_withdrawal, job.job_id, reason)
@@ -313,9 +359,16 @@ class Cycle:
 
     # --- the end ------------------------------------------------------------------------------------------------
 
-    async def _settle(self, job: Job, settlement: Settlement, report: dict[str, Any]) -> Job:
+    async def _settle(self, job: Job, settlement: Settlement, course: _Course) -> Job:
         return await self._durably(
-            self._journal.settle, job.job_id, settlement.outcome, settlement.reason, settlement.detail, report
+            self._journal.settle,
+            job.job_id,
+            settlement.outcome,
+            settlement.reason,
+            settlement.detail,
+            course.report,
+            course.terms,
+            course.transfer,
         )
 
     async def _durably(self, write: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
@@ -356,3 +409,14 @@ class Cycle:
         assert self._link is not None
         transfer = self._transfer(self._link, job, known.session, known.pages, self._now(), sent=True)
         return await transfer.withdraw(Reason.INTERNAL_ERROR, detail)
+
+
+def _figures(stamp: Stamp, pages: tuple[Page, ...]) -> dict[str, Any]:
+    """What the journal keeps of a transfer."""
+    return {
+        "session": stamp.session,
+        "captured_at": stamp.clock_ms,
+        "pages": len(pages),
+        "registers": sum(len(page.header) + len(page.payload) for page in pages),
+        "crc32": [f"{crc32_of(page.header, page.payload):08X}" for page in pages],
+    }

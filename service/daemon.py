@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 from drivers.camera import Camera
+from service.archive_writer import ArchiveWriter
 from service.camera_watch import CameraWatch
 from service.executor import Executor, Ticket, TriggerRefused
 from service.health import Fault, Health
@@ -20,6 +21,7 @@ from service.link import Link
 from service.lock import Held
 from service.reasons import Reason
 from service.state import State
+from service.storage_watch import StorageWatch
 
 log = logging.getLogger("combtrace.daemon")
 
@@ -43,6 +45,8 @@ class Parts:
     triggers: list[Callable[[], Awaitable[None]]] = field(default_factory=list)
     serial_pool: ThreadPoolExecutor | None = None
     warm_up_s: float = 0.0
+    archive: ArchiveWriter | None = None
+    storage: StorageWatch | None = None
 
 
 class Daemon:
@@ -94,6 +98,10 @@ class Daemon:
             parts.executor.run,
             *triggers,
         ]
+        if parts.storage is not None:
+            runs.append(parts.storage.run)
+        if parts.archive is not None:
+            parts.archive.start()
         if parts.link is not None:
             runs += [parts.link.run, partial(self._watch_link, parts.link)]
             self._report_link(parts.link)
@@ -188,6 +196,8 @@ class Daemon:
         if parts.serial_pool is not None:
             parts.serial_pool.shutdown(wait=True)
         parts.camera.close()
+        if parts.archive is not None:
+            await asyncio.to_thread(parts.archive.close)
         parts.journal.close()
         parts.lock.release()
 

@@ -184,6 +184,8 @@ class Executor:
             raise TriggerRefused(Reason.BUSY, f"job {self._health.job or 'before it'} is being executed")
         if self._health.state is not State.READY:
             fault = self._health.first()
+            if fault is not None and fault.reason is Reason.STORAGE_FULL:  # what to do about it is in its name
+                raise TriggerRefused(Reason.STORAGE_FULL, fault.text)
             raise TriggerRefused(Reason.NOT_READY, fault.text if fault else f"state {self._health.state.label}")
         if self._pending() is not None:  # it would be answered 5 while the controller's own trigger is open
             raise TriggerRefused(Reason.BUSY, "the controller's own trigger comes first")

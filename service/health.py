@@ -9,7 +9,7 @@ from service.reasons import Reason
 from service.state import State, StateMachine
 
 # In this order the first is told: what a person repairs first.
-PARTS = ("journal", "calibration", "controller", "camera", "serial", "in-flight")
+PARTS = ("journal", "storage", "calibration", "controller", "camera", "serial", "in-flight")
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ WAL keeps readers out of the way; synchronous=FULL makes the last commit survive
 
 from __future__ import annotations
 
+import hashlib
 import json
 import secrets
 import sqlite3
@@ -20,44 +21,19 @@ from pathlib import Path
 from typing import Any
 
 from drivers.controller.mailbox import Page
+from service.journal_schema import COLUMNS, SCHEMA_VERSION, TABLES, migration
 from service.reasons import Outcome, Reason
 
-SCHEMA_VERSION = 1
 HEADER_REGISTERS = 31
 PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
 LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
-COLUMNS = (
-    "job_id, taken_at, trigger_kind, recipe, thickness_um, trigger_session, trigger_counter,"
-    " session, pages, withdraw_reason, outcome, reason, detail, settled_at, report"
-)
 RESTORED = (
     "job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
     " withdraw_reason"
 )
 UNSETTLED = "outcome IS NULL"
-
-SCHEMA = """
-CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
-CREATE TABLE jobs (
-    job_id INTEGER PRIMARY KEY CHECK (job_id > 0),
-    taken_at TEXT NOT NULL,
-    trigger_kind TEXT NOT NULL,
-    trigger_session INTEGER,
-    trigger_counter INTEGER,
-    recipe INTEGER NOT NULL,
-    thickness_um INTEGER NOT NULL,
-    session INTEGER,
-    pages TEXT,
-    withdraw_reason INTEGER,
-    outcome TEXT CHECK (outcome IN ('accepted', 'written', 'refused', 'failed')),
-    reason INTEGER,
-    detail TEXT,
-    settled_at TEXT,
-    report TEXT
-) STRICT;
-CREATE INDEX jobs_unsettled ON jobs (job_id) WHERE outcome IS NULL;
-CREATE INDEX jobs_by_controller ON jobs (job_id) WHERE trigger_counter IS NOT NULL;
-"""
+PRUNED_AT_ONCE = 500  # rows: some milliseconds, for a job may wait behind it
+LARGEST_LOG_BYTES = 8_000_000  # of the write-ahead log, once it was taken over into the file
 
 
 class JournalError(Exception):
@@ -91,10 +67,19 @@ class TriggerStamp:
 
 
 @dataclass(frozen=True)
+class Terms:
+    """With what a job was carried out: its recipe's settings in whole, and the hash of the calibration's content."""
+
+    recipe: dict[str, Any]
+    calibration: str | None = None
+
+
+@dataclass(frozen=True)
 class Job:
     """One job as the journal holds it.
 
     session: set once any request of a transfer may have been sent, and pages with it, until the job has ended.
+    terms: None where it came to no recipe. transfer: figures of it, empty where nothing was to be sent.
     """
 
     job_id: int
@@ -108,6 +93,8 @@ class Job:
     detail: str | None = None
     settled_at: str | None = None
     report: dict[str, Any] = field(default_factory=dict)
+    terms: Terms | None = None
+    transfer: dict[str, Any] = field(default_factory=dict)
 
     @property
     def sent(self) -> bool:
@@ -144,21 +131,34 @@ class Journal:
     def _prepare(self) -> None:
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = FULL")
+        self._db.execute(f"PRAGMA journal_size_limit = {LARGEST_LOG_BYTES}")
         version = self._db.execute("PRAGMA user_version").fetchone()[0]
         if version == 0:
             self._db.executescript(
-                f"BEGIN IMMEDIATE; {SCHEMA} INSERT INTO meta VALUES ('owner', '{1 + secrets.randbelow(0xFFFF)}');"
+                f"BEGIN IMMEDIATE; {TABLES} INSERT INTO meta VALUES ('owner', '{1 + secrets.randbelow(0xFFFF)}');"
                 f" INSERT INTO meta VALUES ('above', '{self._begin[0]}'), ('otherwise_from', '{self._begin[1]}');"
                 f" PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;"
             )
         elif version != SCHEMA_VERSION:
-            raise JournalError(
-                f"{self._path}: journal of schema version {version}, expected {SCHEMA_VERSION}. "
-                "It was written by another version of combtrace: use that one, or name another journal.path."
-            )
+            self._migrate(version)
         check = self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
         if check != "ok":
             raise JournalDamaged(f"{self._path}: the journal is damaged ({check}). Move it away and start again.")
+
+    def _migrate(self, version: int) -> None:
+        """All steps from an earlier version, or none of them."""
+        script = migration(version)
+        if script is None:
+            raise JournalError(
+                f"{self._path}: journal of schema version {version}, expected 1 to {SCHEMA_VERSION}. "
+                "It was written by another version of combtrace: use that one, or name another journal.path."
+            )
+        try:
+            self._db.executescript(f"BEGIN IMMEDIATE; {script} PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;")
+        except sqlite3.Error:
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            raise
 
     @contextmanager
     def _translated(self) -> Iterator[None]:
@@ -265,9 +265,9 @@ class Journal:
         row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         return int(row[0]) if row else 0
 
-    def store_pages(self, job_id: int, session: int, pages: tuple[Page, ...]) -> None:
+    def store_pages(self, job_id: int, session: int, pages: tuple[Page, ...], terms: Terms | None = None) -> None:
         """Make the pages durable, before the first request of theirs is sent."""
-        self._update(job_id, "session = ?, pages = ?", (session, pages_to_text(pages)))
+        self._update(job_id, "session = ?, pages = ?", (session, pages_to_text(pages)), terms)
 
     def store_withdrawal(self, job_id: int, reason: Reason) -> None:
         """Make durable that the job is being withdrawn, and why; the first reason stands."""
@@ -280,21 +280,54 @@ class Journal:
         reason: Reason | None,
         detail: str | None,
         report: dict[str, Any] | None = None,
+        terms: Terms | None = None,
+        transfer: dict[str, Any] | None = None,
     ) -> Job:
         """The job with its final state, durable; its pages are dropped. A job settles once: raise JournalConflict."""
         return self._update(
             job_id,
-            "outcome = ?, reason = ?, detail = ?, settled_at = ?, report = ?, pages = NULL",
-            (str(outcome), None if reason is None else int(reason), detail, self._stamp(), json.dumps(report or {})),
+            "outcome = ?, reason = ?, detail = ?, settled_at = ?, report = ?, transfer = ?, pages = NULL",
+            (
+                str(outcome),
+                None if reason is None else int(reason),
+                detail,
+                self._stamp(),
+                json.dumps(report or {}),
+                json.dumps(transfer) if transfer else None,
+            ),
+            terms,
         )
 
-    def _update(self, job_id: int, assignments: str, values: tuple[Any, ...]) -> Job:
+    def prune(self, keep: int) -> int:
+        """Delete the oldest of more than `keep` jobs, some at a time; how many that were.
+
+        What numbers and triggers go on from stays: the newest jobs, the controller's last, those that have not ended.
+        """
+        with self._transaction() as db:
+            bound = db.execute("SELECT job_id FROM jobs ORDER BY job_id DESC LIMIT 1 OFFSET ?", (keep,)).fetchone()
+            if bound is None:
+                return 0
+            cursor = db.execute(
+                "DELETE FROM jobs WHERE job_id IN (SELECT job_id FROM jobs WHERE job_id <= ? AND outcome IS NOT NULL"
+                " AND job_id IS NOT (SELECT MAX(job_id) FROM jobs WHERE trigger_counter IS NOT NULL)"
+                " ORDER BY job_id LIMIT ?)",
+                (bound[0], PRUNED_AT_ONCE),
+            )
+            return cursor.rowcount
+
+    def _update(self, job_id: int, assignments: str, values: tuple[Any, ...], terms: Terms | None = None) -> Job:
         """The job as it is then; read in the same step: a failure after the commit would say that nothing was done."""
         with self._transaction() as db:
+            if terms is not None:
+                settings = json.dumps(terms.recipe, sort_keys=True)
+                digest = hashlib.sha256(settings.encode()).hexdigest()
+                db.execute("INSERT OR IGNORE INTO recipe_settings VALUES (?, ?)", (digest, settings))
+                assignments += ", recipe_digest = ?, calibration = ?"
+                values = (*values, digest, terms.calibration)
             cursor = db.execute(f"UPDATE jobs SET {assignments} WHERE job_id = ? AND {UNSETTLED}", (*values, job_id))
             if cursor.rowcount != 1:
                 raise JournalConflict(f"{self._path}: job {job_id} is not there, or has ended already")
-            return _job(db.execute(f"SELECT {COLUMNS} FROM jobs WHERE job_id = ?", (job_id,)).fetchone())
+            return job_of(db.execute(f"SELECT {COLUMNS} FROM jobs WHERE job_id = ?", (job_id,)).fetchone())
 
     def find(self, job_id: int) -> Job | None:
         """The job, or None."""
@@ -330,15 +363,16 @@ class Journal:
     def _jobs(self, where: str, values: tuple[Any, ...] = ()) -> tuple[Job, ...]:
         with self._lock, self._translated():
             rows = self._db.execute(f"SELECT {COLUMNS} FROM jobs {where}", values).fetchall()
-        return tuple(_job(row) for row in rows)
+        return tuple(job_of(row) for row in rows)
 
     def _stamp(self) -> str:
         return self._now().isoformat(timespec="milliseconds")
 
 
-def _job(row: tuple[Any, ...]) -> Job:
+def job_of(row: tuple[Any, ...]) -> Job:
+    """The job of a row that holds `COLUMNS`."""
     job_id, taken_at, kind, recipe, thickness_um, trigger_session, counter, session, pages = row[:9]
-    withdraw_reason, outcome, reason, detail, settled_at, report = row[9:]
+    withdraw_reason, outcome, reason, detail, settled_at, report, settings, calibration, transfer = row[9:]
     return Job(
         job_id=job_id,
         taken_at=taken_at,
@@ -351,6 +385,8 @@ def _job(row: tuple[Any, ...]) -> Job:
         detail=detail,
         settled_at=settled_at,
         report=json.loads(report or "{}"),
+        terms=None if settings is None else Terms(json.loads(settings), calibration),
+        transfer=json.loads(transfer or "{}"),
     )
 
 

@@ -120,6 +120,26 @@ class Measurer:
         self._clock = clock
 
     @property
+    def guard(self) -> CalibrationGuard | None:
+        """The calibration with its limits."""
+        return self._guard
+
+    @property
+    def work_area_mm(self) -> Ring | None:
+        """The machine's work area."""
+        return self._work_area_mm
+
+    @property
+    def table(self) -> TableRecord | None:
+        """The taught table."""
+        return self._table
+
+    @property
+    def calibration_digest(self) -> str | None:
+        """The hash of the calibration file's content; None without one."""
+        return None if self._guard is None else self._guard.record.digest
+
+    @property
     def calibrated(self) -> bool:
         """True where pixels become millimetres."""
         return self._calibration is not None

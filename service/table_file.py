@@ -32,17 +32,23 @@ class TableRecord:
     taught_at: str
 
 
-def save_table(path: Path, record: TableRecord) -> None:
-    """Write the file whole or not at all. Raises TableFileError."""
+def table_bytes(record: TableRecord) -> bytes:
+    """A taught table as it stands in its file."""
     about = {"version": VERSION, "camera": record.camera, "pictures": record.pictures, "taught_at": record.taught_at}
     data = io.BytesIO()
     np.savez_compressed(
         data, picture=record.table.picture, noise=np.float64(record.table.noise), about=np.array(json.dumps(about))
     )
+    return data.getvalue()
+
+
+def save_table(path: Path, record: TableRecord) -> None:
+    """Write the file whole or not at all. Raises TableFileError."""
+    data = table_bytes(record)
     beside = path.with_name(f".{path.name}.new")
     try:
         with beside.open("wb") as file:
-            file.write(data.getvalue())
+            file.write(data)
             file.flush()
             os.fsync(file.fileno())
         os.replace(beside, path)

@@ -17,6 +17,8 @@ from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.controller import modbus
 from drivers.controller.mailbox import MailboxLayout
 from drivers.trigger.serial import SerialLineTrigger
+from service.archive import Archive, ArchiveLimits
+from service.archive_writer import ArchiveWriter
 from service.calibration_file import CalibrationChanged, CalibrationFileError, load_record
 from service.calibration_guard import CalibrationGuard, GuardLimits
 from service.config import (
@@ -42,6 +44,7 @@ from service.measure import Measurer
 from service.reasons import Reason
 from service.state import State, StateMachine
 from service.status import status_line
+from service.storage_watch import StorageLimits, StorageWatch
 from service.table_file import TableFileError, TableRecord, load_table
 from service.transfer import TransferCounter, TransferSettings
 from service.triggers import SerialTrigger, interval_trigger
@@ -61,6 +64,7 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     health = Health(StateMachine(_publisher(link)))
     health.report("calibration", calibration_fault)
     pool = ThreadPoolExecutor(1, "camera")
+    archive = _make_archive(config)
     cycle = Cycle(
         camera,
         Measurer(
@@ -74,6 +78,7 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
         cycle_settings(config),
         pool,
         observe=observe,
+        keep=archive.keep if archive is not None else lambda _evidence: None,
     )
     kinds = {type(trigger) for trigger in config.triggers}
     try:
@@ -83,9 +88,24 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     if link is not None:
         link.on_look = executor.wake
     parts = Parts(camera, journal, health, executor, link, pool, lock)
+    parts.archive = archive
+    parts.storage = StorageWatch(
+        journal,
+        config.journal.path,
+        health,
+        archive,
+        StorageLimits(config.journal.min_free_bytes, config.journal.max_jobs),
+    )
     parts.warm_up_s = getattr(config.camera, "warm_up_s", 0.0)
     _add_triggers(config, parts)
     return parts
+
+
+def _make_archive(config: Config) -> ArchiveWriter | None:
+    settings = config.archive
+    if not settings.max_bytes:
+        return None
+    return ArchiveWriter(Archive(settings.path, ArchiveLimits(settings.max_bytes, settings.min_free_bytes)))
 
 
 def _make_journal(config: Config) -> tuple[Locks, Journal]:

@@ -71,6 +71,7 @@ def demo_config(output: Path, port: int) -> Config:
             "controller": config.controller.model_copy(update={"host": "127.0.0.1", "port": port}),
             "service": config.service.model_copy(update={"state_dir": output / "state"}),
             "journal": config.journal.model_copy(update={"path": output / "state" / "journal.sqlite"}),
+            "archive": config.archive.model_copy(update={"path": output / "state" / "archive"}),
             "triggers": (),
         }
     )

@@ -55,6 +55,7 @@ class Plan:
     def __init__(self) -> None:
         self.result: Measurement | Exception = measured()
         self.calls: list[tuple[int, float]] = []
+        self.calibration_digest = None
 
     def measure(self, picture: object, recipe: Recipe, thickness_mm: float, camera: str = "") -> Measurement:
         self.calls.append((recipe.number, thickness_mm))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from drivers.controller.mailbox import Page
-from service.journal import Journal, JournalConflict, JournalError, JournalFull, TriggerStamp
+from service.journal import Journal, JournalConflict, JournalError, JournalFull, Terms, TriggerStamp
 from service.reasons import Outcome, Reason
 
 PAGE = Page(tuple(range(31)), (1, 2, 3, 4, 0xFFFF, 0))
@@ -126,7 +126,7 @@ def test_a_journal_of_another_version_is_refused_by_its_number(tmp_path: Path) -
     database = sqlite3.connect(path)
     database.execute("PRAGMA user_version = 99")
     database.close()
-    with pytest.raises(JournalError, match="schema version 99, expected 1"):
+    with pytest.raises(JournalError, match="schema version 99, expected 1 to 2"):
         Journal(path)
 
 
@@ -189,3 +189,111 @@ def test_pages_that_cannot_be_read_any_more_are_none(journal: Journal, stored: s
     journal._db.execute("UPDATE jobs SET pages = ?", (stored,))
     (found,) = journal.unsettled()
     assert (found.pages, found.sent) == ((), True)
+
+
+# --- versions ---------------------------------------------------------------------------------------------------
+
+VERSION_1 = """
+PRAGMA journal_mode = WAL;
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+CREATE TABLE jobs (
+    job_id INTEGER PRIMARY KEY CHECK (job_id > 0),
+    taken_at TEXT NOT NULL,
+    trigger_kind TEXT NOT NULL,
+    trigger_session INTEGER,
+    trigger_counter INTEGER,
+    recipe INTEGER NOT NULL,
+    thickness_um INTEGER NOT NULL,
+    session INTEGER,
+    pages TEXT,
+    withdraw_reason INTEGER,
+    outcome TEXT CHECK (outcome IN ('accepted', 'written', 'refused', 'failed')),
+    reason INTEGER,
+    detail TEXT,
+    settled_at TEXT,
+    report TEXT
+) STRICT;
+CREATE INDEX jobs_unsettled ON jobs (job_id) WHERE outcome IS NULL;
+CREATE INDEX jobs_by_controller ON jobs (job_id) WHERE trigger_counter IS NOT NULL;
+INSERT INTO meta VALUES ('owner', '4711'), ('above', '0'), ('otherwise_from', '1'), ('adopted_job', '3');
+INSERT INTO jobs VALUES (5, '2026-01-02T03:04:05.678+00:00', 'controller', 9, 6, 2, 20000, 9, NULL, NULL,
+    'refused', 110, 'empty', '2026-01-02T03:04:06.000+00:00', '{"total_ms": 71.5}');
+INSERT INTO jobs VALUES (6, '2026-01-02T03:05:05.678+00:00', 'controller', 9, 7, 0, 0, 9, '00', 156,
+    NULL, NULL, NULL, NULL, NULL);
+PRAGMA user_version = 1;
+"""
+
+
+def version_1(path: Path) -> Path:
+    """A journal as version 0.1.0 left it: one job ended, one in flight."""
+    database = sqlite3.connect(path)
+    database.executescript(VERSION_1)
+    database.close()
+    return path
+
+
+def test_a_journal_of_version_1_opens_with_all_it_held_and_goes_on(tmp_path: Path) -> None:
+    journal = Journal(version_1(tmp_path / "journal.sqlite"))
+    ended = journal.find(5)
+    assert ended is not None
+    assert (ended.outcome, ended.reason, ended.report, ended.terms) == (
+        Outcome.REFUSED,
+        Reason.NO_BLOCK_FOUND,
+        {"total_ms": 71.5},
+        None,
+    )
+    (in_flight,) = journal.unsettled()
+    assert (in_flight.job_id, in_flight.sent, in_flight.withdraw_reason) == (6, True, Reason.EXPIRED)
+    assert (journal.owner, journal.last_controller_trigger()) == (4711, (9, 7))
+    assert journal.take(TriggerStamp("serial")).job_id == 7
+    terms = Terms({"number": 1}, "sha256:00")
+    assert journal.settle(7, Outcome.ACCEPTED, None, None, {}, terms).terms == terms
+    journal.close()
+    again = Journal(tmp_path / "journal.sqlite")
+    assert again.last_taken() is not None
+    again.close()
+
+
+def test_a_migration_that_fails_leaves_the_old_journal_as_it_was(tmp_path: Path) -> None:
+    path = version_1(tmp_path / "journal.sqlite")
+    database = sqlite3.connect(path)
+    database.execute("CREATE TABLE recipe_settings (somebody TEXT)")
+    database.close()
+    with pytest.raises(JournalError, match="recipe_settings already exists"):
+        Journal(path)
+    database = sqlite3.connect(path)
+    assert database.execute("PRAGMA user_version").fetchone() == (1,)
+    assert len(database.execute("SELECT * FROM jobs").description) == 15
+    database.close()
+
+
+# --- terms, transfer, bounds ------------------------------------------------------------------------------------
+
+
+def test_a_job_keeps_the_whole_settings_it_was_carried_out_with_once_for_all_jobs_alike(journal: Journal) -> None:
+    terms = [Terms({"number": 1, "tolerance_mm": value}, "sha256:aa") for value in (0.1, 0.1, 0.2)]
+    for one in terms:
+        job = journal.take(TriggerStamp("serial"))
+        journal.store_pages(job.job_id, 9, (PAGE,), one)
+        settled = journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {}, one, {"pages": 1})
+        assert (settled.terms, settled.transfer) == (one, {"pages": 1})
+    assert journal._one("SELECT COUNT(*) FROM recipe_settings")[0] == 2
+
+
+def test_a_job_that_a_restart_found_in_flight_knows_its_settings(journal: Journal) -> None:
+    job = journal.take(TriggerStamp("serial"))
+    journal.store_pages(job.job_id, 9, (PAGE,), Terms({"number": 3}))
+    assert journal.unsettled()[0].terms == Terms({"number": 3})
+    assert journal.settle(job.job_id, Outcome.FAILED, Reason.SERVICE_RESTARTED, "").terms == Terms({"number": 3})
+
+
+def test_pruning_lets_the_oldest_go_and_keeps_what_numbers_and_triggers_go_on_from(journal: Journal) -> None:
+    journal.take(TriggerStamp("serial"))  # never ends
+    journal.settle(journal.take(TriggerStamp("controller", session=9, counter=5)).job_id, Outcome.ACCEPTED, None, None)
+    for _ in range(30):
+        journal.settle(journal.take(TriggerStamp("serial")).job_id, Outcome.ACCEPTED, None, None)
+    while journal.prune(10):
+        pass
+    assert [job.job_id for job in journal._jobs("ORDER BY job_id")] == [1, 2, *range(23, 33)]
+    assert journal.last_controller_trigger() == (9, 5)
+    assert journal.take(TriggerStamp("serial")).job_id == 33

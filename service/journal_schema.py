@@ -1,0 +1,63 @@
+"""The journal's tables, and the steps by which a journal of an earlier version becomes one of this.
+
+Version 2 added what a job was carried out with (its recipe's whole settings, the calibration's hash) and its transfer.
+"""
+
+from __future__ import annotations
+
+SCHEMA_VERSION = 2
+
+TABLES = """
+CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
+CREATE TABLE recipe_settings (digest TEXT PRIMARY KEY, settings TEXT NOT NULL) STRICT;
+CREATE TABLE jobs (
+    job_id INTEGER PRIMARY KEY CHECK (job_id > 0),
+    taken_at TEXT NOT NULL,
+    trigger_kind TEXT NOT NULL,
+    trigger_session INTEGER,
+    trigger_counter INTEGER,
+    recipe INTEGER NOT NULL,
+    thickness_um INTEGER NOT NULL,
+    session INTEGER,
+    pages TEXT,
+    withdraw_reason INTEGER,
+    outcome TEXT CHECK (outcome IN ('accepted', 'written', 'refused', 'failed')),
+    reason INTEGER,
+    detail TEXT,
+    settled_at TEXT,
+    report TEXT,
+    recipe_digest TEXT,
+    calibration TEXT,
+    transfer TEXT
+) STRICT;
+CREATE INDEX jobs_unsettled ON jobs (job_id) WHERE outcome IS NULL;
+CREATE INDEX jobs_by_controller ON jobs (job_id) WHERE trigger_counter IS NOT NULL;
+"""
+
+# Each from the version that is its key to the next.
+MIGRATIONS = {
+    1: """
+CREATE TABLE recipe_settings (digest TEXT PRIMARY KEY, settings TEXT NOT NULL) STRICT;
+ALTER TABLE jobs ADD COLUMN recipe_digest TEXT;
+ALTER TABLE jobs ADD COLUMN calibration TEXT;
+ALTER TABLE jobs ADD COLUMN transfer TEXT;
+""",
+}
+
+COLUMNS_OF_1 = (
+    "job_id, taken_at, trigger_kind, recipe, thickness_um, trigger_session, trigger_counter,"
+    " session, pages, withdraw_reason, outcome, reason, detail, settled_at, report"
+)
+COLUMNS = f"{COLUMNS_OF_1}, (SELECT settings FROM recipe_settings WHERE digest = recipe_digest), calibration, transfer"
+
+
+def columns(version: int) -> str:
+    """What to select of `jobs` in a journal of this version, for `service.journal.job_of`."""
+    return COLUMNS if version > 1 else f"{COLUMNS_OF_1}, NULL, NULL, NULL"
+
+
+def migration(version: int) -> str | None:
+    """The script from `version` to this one, one step after the other; None where there is no way."""
+    if not 1 <= version < SCHEMA_VERSION:
+        return None
+    return "".join(MIGRATIONS[step] for step in range(version, SCHEMA_VERSION))

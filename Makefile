@@ -24,8 +24,9 @@ test-camera: install
 	$(BIN)/python tests/camera_guest/guest.py --timeout 900 -- env COMBTRACE_CAMERA_GUEST=1 \
 		$(BIN)/python -m pytest tests/camera_guest tests/contracts/test_camera_contract.py -p no:cacheprovider
 
+# FRAMES=100000: how memory fares over that many, half an hour.
 bench-camera: install
-	$(BIN)/python tests/camera_guest/guest.py --timeout 3000 -- $(BIN)/python -m benchmarks.cameras
+	$(BIN)/python tests/camera_guest/guest.py --timeout 6000 -- $(BIN)/python -m benchmarks.cameras --frames $(or $(FRAMES),3000)
 
 bench: install
 	$(BIN)/python -m benchmarks.bench

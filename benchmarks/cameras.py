@@ -1,12 +1,15 @@
 """What a trigger gets from a V4L2 camera: our driver beside OpenCV's, and beside the kernel tools' own frame rate.
 
 Runs on the kernel's virtual camera, in the guest that `make bench-camera` boots, all in one run. Prints Markdown.
+`python -m benchmarks.cameras [--frames N] [PART...]` measures only those parts:
+triggers, stale, usb, trouble, rate, endurance.
 The guest's processor is emulated: pixel conversions take many times longer there, so pictures come as BGR, which are
 only copied.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
 import statistics
@@ -42,10 +45,25 @@ def ours(**changes: object) -> V4l2Camera:
 
 def main() -> int:
     """Measure and print."""
+    parts: dict[str, Callable[[], Iterator[tuple[str, str, str]]]] = {
+        "triggers": trigger_rows,
+        "stale": stale_rows,
+        "usb": usb_rows,
+        "trouble": trouble_rows,
+        "rate": rate_rows,
+        "endurance": lambda: endurance_rows(args.frames),
+    }
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", type=int, default=3000, help="how many in a row for memory's growth")
+    parser.add_argument(
+        "part", nargs="*", choices=[*parts, []], metavar="PART", help="what to measure; all where none is named"
+    )
+    args = parser.parse_args()
     ctl("-i", "0", "-c", "osd_text_mode=2")
     print("| what | ours | beside it |\n|---|---|---|")
-    for row in (*trigger_rows(), *stale_rows(), *trouble_rows(), *rate_rows(), *endurance_rows()):
-        print("| " + " | ".join(row) + " |", flush=True)
+    for name in args.part or parts:
+        for row in parts[name]():
+            print("| " + " | ".join(row) + " |", flush=True)
     return 0
 
 
@@ -88,6 +106,43 @@ def stale_rows() -> Iterator[tuple[str, str, str]]:
     capture.release()
     yield "stale frames handed out after 3 s of idling", str(of_ours), f"cv2.VideoCapture {of_opencv}"
     ctl("-c", "test_pattern=0")
+
+
+def usb_rows() -> Iterator[tuple[str, str, str]]:
+    """Frames of a USB webcam exposed before their trigger: ours, and believing uvcvideo's flag."""
+    from drivers.camera.v4l2 import camera as driver
+    from tests.camera_guest.test_usb_webcam import Scene, camera_on, node_of_the_webcam
+    from tests.camera_guest.usb_webcam import Webcam
+
+    subprocess.run(["/bin/busybox", "modprobe", "uvcvideo"], check=True)
+    scene = Scene()
+    webcam = Webcam(scene.encode)
+    webcam.plug_in()
+    node = node_of_the_webcam()
+
+    def early(rate: float) -> str:
+        camera = camera_on(node, frame_rate=rate)
+        camera.open()
+        ages = []
+        for number in range(TRIGGERS):
+            time.sleep(0.1 + number * 0.618 % 1 / rate)
+            asked_s = time.monotonic()
+            ages.append(asked_s - scene.exposure_of(camera.grab(asked_s, 5.0).pixels))
+        camera.close()
+        return f"{sum(age > 0 for age in ages)} of {TRIGGERS}, oldest {max(*ages, 0):.3f} s"
+
+    known = driver.STAMP_ARRIVAL
+    for rate in (30.0, 10.0):
+        ours_text = early(rate)
+        driver.STAMP_ARRIVAL = frozenset()
+        believed = early(rate)
+        driver.STAMP_ARRIVAL = known
+        yield (
+            f"USB webcam at {rate:g} Hz: frames exposed before their trigger",
+            ours_text,
+            f"stamps believed: {believed}",
+        )
+    webcam.pull_out()
 
 
 def trouble_rows() -> Iterator[tuple[str, str, str]]:
@@ -157,9 +212,8 @@ def rate_rows() -> Iterator[tuple[str, str, str]]:
     ctl("-i", "0")
 
 
-def endurance_rows() -> Iterator[tuple[str, str, str]]:
-    """Growth of memory and descriptors over many frames."""
-    frames = int(os.environ.get("COMBTRACE_CAMERA_FRAMES", "3000"))
+def endurance_rows(frames: int) -> Iterator[tuple[str, str, str]]:
+    """Growth of memory and descriptors over that many frames."""
     camera = ours(width=320, height=180, frame_rate=60.0)
     camera.open()
     for _ in range(200):
@@ -170,7 +224,7 @@ def endurance_rows() -> Iterator[tuple[str, str, str]]:
     grown, more = resident_kb() - before, len(os.listdir("/proc/self/fd")) - descriptors
     bad = camera.counts.bad
     camera.close()
-    yield f"{frames} frames in a row", f"{grown} kB and {more} descriptors more", f"{bad} unusable"
+    yield f"{frames:,} frames in a row", f"{grown} kB and {more} descriptors more", f"{bad} unusable"
 
 
 def resident_kb() -> int:

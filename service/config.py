@@ -112,6 +112,12 @@ class V4l2Camera(Model):
         le=60_000,
         description="Exposure time where the camera does not tell it, ms; none = one frame period is assumed.",
     )
+    latency_ms: float = Field(
+        0,
+        ge=0,
+        le=10_000,
+        description="How long the camera keeps a frame, beyond exposure and reading out, before it sends it, ms.",
+    )
     average: int = Field(
         1, ge=1, le=64, description="Frames of a still scene that are averaged; 103 where it moves. 1 = none."
     )

@@ -192,6 +192,7 @@ def _single_frames(config: Config) -> Camera:
             controls=settings.controls,
             input=settings.input,
             exposure_s=None if settings.exposure_ms is None else settings.exposure_ms / 1000,
+            latency_s=settings.latency_ms / 1000,
         )
     )
 

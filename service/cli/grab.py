@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from datetime import datetime
 from pathlib import Path
 
 from service.cli.camera_options import add_camera_arguments, opened_camera
@@ -29,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     from service.pictures import PictureFileError, write_picture
 
     with opened_camera(args) as camera:
-        asked_at_s = time.monotonic()
+        asked_at_s, clock = time.monotonic(), datetime.now().astimezone()
         frame = camera.grab(asked_at_s, args.timeout_s)
         took_ms = (time.monotonic() - asked_at_s) * 1000
         opened = getattr(camera, "opened", None)
@@ -44,5 +45,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"camera    {opened}")
     exposed_ms = (frame.exposed_at_s - asked_at_s) * 1000
     print(f"time      {took_ms:.0f} ms from trigger to frame; exposed {exposed_ms:.0f} ms after the trigger or later")
+    told = f"{clock:%H:%M:%S.%f}"[:-3]
+    print(f"trigger   at {told} by this machine's clock; a clock in the picture must not show less")
     print(f"picture   {picture_figures(frame.pixels)}")
     return EXIT_OK

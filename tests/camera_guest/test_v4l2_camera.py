@@ -227,7 +227,7 @@ def test_a_format_that_nobody_reads_is_refused():
         ({"shutter": 1}, r"no control 'shutter'; there are: .*brightness"),
         ({"button": 1}, r"of kind button"),
         ({"read_only_integer_32_bits": 1}, r"read-only"),
-        ({"gain": 50}, r"gain was set to 50 but is inactive.*gain_automatic: 0"),
+        ({"gain": 50}, r"gain = 50 does not hold, it is inactive.*gain_automatic: 0"),
     ],
 )
 def test_a_control_that_does_not_hold_is_refused_with_its_range_or_cause(controls, text):

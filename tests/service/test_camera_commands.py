@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import cv2
 import numpy as np
 import pytest
@@ -29,6 +31,7 @@ def test_grab_stores_the_frame_as_it_is_and_tells_of_it(picture, tmp_path, capsy
     told = capsys.readouterr().out
     assert "160 x 120 px, grey" in told
     assert "ms from trigger to frame" in told
+    assert re.search(r"trigger   at \d\d:\d\d:\d\d\.\d{3} by", told)
     assert "sharpness" in told
 
 

@@ -11,7 +11,7 @@ from drivers.camera import CameraRefused, CameraTimeout, CameraUnavailable, Fram
 from drivers.camera.v4l2 import kernel_interface as v4l2
 from drivers.camera.v4l2.controls import apply_controls, exposure_s
 from drivers.camera.v4l2.device import TELL_WHAT_IT_IS, Device
-from drivers.camera.v4l2.exposure import FrameTiming
+from drivers.camera.v4l2.exposure import STAMP_ARRIVAL, FrameTiming
 from drivers.camera.v4l2.formats import PictureFormat, set_format, set_frame_rate
 from drivers.camera.v4l2.identity import CameraIdentity, identify
 from drivers.camera.v4l2.pixels import bytes_needed, to_pixels
@@ -31,6 +31,7 @@ class V4l2Settings:
     """What the camera is asked for at every open.
 
     exposure_s: what the exposure time is where the camera does not tell; None = one frame period is assumed.
+    latency_s: how long the camera keeps a frame, beyond exposure and reading out, before it sends it.
     input: number of a capture card's input; None = as it is.
     """
 
@@ -42,6 +43,7 @@ class V4l2Settings:
     controls: Mapping[str, int] = field(default_factory=dict)
     input: int | None = None
     exposure_s: float | None = None
+    latency_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -234,8 +236,8 @@ class V4l2Camera:
             self._seen_period_s = filled.stamp_s - last.stamp_s
         told_s = UNKNOWN_PERIOD_S if opened.period_s is None else opened.period_s
         # In poor light some cameras lengthen the exposure and with it the period beyond what they were set to.
-        timing = FrameTiming(max(told_s, self._seen_period_s), opened.exposure_s)
-        at_start = filled.stamped_at_start_of_exposure
+        timing = FrameTiming(max(told_s, self._seen_period_s), opened.exposure_s, self._settings.latency_s)
+        at_start = filled.stamped_at_start_of_exposure and opened.identity.driver not in STAMP_ARRIVAL
         return timing.earliest_start_s(filled.stamp_s, at_start_of_exposure=at_start)
 
     def _timed_out(self, before: FrameCounts, timeout_s: float, trouble: str) -> CameraTimeout:

@@ -78,6 +78,7 @@ def apply_controls(device: Device, wanted: Mapping[str, int]) -> dict[str, int]:
         _check_settable(device, name, value, known)
     in_order = sorted(wanted, key=lambda name: known[name].kind not in SWITCHES)
     for name in in_order:
+        _refuse_governed(device, name, wanted[name])  # some drivers then refuse the writing, with no word of why
         setting = v4l2.Control(known[name].number, _as_int32(wanted[name]))
         device.call(v4l2.S_CTRL, setting, f"set {name} to {wanted[name]}")
     return {name: _held(device, name, wanted[name]) for name in in_order}
@@ -146,14 +147,20 @@ def _as_int32(value: int) -> int:
     return value - (1 << 32) if value >= 1 << 31 else value
 
 
-def _held(device: Device, name: str, value: int) -> int:
-    """The value read back; raise CameraRefused where the device holds another, or is not governed by it."""
+def _refuse_governed(device: Device, name: str, value: int) -> ControlInfo:
+    """The control as it is now; raise CameraRefused where an automatic governs it."""
     control = next(control for control in list_controls(device) if control.name == name)
     if control.inactive:
         raise CameraRefused(
-            f"{device.path}: control {name} was set to {value} but is inactive: an automatic governs it. "
+            f"{device.path}: control {name} = {value} does not hold, it is inactive: an automatic governs it. "
             "Switch the automatic off in camera.controls too, such as gain_automatic: 0 or auto_exposure: 1."
         )
+    return control
+
+
+def _held(device: Device, name: str, value: int) -> int:
+    """The value read back; raise CameraRefused where the device holds another, or is not governed by it."""
+    control = _refuse_governed(device, name, value)
     if control.value != value:
         raise CameraRefused(
             f"{device.path}: control {name} was set to {value} and reads back {control.value}; expected {value}. "

@@ -97,11 +97,12 @@ def test_a_jpeg_frame_that_was_cut_or_has_another_size_is_unusable():
     readout=st.floats(0, 1),
     period=st.floats(0.001, 0.5),
     known=st.booleans(),
+    latency=st.floats(0, 2),
 )
-def test_a_frame_never_counts_as_begun_later_than_it_did(began, exposure, readout, period, known):
+def test_a_frame_never_counts_as_begun_later_than_it_did(began, exposure, readout, period, known, latency):
     """A free-running sensor exposes for at most a period and reads out in at most a period."""
     exposure = min(exposure, period)
-    stamp_s = began + exposure + readout * period
-    timing = FrameTiming(period, exposure if known else None)
+    stamp_s = began + exposure + readout * period + latency
+    timing = FrameTiming(period, exposure if known else None, latency)
     assert timing.earliest_start_s(stamp_s, at_start_of_exposure=False) <= began + 1e-9
     assert timing.earliest_start_s(began, at_start_of_exposure=True) == began

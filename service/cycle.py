@@ -305,21 +305,14 @@ class Cycle:
             simulated=frame.simulated,
             word_order=self._settings.mailbox.word_order,
             payload_capacity=self._settings.mailbox.payload_capacity,
+            single_page=not self._settings.transfer.handshake,
         )
 
     def _pages(self, measurement: Measurement, envelope: Envelope) -> tuple[Page, ...]:
         contour = measurement.millimetres
         if contour is None:
             raise _Stop(Reason.CALIBRATION_MISSING, "a contour in pixels cannot be sent to a controller")
-        pages = contour_pages(measurement, envelope)
-        if len(pages) > 1 and not self._settings.transfer.handshake:
-            # Without answers nobody knows when a page was read, so the next one would overwrite it unseen.
-            raise _Stop(
-                Reason.TOO_MANY_POINTS,
-                f"{contour.point_count} vertices need {len(pages)} pages of {envelope.payload_capacity} registers, "
-                "a controller that cannot answer takes one: raise tolerance_mm or payload_capacity",
-            )
-        return pages
+        return contour_pages(measurement, envelope)
 
     def _transfer(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivers.controller.mailbox import ContourMessage, Page, WordOrder, encode_pages, micrometres
+from drivers.controller.mailbox import ContourMessage, ContourTooLarge, Page, WordOrder, encode_pages, micrometres
 from service.measure import Measurement
 
 UNCERTAINTY_FACTOR = 1000.0  # mm to µm
@@ -15,6 +15,7 @@ class Envelope:
     """What stands in a job's pages and was not measured, and how they are laid out.
 
     captured_at, valid_for_ms: on the controller's clock, ms. trigger: the counter it answers, 0 = another kind.
+    single_page: nobody answers, so nobody knows when a page was read, and the next would overwrite it unseen.
     """
 
     job_id: int
@@ -26,6 +27,7 @@ class Envelope:
     simulated: bool
     word_order: WordOrder = "big"
     payload_capacity: int = 1984
+    single_page: bool = False
 
 
 def contour_pages(measurement: Measurement, envelope: Envelope) -> tuple[Page, ...]:
@@ -47,4 +49,10 @@ def contour_pages(measurement: Measurement, envelope: Envelope) -> tuple[Page, .
         session=envelope.session,
         trigger=envelope.trigger,
     )
-    return encode_pages(message, envelope.payload_capacity, envelope.word_order)
+    pages = encode_pages(message, envelope.payload_capacity, envelope.word_order)
+    if envelope.single_page and len(pages) > 1:
+        raise ContourTooLarge(
+            f"{contour.point_count} vertices need {len(pages)} pages of {envelope.payload_capacity} registers, "
+            "a controller that cannot answer takes one: raise tolerance_mm or payload_capacity"
+        )
+    return pages

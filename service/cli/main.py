@@ -12,7 +12,7 @@ from service.cli.errors import EXIT_UNUSABLE, UserError
 COMMANDS = (
     *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
     *("board", "calibrate", "align", "verify", "repeat", "teach-table"),
-    *("probe",),
+    *("probe", "jobs", "replay"),
     *("schema", "reasons", "register-map"),
 )
 
@@ -54,6 +54,8 @@ EXAMPLES
         Say what is wrong with the configuration and every device it names.
     combtrace run --config config.yaml
         Run the daemon.
+    combtrace jobs --since 1d --outcome refused
+        Say what was refused since yesterday, and why.
 """
 
 

@@ -1,0 +1,203 @@
+"""`combtrace replay`: jobs done again from their archived frames, with the archived settings or others."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
+from service.cli.jobs import local
+from service.cli.jobs_options import add_config_argument, add_filter_arguments, config_of, filter_of, job_number
+
+if TYPE_CHECKING:
+    from service.config import Config
+    from service.replay import Replayed, Settings
+
+HELP = "do jobs again from the archive, with other settings if wanted"
+DESCRIPTION = """\
+Measure archived frames again with the archived recipe and calibration, put the
+contours into pages again, and say whether they come out as they were, register
+for register, or what is not. With --set: try other settings on the archive, and
+list the jobs whose verdict flips. Nothing is sent and nothing is written.
+
+Settings: recipe.KEY, recipe.parameters.KEY, calibration.file,
+calibration.max_age_days, .sentinel_tolerance_px, .sentinels_required.
+
+Exit status: 0 all came out as they were (with --set: done), 3 something did not,
+2 nothing to replay, or wrong usage."""
+
+LIMITS = ("max_age_days", "sentinel_tolerance_px", "sentinels_required")
+BAR = 30
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which jobs, and with which settings."""
+    parser.add_argument("numbers", nargs="*", type=job_number, metavar="N", help="job numbers; or --since and the like")
+    add_config_argument(parser)
+    add_filter_arguments(parser)
+    parser.add_argument("--limit", type=int, default=0, metavar="N", help="the newest N; default all")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="changes", help="e.g. recipe.tolerance_mm=0.2"
+    )
+    parser.add_argument("--json", action="store_true", help="JSON Lines, one object a job")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Replay, tell, and say by the exit status whether all came out as it was."""
+    from service.archived_job import EvidenceError, load_archived
+    from service.replay import replay
+
+    settings = settings_of(args.changes)
+    config = config_of(args)
+    numbers = _numbers(args, config)
+    done: list[Replayed] = []
+    left_out: list[str] = []
+    for job_id in _with_bar(numbers):
+        try:
+            done.append(replay(load_archived(config.archive.path, job_id), settings))
+        except EvidenceError as error:
+            left_out.append(str(error))
+            continue
+        if args.json:
+            print(json.dumps(_fields(done[-1]), ensure_ascii=False), flush=True)
+    if not done:
+        raise UserError("; ".join(left_out[:3]) or "no jobs: nothing was taken then, or nothing of it ended so")
+    if not args.json:
+        _tell(done, settings)
+    for text in left_out if args.numbers else left_out[:3]:
+        print(f"left out: {text}", file=sys.stderr)
+    if len(left_out) > 3 and not args.numbers:
+        print(f"left out: {len(left_out) - 3} more", file=sys.stderr)
+    same = all(one.identical for one in done)
+    return EXIT_OK if same or not settings.as_archived else EXIT_REFUSED
+
+
+def settings_of(changes: list[str]) -> Settings:
+    """The settings that --set names; raise UserError."""
+    import yaml
+
+    from service.config import Recipe
+    from service.replay import Settings
+
+    recipe: dict[str, Any] = {}
+    limits: dict[str, Any] = {}
+    calibration: Path | None = None
+    for change in changes:
+        key, equals, text = change.partition("=")
+        part, _, name = key.partition(".")
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise UserError(f"--set {change}: {text!r} is no value") from error
+        known = name in Recipe.model_fields or name.startswith("parameters.")
+        if equals and part == "recipe" and known and name not in ("number", "name"):
+            recipe[name] = value
+        elif equals and part == "calibration" and name in LIMITS and isinstance(value, int | float):
+            limits[name] = value
+        elif equals and key == "calibration.file" and text:
+            calibration = Path(text)
+        else:
+            raise UserError(f"--set {change}: expected recipe.KEY=VALUE or calibration.KEY=VALUE, see --help")
+    return Settings(recipe, limits, calibration)
+
+
+def _numbers(args: argparse.Namespace, config: Config) -> list[int]:
+    """Job numbers given, or those of the journal that are wanted and of which evidence is kept."""
+    from service.archive import document_of
+    from service.journal_reader import JournalUnreadable, reading
+
+    if args.numbers:
+        if args.since or args.outcome or args.reason:
+            raise UserError("job numbers and --since, --outcome or --reason exclude each other")
+        return list(args.numbers)
+    if not (args.since or args.outcome or args.reason or args.limit):
+        raise UserError("which jobs? Give numbers, or --since, --outcome, --reason, --limit")
+    try:
+        with reading(config.journal.path) as journal:
+            jobs = journal.jobs(filter_of(args))
+    except JournalUnreadable as error:
+        raise UserError(str(error)) from error
+    kept = [job.job_id for job in jobs if document_of(config.archive.path, job.job_id) is not None]
+    return kept[-args.limit :] if args.limit > 0 else kept
+
+
+def _with_bar(numbers: list[int]) -> Iterator[int]:
+    """The numbers, with a bar on a terminal's standard error that says how far it is."""
+    shown = sys.stderr.isatty() and len(numbers) > 1
+    for done, number in enumerate(numbers):
+        if shown:
+            filled = BAR * done // len(numbers)
+            bar = f"[{'#' * filled}{'.' * (BAR - filled)}] {done}/{len(numbers)} job {number}"
+            print(f"\r{bar[: shutil.get_terminal_size().columns - 1]}\x1b[K", end="", file=sys.stderr, flush=True)
+        yield number
+    if shown:
+        print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def _tell(done: list[Replayed], settings: Settings) -> None:
+    if not settings.as_archived:
+        _tell_flips(done)
+        return
+    for one in done:
+        if one.identical:
+            sent = f"{one.registers} registers" if one.registers else "nothing was sent; verdict and polygon"
+            print(f"job {one.job_id}: {sent}: byte for byte as they were")
+            continue
+        print(f"job {one.job_id}: NOT as it was")
+        for change in one.changes:
+            print(f"  {change.field:<20} was {change.was}, is {change.now}")
+
+
+def _tell_flips(done: list[Replayed]) -> None:
+    """The table of verdict flips, and what became of the rest."""
+    flips = [one for one in done if one.flipped]
+    rows = [("job", "taken", "was", "would be", "because")]
+    rows += [
+        (str(one.job_id), local(one.taken_at), _verdict(one.reasons_were), _verdict(one.reasons), _why(one))
+        for one in flips
+    ]
+    if flips:
+        widths = [max(len(row[column]) for row in rows) for column in range(4)]
+        for row in rows:
+            print("  ".join([*(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=False)), row[4]]).rstrip())
+        print()
+    toll = Counter("sent -> refused" if one.reasons else "refused -> sent" for one in flips)
+    told = ", ".join(f"{count} {what}" for what, count in sorted(toll.items()))
+    print(f"{len(done)} jobs, {len(flips)} verdicts flip" + (f": {told}" if told else ""))
+    both = [one for one in done if not one.reasons and not one.reasons_were]
+    if both:
+        for name, digits in (("vertices", 0), ("area_mm2", 1), ("uncertainty_mm", 3)):
+            pairs = [(one.was[name], one.now[name]) for one in both if None not in (one.was[name], one.now[name])]
+            if pairs:
+                was, now = (median(pair[side] for pair in pairs) for side in (0, 1))
+                print(
+                    f"  {name:<15} median of {len(pairs)} sent before and after: {was:.{digits}f} -> {now:.{digits}f}"
+                )
+
+
+def _verdict(reasons: tuple[Any, ...]) -> str:
+    return f"{int(reasons[0])} {reasons[0].label}" if reasons else "sent"
+
+
+def _why(one: Replayed) -> str:
+    return one.texts[0] if one.texts else ""
+
+
+def _fields(one: Replayed) -> dict[str, Any]:
+    return {
+        "job_id": one.job_id,
+        "identical": one.identical,
+        "flipped": one.flipped,
+        "reasons_were": [int(reason) for reason in one.reasons_were],
+        "reasons": [int(reason) for reason in one.reasons],
+        "changes": [{"field": change.field, "was": change.was, "now": change.now} for change in one.changes],
+        "was": one.was,
+        "now": one.now,
+    }

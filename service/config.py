@@ -271,12 +271,45 @@ class ControllerTrigger(Model):
 
 
 class SerialTrigger(Model):
-    """A job by hand, over a line of text on a serial port."""
+    """A job by hand, over a serial port: by lines of text, by any byte, or by an edge of an input line."""
 
     kind: Literal["serial"]
-    port: str = Field(min_length=1, description="Serial port; one below /dev/serial/by-id keeps its name.")
+    port: str = Field(
+        min_length=1,
+        description="Serial port; one below /dev/serial/by-id keeps its name. With byte and signal also "
+        "rfc2217://HOST:PORT of a serial server.",
+    )
     baudrate: int = Field(9600, ge=300, le=4_000_000, description="Baud rate.")
-    mode: Literal["text"] = Field("text", description="text: lines of TRIG, STAT, PING.")
+    mode: Literal["text", "byte", "signal"] = Field(
+        "text", description="text: lines of TRIG, STAT, PING. byte: any byte. signal: an edge of CTS or DSR."
+    )
+    debounce_s: Annotated[float, Field(ge=0.001, le=10)] | None = Field(
+        None,
+        description="byte: bytes closer than this are one trigger, s, else 0.2. signal: how long the new level must "
+        "hold, s, else 0.05.",
+    )
+    signal: Literal["cts", "dsr"] = Field("cts", description="mode signal: the input line that is watched.")
+    edge: Literal["rising", "falling"] = Field(
+        "rising", description="mode signal: rising = the line becomes asserted (contact closes), falling = it ends."
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.mode == "text" and "://" in self.port:
+            raise ValueError(f"port is {self.port}, but mode text needs a serial port of this machine")
+        if "://" in self.port and not self.port.startswith("rfc2217://"):
+            raise ValueError(f"port is {self.port}, expected a serial port of this machine or rfc2217://HOST:PORT")
+        foreign = self.model_fields_set & _OF_OTHER_MODES[self.mode]
+        if foreign:
+            raise ValueError(f"{', '.join(sorted(foreign))} is given, but means nothing in mode {self.mode}")
+        return self
+
+
+_OF_OTHER_MODES: dict[str, set[str]] = {
+    "text": {"debounce_s", "signal", "edge"},
+    "byte": {"signal", "edge"},
+    "signal": set(),
+}
 
 
 class Recipe(Model):
@@ -366,8 +399,8 @@ class Service(Model):
     """Where the service keeps its state, and how it queues."""
 
     state_dir: FilePath = Field(Path("var"), description="Folder of the lock and other state.")
-    queue_depth: Literal[0] = Field(
-        0, description="Triggers kept while a job is executed; 0 = they are refused as busy."
+    queue_depth: int = Field(
+        0, ge=0, le=100, description="Triggers that may wait while a job is executed; 0 = they are refused as busy."
     )
 
 

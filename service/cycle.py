@@ -58,6 +58,11 @@ class CycleSettings:
     mailbox: MailboxFormat = field(default_factory=MailboxFormat)
     transfer: TransferSettings = field(default_factory=TransferSettings)
 
+    @property
+    def lifetime_s(self) -> float:
+        """How old a contour may become, by whichever bound there is."""
+        return self.valid_for_s or self.job_timeout_s
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -163,7 +168,8 @@ class Cycle:
             detail = "nothing of it was sent" if not job.sent else "whether it was taken cannot be known"
             return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), _Course(job))
         assert job.session is not None
-        transfer = self._transfer(self._link, job, job.session, job.pages, self._now() + self._lifetime_s, sent=True)
+        expires_at_s = self._now() + self._settings.lifetime_s
+        transfer = self._transfer(self._link, job, job.session, job.pages, expires_at_s, sent=True)
         if job.withdraw_reason is not None:
             settlement = await transfer.withdraw(job.withdraw_reason, "a withdrawal that the restart cut short")
         elif not job.pages:
@@ -197,7 +203,7 @@ class Cycle:
         course.report["pages_ms"] = self._since(before)
         if self._settings.observe:
             return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
-        expires_at_s = stamped_at + self._lifetime_s
+        expires_at_s = stamped_at + self._settings.lifetime_s
         transfer = self._transfer(self._link, job, stamp.session, pages, expires_at_s, terms=course.terms)
         before = self._now()
         settlement = await transfer.run()
@@ -222,10 +228,6 @@ class Cycle:
         except MailboxError as error:  # what passed the checks in float64 degenerates in whole micrometres
             raise _Stop(Reason.SELF_INTERSECTING, str(error)) from error
         return course.pages
-
-    @property
-    def _lifetime_s(self) -> float:
-        return self._settings.valid_for_s or self._settings.job_timeout_s
 
     def _recipe(self, job: Job) -> Recipe:
         number = job.trigger.recipe or self._settings.default_recipe

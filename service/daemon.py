@@ -14,7 +14,7 @@ from typing import Any
 from drivers.camera import Camera
 from service.archive_writer import ArchiveWriter
 from service.camera_watch import CameraWatch
-from service.executor import Executor, Ticket, TriggerRefused
+from service.executor import Executor
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
@@ -22,6 +22,7 @@ from service.lock import Held
 from service.reasons import Reason
 from service.state import State
 from service.storage_watch import StorageWatch
+from service.trigger_queue import Ticket, TriggerRefused
 
 log = logging.getLogger("combtrace.daemon")
 
@@ -43,6 +44,7 @@ class Parts:
     pool: ThreadPoolExecutor
     lock: Held
     triggers: list[Callable[[], Awaitable[None]]] = field(default_factory=list)
+    ports: list[str] = field(default_factory=list)
     serial_pool: ThreadPoolExecutor | None = None
     warm_up_s: float = 0.0
     archive: ArchiveWriter | None = None
@@ -64,6 +66,9 @@ class Daemon:
         """Run until `stop` or a signal."""
         for number in on_signals:
             asyncio.get_running_loop().add_signal_handler(number, self.stop)
+        for port in self._parts.ports:
+            opening = Fault(Reason.NOT_READY, f"{port} is being opened", starting=True)
+            self._parts.health.report(f"serial {port}", opening)
         tasks = self._start(self._parts.triggers)
         try:
             await self._stopped_or_dead(tasks)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import Counter
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from typing import ParamSpec, Protocol, TypeVar
 
 from drivers.controller.mailbox import TEST_VALUE, ServiceBlock
@@ -14,6 +14,7 @@ from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
 from service.reasons import Outcome, Reason
 from service.state import State
+from service.trigger_queue import Queued, Ticket, TriggerQueue, TriggerRefused
 
 log = logging.getLogger("combtrace.jobs")
 
@@ -21,28 +22,8 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 JOURNAL_PAUSE_S = 1.0
+QUEUE_LOOK_S = 0.25  # how often those that wait are looked at where nothing else wakes the loop
 COUNTER_VALUES = 65535  # a trigger counter runs 1…65535; 0 means none yet
-
-
-class TriggerRefused(Exception):
-    """A trigger was not taken: `reason` as on the wire, and a sentence."""
-
-    def __init__(self, reason: Reason, text: str) -> None:
-        super().__init__(text)
-        self.reason = reason
-
-    @property
-    def not_ready(self) -> bool:
-        """True where no part of the job was begun because something did not work."""
-        return self.reason is Reason.NOT_READY
-
-
-@dataclass(frozen=True)
-class Ticket:
-    """A job that is durable in the journal, and its settled form once it has ended."""
-
-    job: Job
-    settled: asyncio.Future[Job]
 
 
 class JobRunner(Protocol):
@@ -72,14 +53,19 @@ class Executor:
         link: Link | None,
         *,
         controller_triggers: bool,
+        queue: TriggerQueue | None = None,
         on_settled: Callable[[Job], Awaitable[None]] | None = None,
     ) -> None:
+        """queue: where triggers wait while a job is executed; None = they are refused as busy."""
         self._journal = journal
         self._runner = runner
         self._health = health
         self._link = link
         self._controller_triggers = controller_triggers and link is not None
+        self._queue = TriggerQueue(0, 0.0) if queue is None else queue
         self._on_settled = on_settled
+        self._tickets: dict[int, asyncio.Future[Job]] = {}
+        self.counts: Counter[tuple[str, str]] = Counter()
         self._wake = asyncio.Event()
         self._submitted: Ticket | None = None
         self._taking = False
@@ -157,22 +143,46 @@ class Executor:
         """Take no triggers of the controller; they stay pending."""
         self._controller_triggers = False
 
+    @property
+    def waiting(self) -> int:
+        """Triggers that wait for their turn."""
+        return len(self._queue)
+
     async def submit(self, trigger: TriggerStamp) -> Ticket:
-        """A ticket for the job, durable in the journal; raise TriggerRefused where it cannot be taken now."""
+        """A ticket for the job, durable in the journal; raise TriggerRefused where it cannot be taken in its turn."""
+        taken = await self.ask(trigger)
+        return await taken.ticket if isinstance(taken, Queued) else taken
+
+    async def ask(self, trigger: TriggerStamp) -> Ticket | Queued:
+        """A ticket for the job, or the trigger's place where it has to wait; raise TriggerRefused."""
         try:
             self._check_free()
             self._taking = True
             try:
-                job = await self._take(trigger)
+                ticket = await self._ticket(trigger)
             finally:
                 self._taking = False
         except TriggerRefused as refused:
-            self._count_missed(1)
-            self._tell(f"trigger {trigger.kind} not taken: {refused.reason.label}: {refused}")
+            if refused.reason is Reason.BUSY and not self._queue.full:
+                queued = self._queue.add(trigger)
+                log.info("trigger %s waits, place %d: %s", trigger.kind, queued.place, refused)
+                self._wake.set()
+                return queued
+            self._refused(trigger, refused)
             raise
-        self._submitted = Ticket(job, asyncio.get_running_loop().create_future())
+        self._submitted = ticket
         self._wake.set()
-        return self._submitted
+        return ticket
+
+    def missed_by_source(self, kind: str, count: int) -> None:
+        """Count triggers that a source could not even ask for."""
+        self.counts[kind, Reason.BUSY.label] += count
+        self._count_missed(count)
+
+    def _refused(self, trigger: TriggerStamp, refused: TriggerRefused) -> None:
+        self.counts[trigger.kind, refused.reason.label] += 1
+        self._count_missed(1)
+        self._tell(f"trigger {trigger.kind} not taken: {refused.reason.label}: {refused}")
 
     def _tell(self, refusal: str) -> None:
         """Log a refusal, once until a trigger is taken: at intervals it would come back all night."""
@@ -182,16 +192,28 @@ class Executor:
     def _check_free(self) -> None:
         if self._health.job is not None or self._submitted is not None or self._taking:
             raise TriggerRefused(Reason.BUSY, f"job {self._health.job or 'before it'} is being executed")
+        if len(self._queue):
+            raise TriggerRefused(Reason.BUSY, f"{len(self._queue)} triggers wait before it")
         if self._health.state is not State.READY:
-            fault = self._health.first()
-            if fault is not None and fault.reason is Reason.STORAGE_FULL:  # what to do about it is in its name
-                raise TriggerRefused(Reason.STORAGE_FULL, fault.text)
-            raise TriggerRefused(Reason.NOT_READY, fault.text if fault else f"state {self._health.state.label}")
+            raise self._not_ready()
         if self._pending() is not None:  # it would be answered 5 while the controller's own trigger is open
             raise TriggerRefused(Reason.BUSY, "the controller's own trigger comes first")
         why_not = self._link.controller_not_ready() if self._link else None
         if why_not is not None:
             raise TriggerRefused(Reason.NOT_READY, why_not)
+
+    def _not_ready(self) -> TriggerRefused:
+        fault = self._health.first()
+        if fault is None or self._health.state is State.HALTED:
+            return TriggerRefused(Reason.NOT_READY, f"state {self._health.state.label}")
+        # What to do about a full disk is in the reason's name.
+        reason = Reason.STORAGE_FULL if fault.reason is Reason.STORAGE_FULL else Reason.NOT_READY
+        return TriggerRefused(reason, fault.text)
+
+    async def _ticket(self, trigger: TriggerStamp) -> Ticket:
+        job = await self._take(trigger)
+        self._tickets[job.job_id] = asyncio.get_running_loop().create_future()
+        return Ticket(job, self._tickets[job.job_id])
 
     async def _take(self, trigger: TriggerStamp) -> Job:
         view = self._link.view if self._link else None
@@ -203,6 +225,7 @@ class Executor:
             raise TriggerRefused(fault.reason, fault.text) from error
         self._health.report("journal", None)
         self._told.clear()
+        self.counts[trigger.kind, "taken"] += 1
         log.info("job %d taken: trigger %s, recipe %s", job.job_id, trigger.kind, trigger.recipe or "default")
         if self._link is not None:
             self._link.publish(job_id=job.job_id)
@@ -217,7 +240,7 @@ class Executor:
 
     async def run(self) -> None:
         """Execute jobs for ever; first those that a restart found in flight."""
-        await self._settle_in_flight()
+        self._found = True
         while True:
             self._wake.clear()
             if self._found and not self._taking:  # a job that is only being taken is none of before
@@ -230,15 +253,58 @@ class Executor:
             if trigger is not None:
                 await self._take_pending(trigger)
                 continue
+            if not await self._serve_queue():
+                await self._pause()
+
+    async def _pause(self) -> None:
+        """Wait until something changes; while triggers wait, look after them too."""
+        timer = asyncio.get_running_loop().call_later(QUEUE_LOOK_S, self._wake.set) if len(self._queue) else None
+        try:
             await self._wake.wait()
+        finally:
+            if timer is not None:
+                timer.cancel()
 
     async def _execute_submitted(self, ticket: Ticket) -> None:
         try:
-            job = await self._execute(ticket.job)
+            await self._execute(ticket.job)
         finally:
             self._submitted = None
-        if not ticket.settled.done():
-            ticket.settled.set_result(job)
+
+    async def _serve_queue(self) -> bool:
+        """True where the turn of one that waits had come; those that cannot be run any more are told why."""
+        for expired in self._queue.take_expired():
+            self._refuse_queued(expired, self._queue.refusal_of_expired())
+        if self._health.state is not State.READY:
+            halted = self._health.state is State.HALTED
+            refused = TriggerRefused(Reason.ABORTED, "state Halted") if halted else self._not_ready()
+            self.refuse_all_queued(refused)
+        if self._taking or (self._link is not None and self._link.controller_not_ready() is not None):
+            return False
+        queued = self._queue.next()
+        if queued is None:
+            return False
+        self._taking = True
+        try:
+            ticket = await self._ticket(queued.trigger)
+        except TriggerRefused as refused:
+            self._refuse_queued(queued, refused)
+            return True
+        finally:
+            self._taking = False
+        if not queued.ticket.done():
+            queued.ticket.set_result(ticket)
+        await self._execute(ticket.job)
+        return True
+
+    def _refuse_queued(self, queued: Queued, refused: TriggerRefused) -> None:
+        self._refused(queued.trigger, refused)
+        queued.refuse(refused)
+
+    def refuse_all_queued(self, refused: TriggerRefused) -> None:
+        """Tell all that wait why they will not be run."""
+        for waiting in self._queue.take_all():
+            self._refuse_queued(waiting, refused)
 
     async def _settle_in_flight(self) -> None:
         for job in await self._unsettled():
@@ -291,7 +357,9 @@ class Executor:
             return
         finally:
             self._taking = False
-        self._count_missed(missed_between(self._last_pair, trigger.session, trigger.counter))
+        skipped = missed_between(self._last_pair, trigger.session, trigger.counter)
+        if skipped:
+            self.missed_by_source("controller", skipped)
         self._last_pair = (trigger.session, trigger.counter)
         self._link.publish(job_id=job.job_id, trigger_ack=trigger.counter, session_ack=trigger.session)
         await self._execute(job)
@@ -316,6 +384,9 @@ class Executor:
         self.settled_job = job.job_id
         if self._link is not None:
             self._link.publish(settled_job=job.job_id, reject_reason=int(job.reason or 0))
+        waited_for = self._tickets.pop(job.job_id, None)
+        if waited_for is not None and not waited_for.done():
+            waited_for.set_result(job)
         if self._on_settled is not None:
             await self._on_settled(job)
         return job

@@ -4,6 +4,7 @@ A line is ASCII, ended by CR, LF or CRLF, 80 characters at most; capitals and sm
 
     TRIG [recipe=N]   ACK <job> once the job is durable, later
                       DONE <job> <vertices> <area mm²> or FAIL <job> <code> <name>
+                      WAIT <place> first, where others are before it and it may wait; then ACK or NAK
     STAT              a status line
     PING              PONG
     anything else     NAK <code> <name>
@@ -81,6 +82,11 @@ def _trigger(number: bytes) -> Request:
 def ack(job: int) -> str:
     """The job is durable in the journal."""
     return f"ACK {job}"
+
+
+def wait(place: int) -> str:
+    """The trigger waits for its turn, 1 = the next; ACK or NAK follows."""
+    return f"WAIT {place}"
 
 
 def done(job: int, vertices: int, area_mm2: float) -> str:

@@ -1,14 +1,16 @@
-"""Triggers that ask the executor for a job: at intervals, and by hand over a serial line."""
+"""Triggers that ask the executor for a job: at intervals, and over serial ports, by text or by pulses."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+import math
+from collections.abc import Awaitable, Callable, Coroutine
 from concurrent.futures import Executor as ThreadPool
+from typing import Any, Protocol, TypeVar
 
-from drivers.trigger import LineTrigger, TriggerUnavailable
-from service.executor import Executor, Ticket, TriggerRefused
+from drivers.trigger import LineTrigger, PulseTrigger, TriggerUnavailable
+from service.executor import Executor
 from service.health import Fault, Health
 from service.journal import Job, TriggerStamp
 from service.reasons import Outcome, Reason
@@ -23,27 +25,123 @@ from service.trigger_lines import (
     nak,
     parse_line,
     pong,
+    wait,
 )
+from service.trigger_queue import Queued, Ticket, TriggerRefused
 
 log = logging.getLogger("combtrace.triggers")
 
 READ_TIMEOUT_S = 0.25  # how long a stop waits for the thread that reads
 RETRY_PAUSES_S = (0.2, 0.5, 1.0)
 
+T = TypeVar("T")
+
+
+def _nothing() -> None:
+    return
+
 
 async def interval_trigger(executor: Executor, period_s: float) -> None:
-    """Ask for a job every `period_s`, for ever. One that cannot be taken is counted and told by the executor."""
+    """Ask for a job every `period_s`, for ever; what cannot be taken, or even asked for, is counted."""
     loop = asyncio.get_running_loop()
     due = loop.time() + period_s
     while True:
         await asyncio.sleep(max(0.0, due - loop.time()))
         due += period_s
-        if due < loop.time():  # the machine slept, or a period is shorter than a step: no burst to catch up
-            due = loop.time() + period_s
+        if due < loop.time():  # the one before waited for its turn, or the machine slept: no burst to catch up
+            skipped = math.floor((loop.time() - due) / period_s) + 1
+            due += skipped * period_s
+            executor.missed_by_source("interval", skipped)
         try:
             await executor.submit(TriggerStamp("interval"))
         except TriggerRefused:
             continue
+
+
+class Port(Protocol):
+    """What all serial triggers can: open, also while open, and close."""
+
+    def open(self) -> None:
+        """Open it; raise TriggerUnavailable."""
+
+    def close(self) -> None:
+        """Let it go; never raises."""
+
+
+async def keep_open(
+    port: Port,
+    name: str,
+    health: Health,
+    pool: ThreadPool,
+    listen: Callable[[], Awaitable[T]],
+    serve: Callable[[T], Awaitable[None]],
+) -> None:
+    """Serve a port for ever; while it is away its fault is told, and it is opened again with growing pauses.
+
+    listen: hears for a moment. serve: gets what was heard first, and goes on until the port is lost.
+    """
+    part = f"serial {name}"
+    loop = asyncio.get_running_loop()
+    failures = 0
+    try:
+        while True:
+            try:
+                await loop.run_in_executor(pool, port.open)
+                heard = await listen()  # a port that opens and then cannot be read is not back
+                if failures:
+                    log.info("serial %s: is back", name)
+                failures = 0
+                health.report(part, None)
+                await serve(heard)
+            except TriggerUnavailable as error:
+                if failures == 0:
+                    log.warning("serial: %s", error)
+                health.report(part, Fault(Reason.NOT_READY, str(error)))
+                port.close()
+                await asyncio.sleep(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
+                failures += 1
+    finally:
+        port.close()
+
+
+class SerialPulses:
+    """Serves a port whose every pulse asks for a job. Nothing can be answered; the log and the counts tell."""
+
+    def __init__(
+        self,
+        port: PulseTrigger,
+        name: str,
+        trigger: TriggerStamp,
+        executor: Executor,
+        health: Health,
+        pool: ThreadPool,
+        *,
+        beat: Callable[[], None] = _nothing,
+    ) -> None:
+        self._port = port
+        self._name = name
+        self._trigger = trigger
+        self._executor = executor
+        self._health = health
+        self._pool = pool
+        self._beat = beat
+
+    async def run(self) -> None:
+        """Serve the port for ever."""
+        await keep_open(self._port, self._name, self._health, self._pool, self._listen, self._serve)
+
+    async def _listen(self) -> bool:
+        self._beat()
+        return await asyncio.get_running_loop().run_in_executor(self._pool, self._port.wait, READ_TIMEOUT_S)
+
+    async def _serve(self, pulse: bool) -> None:
+        while True:
+            if pulse:
+                try:
+                    await self._executor.ask(self._trigger)
+                except TriggerRefused as refused:
+                    log.debug("serial %s: %s", self._name, refused)  # the executor has told and counted it
+            pulse = await self._listen()
 
 
 class SerialTrigger:
@@ -57,6 +155,8 @@ class SerialTrigger:
         health: Health,
         status: Callable[[], str],
         pool: ThreadPool,
+        *,
+        beat: Callable[[], None] = _nothing,
     ) -> None:
         self._port = port
         self._name = name
@@ -64,39 +164,19 @@ class SerialTrigger:
         self._health = health
         self._status = status
         self._pool = pool
+        self._beat = beat
         self._replies: set[asyncio.Task[None]] = set()
 
     async def run(self) -> None:
         """Serve the line for ever."""
-        loop = asyncio.get_running_loop()
-        failures = 0
         try:
-            while True:
-                try:
-                    await loop.run_in_executor(self._pool, self._port.open)
-                    line = await self._read()  # a port that opens and then cannot be read is not back
-                    if failures:
-                        log.info("serial %s: is back", self._name)
-                    failures = 0
-                    self._health.report(self._part, None)
-                    await self._serve(line)
-                except TriggerUnavailable as error:
-                    if failures == 0:
-                        log.warning("serial: %s", error)
-                    self._health.report(self._part, Fault(Reason.NOT_READY, str(error)))
-                    self._port.close()
-                    await asyncio.sleep(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
-                    failures += 1
+            await keep_open(self._port, self._name, self._health, self._pool, self._read, self._serve)
         finally:
             for task in self._replies:
                 task.cancel()
-            self._port.close()
-
-    @property
-    def _part(self) -> str:
-        return f"serial {self._name}"
 
     async def _read(self) -> bytes | None:
+        self._beat()
         return await asyncio.get_running_loop().run_in_executor(self._pool, self._port.read_line, READ_TIMEOUT_S)
 
     async def _serve(self, line: bytes | None) -> None:
@@ -122,21 +202,39 @@ class SerialTrigger:
 
     async def _trigger(self, recipe: int | None) -> None:
         try:
-            ticket = await self._executor.submit(TriggerStamp("serial", recipe or 0))
+            taken = await self._executor.ask(TriggerStamp("serial", recipe or 0))
         except TriggerRefused as refused:
             await self._send(nak(int(refused.reason), refused.reason.label))
             return
-        await self._send(ack(ticket.job.job_id))  # before the task exists that may tell the end
-        task = asyncio.get_running_loop().create_task(self._tell_the_end(ticket))
+        if isinstance(taken, Queued):
+            await self._send(wait(taken.place))
+            self._later(self._tell_its_turn(taken))
+            return
+        await self._send(ack(taken.job.job_id))  # before the task exists that may tell the end
+        self._later(self._tell_the_end(taken))
+
+    def _later(self, telling: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(telling)
         self._replies.add(task)
         task.add_done_callback(self._replies.discard)
 
-    async def _tell_the_end(self, ticket: Ticket) -> None:
-        job = await asyncio.shield(ticket.settled)
+    async def _tell_its_turn(self, queued: Queued) -> None:
         try:
-            await self._send(result_line(job))
+            ticket = await asyncio.shield(queued.ticket)
+        except TriggerRefused as refused:
+            await self._send_if_there(nak(int(refused.reason), refused.reason.label))
+            return
+        await self._send_if_there(ack(ticket.job.job_id))
+        await self._tell_the_end(ticket)
+
+    async def _tell_the_end(self, ticket: Ticket) -> None:
+        await self._send_if_there(result_line(await asyncio.shield(ticket.settled)))
+
+    async def _send_if_there(self, text: str) -> None:
+        try:
+            await self._send(text)
         except TriggerUnavailable as error:
-            log.warning("serial %s: could not tell the end of job %d: %s", self._name, job.job_id, error)
+            log.warning("serial %s: could not tell %r: %s", self._name, text, error)
 
     async def _send(self, text: str) -> None:
         await asyncio.get_running_loop().run_in_executor(None, self._port.write_line, text)

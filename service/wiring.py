@@ -16,6 +16,8 @@ from drivers.camera.files import FileCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.controller import modbus
 from drivers.controller.mailbox import MailboxLayout
+from drivers.trigger import LineTrigger, PulseTrigger
+from drivers.trigger.pulses import SerialBytes, SerialSignal
 from drivers.trigger.serial import SerialLineTrigger
 from service.archive import Archive, ArchiveLimits
 from service.archive_writer import ArchiveWriter
@@ -36,7 +38,7 @@ from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation
 from service.daemon import Parts
 from service.executor import Executor
 from service.health import Fault, Health
-from service.journal import Journal, JournalError
+from service.journal import Journal, JournalError, TriggerStamp
 from service.journal_recovery import open_journal
 from service.link import Link, LinkSettings
 from service.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
@@ -47,7 +49,11 @@ from service.status import status_line
 from service.storage_watch import StorageLimits, StorageWatch
 from service.table_file import TableFileError, TableRecord, load_table
 from service.transfer import TransferCounter, TransferSettings
-from service.triggers import SerialTrigger, interval_trigger
+from service.trigger_queue import TriggerQueue
+from service.triggers import SerialPulses, SerialTrigger, interval_trigger
+
+BURST_SILENCE_S = 0.2
+LEVEL_HOLDS_S = 0.05
 
 
 class WiringError(Exception):
@@ -82,7 +88,14 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     )
     kinds = {type(trigger) for trigger in config.triggers}
     try:
-        executor = Executor(journal, cycle, health, link, controller_triggers=ControllerTrigger in kinds)
+        executor = Executor(
+            journal,
+            cycle,
+            health,
+            link,
+            controller_triggers=ControllerTrigger in kinds,
+            queue=TriggerQueue(config.service.queue_depth, cycle_settings(config).lifetime_s),
+        )
     except JournalError as error:
         raise WiringError(str(error)) from error
     if link is not None:
@@ -300,7 +313,7 @@ def _add_triggers(config: Config, parts: Parts) -> None:
         if isinstance(trigger, IntervalTrigger):
             parts.triggers.append(_interval(parts.executor, trigger.period_s))
         elif isinstance(trigger, SerialTriggerSettings):
-            parts.triggers.append(_serial(parts, trigger).run)
+            parts.triggers.append(_serial(parts, trigger))
 
 
 def _interval(executor: Executor, period_s: float) -> Callable[[], Awaitable[None]]:
@@ -310,13 +323,30 @@ def _interval(executor: Executor, period_s: float) -> Callable[[], Awaitable[Non
     return run
 
 
-def _serial(parts: Parts, trigger: SerialTriggerSettings) -> SerialTrigger:
+def _serial(parts: Parts, trigger: SerialTriggerSettings) -> Callable[[], Awaitable[None]]:
     assert parts.serial_pool is not None
-    return SerialTrigger(
-        SerialLineTrigger(trigger.port, trigger.baudrate),
-        trigger.port,
-        parts.executor,
-        parts.health,
-        lambda: status_line(parts.health, parts.executor.settled_job, parts.executor.missed),
-        parts.serial_pool,
-    )
+    shared = parts.executor, parts.health
+    parts.ports.append(trigger.port)
+    if trigger.mode == "text":
+        return SerialTrigger(
+            SerialLineTrigger(trigger.port, trigger.baudrate),
+            trigger.port,
+            *shared,
+            lambda: status_line(parts.health, parts.executor.settled_job, parts.executor.missed),
+            parts.serial_pool,
+        ).run
+    stamp = TriggerStamp(trigger.mode)
+    return SerialPulses(make_pulses(trigger), trigger.port, stamp, *shared, parts.serial_pool).run
+
+
+def make_serial_port(trigger: SerialTriggerSettings) -> LineTrigger | PulseTrigger:
+    """The driver of a serial trigger, whatever its mode, not yet opened."""
+    return SerialLineTrigger(trigger.port, trigger.baudrate) if trigger.mode == "text" else make_pulses(trigger)
+
+
+def make_pulses(trigger: SerialTriggerSettings) -> PulseTrigger:
+    """The driver of a serial trigger that is no text."""
+    if trigger.mode == "byte":
+        return SerialBytes(trigger.port, trigger.baudrate, trigger.debounce_s or BURST_SILENCE_S)
+    hold_s = trigger.debounce_s or LEVEL_HOLDS_S
+    return SerialSignal(trigger.port, trigger.signal, trigger.edge, hold_s, baudrate=trigger.baudrate)

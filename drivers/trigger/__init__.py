@@ -1,4 +1,4 @@
-"""Triggers from outside that are no controller: a line-based serial port."""
+"""Triggers from outside that are no controller: serial ports, by lines of text, by any byte, or by a control line."""
 
 from __future__ import annotations
 
@@ -24,6 +24,19 @@ class LineTrigger(Protocol):
 
     def write_line(self, text: str) -> None:
         """Send `text` (ASCII) and a line end; raise TriggerUnavailable."""
+
+    def close(self) -> None:
+        """Let the port go; never raises."""
+
+
+class PulseTrigger(Protocol):
+    """A one-way trigger that carries nothing but its moment. Blocking: the service gives it a thread of its own."""
+
+    def open(self) -> None:
+        """Open the port; raise TriggerUnavailable. Opening an open port does nothing."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """True as soon as a job is asked for, False when `timeout_s` passed without; raise TriggerUnavailable."""
 
     def close(self) -> None:
         """Let the port go; never raises."""

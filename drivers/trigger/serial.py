@@ -22,7 +22,7 @@ CHUNK = 256
 LINE_END = b"\r\n"
 
 # Beside its own exception, an OSError, pyserial lets these through: from termios, and where a setting is refused.
-_FAULTS = (OSError, ValueError, NotImplementedError, termios.error)
+PORT_FAULTS = (OSError, ValueError, NotImplementedError, termios.error)
 
 
 class SerialLineTrigger:
@@ -61,10 +61,10 @@ class SerialLineTrigger:
             port = serial.Serial(
                 self._name, self._baudrate, timeout=0, write_timeout=self._write_timeout_s, exclusive=True
             )
-        except _FAULTS as error:
+        except PORT_FAULTS as error:
             raise TriggerUnavailable(
-                f"{self._name}: cannot be opened at {self._baudrate} baud ({_reason(error)}); expected a free serial "
-                "port. Check its name, cable and permissions."
+                f"{self._name}: cannot be opened at {self._baudrate} baud ({fault_text(error)}); expected a free "
+                "serial port. Check its name, cable and permissions."
             ) from error
         self._splitter = LineSplitter()
         self._lines.clear()
@@ -93,7 +93,7 @@ class SerialLineTrigger:
             port = self._opened()
             try:
                 port.write(text.encode("ascii") + LINE_END)
-            except _FAULTS as error:
+            except PORT_FAULTS as error:
                 raise self._lose(error) from error
             self._still_open(port)
 
@@ -102,11 +102,11 @@ class SerialLineTrigger:
         port, self._port, self._lost = self._port, None, False
         if port is None:
             return
-        with contextlib.suppress(*_FAULTS):
+        with contextlib.suppress(*PORT_FAULTS):
             port.cancel_read()
             port.cancel_write()
         # Both have been woken; the descriptor must not be reused while one of them still looks at it.
-        with self._reading, self._writing, contextlib.suppress(*_FAULTS):
+        with self._reading, self._writing, contextlib.suppress(*PORT_FAULTS):
             port.close()
 
     def _opened(self) -> serial.Serial:
@@ -125,7 +125,7 @@ class SerialLineTrigger:
             data = port.read(1)
             if data:
                 data += port.read(min(port.in_waiting, CHUNK))
-        except _FAULTS as error:
+        except PORT_FAULTS as error:
             raise self._lose(error) from error
         self._still_open(port)
         if not data:
@@ -139,11 +139,12 @@ class SerialLineTrigger:
         """Give the port up: after a fault half a line may be on its way, and nothing more is to be trusted."""
         self._lost = True
         return TriggerUnavailable(
-            f"{self._name}: was lost ({_reason(error)}); expected it to stay. Check cable and device; it may come back."
+            f"{self._name}: was lost ({fault_text(error)}); expected it to stay. Check cable and device; "
+            "it may come back."
         )
 
 
-def _reason(error: BaseException) -> str:
+def fault_text(error: BaseException) -> str:
     """What went wrong, in words, without pyserial's nested numbers."""
     number = getattr(error, "errno", None)
     if number in (errno.EAGAIN, errno.EBUSY):

@@ -152,19 +152,19 @@ async def _controller(config: Config) -> Finding:
 
 def _serial(config: Config) -> Iterator[Finding]:
     from drivers.trigger import TriggerUnavailable
-    from drivers.trigger.serial import SerialLineTrigger
     from service.config import SerialTrigger
+    from service.wiring import make_serial_port
 
     for trigger in config.triggers:
         if not isinstance(trigger, SerialTrigger):
             continue
-        port = SerialLineTrigger(trigger.port, trigger.baudrate)
+        port = make_serial_port(trigger)
         try:
             port.open()
         except TriggerUnavailable as error:
             yield Finding("serial", False, str(error))
         else:
-            yield Finding("serial", True, f"{trigger.port} at {trigger.baudrate} baud")
+            yield Finding("serial", True, f"{trigger.port} at {trigger.baudrate} baud, mode {trigger.mode}")
         finally:
             port.close()
 

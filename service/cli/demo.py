@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
 async def _demo(output: Path) -> int:
     from drivers.controller.simulated import SimulatedController
     from service.daemon import Daemon
-    from service.executor import TriggerRefused
+    from service.trigger_queue import TriggerRefused
     from service.wiring import WiringError, build
 
     taken: list[AcceptedContour] = []

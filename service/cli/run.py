@@ -61,8 +61,8 @@ def summary(config: Config) -> str:
 
 async def _run(config: Config, config_path: Path, *, once: bool) -> int:
     from service.daemon import Daemon
-    from service.executor import TriggerRefused
     from service.reasons import Outcome
+    from service.trigger_queue import TriggerRefused
     from service.wiring import WiringError, build
 
     try:

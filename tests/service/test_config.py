@@ -175,7 +175,7 @@ def test_the_embedded_defaults_need_no_file() -> None:
         (SMALL + "work_area_mm: [[0, 0], [1, 1, 4], [0, 1]]\n", "work_area_mm[1]"),
         (SMALL.replace("calibration: {file: c.yaml}\n", ""), "calibration is missing: a controller needs millimetres"),
         (SMALL + "camera: {kind: files, path: b}\n", "line 4, column 1: key 'camera' stands twice, first in line 1"),
-        (SMALL + "service: {queue_depth: 5}\n", "service.queue_depth: seen 5"),
+        (SMALL + "service: {queue_depth: 101}\n", "service.queue_depth: seen 101"),
         (SMALL + "recipes: [{number: 1, name: a, parameters: {core_px: yes}}]\n", "core_px: is a truth value (True)"),
         (SMALL + "work_area_mm: [[0, 0], [1, no], [0, 1]]\n", "work_area_mm[1][1]: is a truth value (False)"),
         (SMALL + "extra: 1\n", "extra: unknown key, expected one of archive, calibration, camera"),

@@ -19,7 +19,7 @@ from drivers.controller.mailbox import Answer
 from service.config import Recipe
 from service.cycle import Cycle, CycleSettings
 from service.daemon import Daemon, Parts
-from service.executor import Executor, TriggerRefused
+from service.executor import Executor
 from service.health import Health
 from service.journal import Job, Journal, TriggerStamp
 from service.link import Link, LinkSettings
@@ -27,6 +27,7 @@ from service.lock import Lock, LockError
 from service.reasons import Outcome, Reason
 from service.state import State, StateMachine
 from service.transfer import TransferCounter, TransferSettings
+from service.trigger_queue import TriggerRefused
 from tests.service.scripted_controller import ScriptedController
 from tests.service.test_cycle import Plan
 

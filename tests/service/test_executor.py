@@ -13,12 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller.mailbox import LinkBlock, ServiceBlock
-from service.executor import Executor, TriggerRefused, missed_between
+from service.executor import Executor, missed_between
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link, LinkSettings
 from service.reasons import Outcome, Reason
 from service.state import State, StateMachine
+from service.trigger_queue import TriggerRefused
 from tests.service.waiting import until
 
 

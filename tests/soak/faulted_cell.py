@@ -29,9 +29,9 @@ from service import wiring
 from service.config import Config
 from service.cycle import Observation
 from service.daemon import Daemon
-from service.executor import TriggerRefused
 from service.journal import TriggerStamp
 from service.state import State
+from service.trigger_queue import TriggerRefused
 from tests.soak.crossed_line import crossed_line
 from tests.soak.promises import Evidence, Findings, Taken, judge, micrometres
 from tests.soak.random_contours import RandomContours

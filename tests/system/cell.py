@@ -19,6 +19,7 @@ class Cell:
         triggers: str = "[{kind: controller}]",
         trigger_every_s: float | None = 0.05,
         camera: str = "",
+        service: str = "{state_dir: state}",
         more: str = "",
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
@@ -32,7 +33,7 @@ class Cell:
             f"calibration: {{file: {SAMPLES / 'calibration.yaml'}}}\n"
             f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: 0.5, ack_timeout_s: 1}}\n"
             f"triggers: {triggers}\n"
-            "service: {state_dir: state}\n"
+            f"service: {service}\n"
             "journal: {path: journal.sqlite}\n"
             f"{more}"
         )

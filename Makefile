@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera bench-camera bench bench-link bench-daemon accuracy refusals rules soak hil check format clean
+.PHONY: install demo test test-camera bench-camera bench bench-link bench-daemon accuracy refusals rules soak soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -47,6 +47,10 @@ rules: install
 # Campaigns under faults and kills, an hour or so on two cores; resumes where it was broken off (SOAK=--fresh: anew).
 soak: install
 	$(BIN)/python -m tests.soak $(SOAK)
+
+# One daemon for 20,000 jobs: memory, descriptors, archive (JOBS=3000: fewer, and no report).
+soak-daemon: install
+	$(BIN)/python -m tests.soak.long_run $(if $(JOBS),--jobs $(JOBS),--write)
 
 # The protocol's suite on a real controller. Whole contours, which may make it move, only with MOVE=yes.
 hil: install

@@ -408,7 +408,7 @@ class JournalSettings(Model):
     """Where jobs are kept."""
 
     path: FilePath = Field(Path("var/journal.sqlite"), description="SQLite file.")
-    max_jobs: int = Field(1_000_000, ge=1000, le=10**9, description="Most jobs kept; the oldest are let go.")
+    max_jobs: int = Field(500_000, ge=1000, le=10**9, description="Most jobs kept; the oldest are let go.")
     min_free_bytes: int = Field(
         50_000_000,
         ge=0,

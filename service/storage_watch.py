@@ -27,7 +27,7 @@ class StorageLimits:
     """Free bytes without which no trigger is taken, and most jobs in the journal."""
 
     min_free_bytes: int = 0
-    max_jobs: int = 1_000_000
+    max_jobs: int = 500_000
 
 
 class StorageWatch:

@@ -20,6 +20,8 @@ class Cell:
         trigger_every_s: float | None = 0.05,
         camera: str = "",
         service: str = "{state_dir: state}",
+        calibration: Path = SAMPLES / "calibration.yaml",
+        link: str = "",
         more: str = "",
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
@@ -30,8 +32,8 @@ class Cell:
         self.accepted = folder / "accepted.jsonl"
         (folder / "config.yaml").write_text(
             f"camera: {camera}\n"
-            f"calibration: {{file: {SAMPLES / 'calibration.yaml'}}}\n"
-            f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: 0.5, ack_timeout_s: 1}}\n"
+            f"calibration: {{file: {calibration}}}\n"
+            f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: 0.5, ack_timeout_s: 1{link}}}\n"
             f"triggers: {triggers}\n"
             f"service: {service}\n"
             "journal: {path: journal.sqlite}\n"

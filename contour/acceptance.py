@@ -89,7 +89,8 @@ def judge(
     of, adds what was seen besides. Where there is a limit to the uncertainty in millimetres, a `budget` of None (nobody
     knows it) is refused as one too large.
     """
-    outlines = [polygon.pixels.exterior, *([traced.contour.exterior] if traced else [])]
+    # With a margin the polygon may well leave the picture; what was seen may not.
+    outlines = [traced.contour.exterior] if traced else [polygon.pixels.exterior]
     findings = [
         *_quality(traced, limits.quality),
         _no_walls(traced, limits.quality),
@@ -311,11 +312,13 @@ def _points(pixels: Contour, max_vertices: int) -> Finding | None:
     return Finding(
         Refusal.TOO_MANY_POINTS,
         f"The contour has {pixels.point_count} vertices, the recipe allows {max_vertices}. "
-        "Raise tolerance_mm or max_vertices.",
+        "Raise tolerance_mm or max_vertices, or let it give up more material by budget_mm.",
     )
 
 
 def _shape(polygon: Polygon) -> Finding | None:
+    if polygon.defect is not None:
+        return Finding(Refusal.SELF_INTERSECTING, f"The contour cannot be cut: {polygon.defect}.")
     shapes: list[tuple[str, Contour]] = [("", polygon.pixels)]
     if polygon.millimetres is not None:
         shapes.append((" in millimetres", polygon.millimetres))

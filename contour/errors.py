@@ -5,6 +5,7 @@ ContourError
 ├── ParameterError      a method's or renderer's parameter is out of its range
 ├── NoBlockFound        the picture was usable, but no block could be traced in it
 ├── BoardNotSeen        the picture shows no calibration board that could be used
+├── MarginImpossible    a contour that a margin tears, closes up or lets vanish
 ├── CalibrationFailed   views or points from which no calibration can be had
 └── CalibrationError    a calibration that contradicts itself, or does not fit the picture
 """
@@ -36,3 +37,7 @@ class BoardNotSeen(ContourError):
 
 class CalibrationFailed(ContourError):
     """No calibration can be had from these views or points; the message says why, and what to do."""
+
+
+class MarginImpossible(ContourError):
+    """The contour has no counterpart at that margin: a ring would vanish, split or run into another."""

@@ -40,7 +40,11 @@ class BoxTree:
     def of_ring(cls, ring: Floats) -> BoxTree:
         """The tree over the ring's N segments; segment i runs from vertex i to vertex i + 1 (cyclic)."""
         start = np.ascontiguousarray(ring, dtype=np.float64)
-        end = np.roll(start, -1, axis=0)
+        return cls.of_segments(start, np.roll(start, -1, axis=0))
+
+    @classmethod
+    def of_segments(cls, start: Floats, end: Floats) -> BoxTree:
+        """The tree over N segments, the better the nearer neighbours lie to each other."""
         levels = [(np.minimum(start, end), np.maximum(start, end))]
         while len(levels[-1][0]) > 1:
             low, high = levels[-1]

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator, model_validator
 
 from contour.geometry import ring_defect
+from contour.start_vertex import Start
 from contour.tracing import Method
 
 DEFAULT_METHOD: Method = "wall-tips"
@@ -45,6 +46,7 @@ def _a_path(value: Any) -> Any:
 
 
 Number = Annotated[float, BeforeValidator(no_truth_value)]
+Point = tuple[Number, Number]
 FilePath = Annotated[Path, BeforeValidator(_a_path)]
 
 
@@ -333,7 +335,25 @@ class Recipe(Model):
         description="Widest place where the contour may differ from the busy part of the picture, cell pitches; "
         "0 = not checked.",
     )
+    margin_mm: float = Field(
+        0,
+        ge=-1000,
+        le=1000,
+        description="How far the polygon's edges are moved into the material, mm: the exterior shrinks, holes grow; "
+        "negative = out of it.",
+    )
+    start: Literal["traced", "lower-left", "lower-right", "upper-left", "upper-right"] | Point = Field(
+        "traced",
+        description="Vertex at which each ring begins: as traced, the outermost towards a corner, or the nearest to a "
+        "point [x, y] in mm; all in the machine frame.",
+    )
     max_vertices: int = Field(4000, ge=3, le=1_000_000, description="Most vertices of all rings together.")
+    budget_mm: float = Field(
+        0,
+        ge=0,
+        le=100,
+        description="Most material that may be given up so that there are no more than max_vertices, mm; 0 = none.",
+    )
     min_area_mm2: float = Field(100, ge=0, le=4e9, description="Smallest accepted area, mm², holes taken off.")
     max_area_mm2: float = Field(4_000_000, gt=0, le=4e9, description="Largest accepted area, mm², holes taken off.")
     polarity: Literal["auto", "bright", "dark"] = Field("auto", description="Walls against the table.")
@@ -378,6 +398,17 @@ class Recipe(Model):
             if name.endswith("_px") and value != int(value):
                 raise ValueError(f"parameters.{name} is {value:g}, expected a whole number of pixels")
         return self
+
+    @property
+    def needs_millimetres(self) -> str | None:
+        """The first of its keys that means nothing without a calibration."""
+        meant = {"roi_mm": self.roi_mm, "margin_mm": self.margin_mm, "start": isinstance(self.start, tuple)}
+        return next((key for key, value in meant.items() if value), None)
+
+    @property
+    def first_vertex(self) -> Start | None:
+        """Where rings begin; None = as traced."""
+        return None if self.start == "traced" else self.start
 
     @field_validator("roi_px", "roi_mm")
     @classmethod
@@ -435,7 +466,6 @@ class ArchiveSettings(Model):
 Camera = Annotated[FilesCamera | V4l2Camera, Field(discriminator="kind")]
 Controller = Annotated[NoController | ModbusTcp | ModbusRtu | ModbusRtuOverTcp, Field(discriminator="kind")]
 Trigger = Annotated[IntervalTrigger | ControllerTrigger | SerialTrigger, Field(discriminator="kind")]
-Point = tuple[Number, Number]
 
 
 class Config(Model):
@@ -464,8 +494,9 @@ class Config(Model):
                 raise ValueError(f"recipes: {name} {', '.join(twice)} is there more than once")
         if self.default_recipe not in {recipe.number for recipe in self.recipes}:
             raise ValueError(f"default_recipe is {self.default_recipe}, but no recipe has that number")
-        if self.calibration is None and any(recipe.roi_mm for recipe in self.recipes):
-            raise ValueError("calibration is missing: a recipe's roi_mm needs millimetres. Set calibration.file")
+        needs = next((recipe.needs_millimetres for recipe in self.recipes if recipe.needs_millimetres), None)
+        if self.calibration is None and needs:
+            raise ValueError(f"calibration is missing: a recipe's {needs} needs millimetres. Set calibration.file")
         if self.calibration is None and not isinstance(self.controller, NoController):
             raise ValueError("calibration is missing: a controller needs millimetres. Set calibration.file")
         controllers = [trigger for trigger in self.triggers if isinstance(trigger, ControllerTrigger)]

@@ -15,7 +15,7 @@ from contour.calibration import Calibration
 from contour.error_budget import ErrorBudget, error_budget
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
 from contour.geometry import Contour, Ring, densified
-from contour.polygon import Polygon, cutting_polygon
+from contour.polygon import Finish, Polygon, cutting_polygon
 from contour.region import Region
 from contour.taught_table import TableLimits, look_at
 from contour.tracing import Trace, TraceSettings, check_picture, trace
@@ -203,10 +203,14 @@ class Measurer:
             calibration,
             height_mm=thickness_mm,
             tolerance_mm=recipe.tolerance_mm,
+            finish=Finish(recipe.margin_mm, recipe.max_vertices, recipe.budget_mm, recipe.first_vertex),
             on_stage=watch.lap,
         )
         # What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither.
-        sure_px = None if traced.uncertainty_px is None else float(np.hypot(traced.uncertainty_px, polygon.shift_px))
+        # What the vertex budget gave up is of one sign, and adds in full.
+        sure_px = traced.uncertainty_px
+        if sure_px is not None:
+            sure_px = float(np.hypot(sure_px, polygon.shift_px)) + polygon.given_up_px
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
         findings = judge(polygon, (width, height), self._limits(recipe), traced=traced, region=region, budget=budget)
         watch.lap("judge")

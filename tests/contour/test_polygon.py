@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contour.calibration import Alignment, SimpleCalibration
 from contour.errors import CalibrationError, ParameterError
 from contour.geometry import Contour, contour_defect, densified, hausdorff, signed_area
-from contour.polygon import PIXEL_TOLERANCE, Polygon, cutting_polygon
+from contour.polygon import PIXEL_TOLERANCE, Finish, Polygon, cutting_polygon
 from tests.contour.rings import SQUARE, blobs, simple_rings
 from tests.contour.test_calibration import camera
 
@@ -127,3 +127,58 @@ def test_a_bad_tolerance_is_refused(tolerance: float) -> None:
 def test_a_contour_that_cannot_be_converted_is_an_error() -> None:
     with pytest.raises(CalibrationError, match="not below the camera"):
         cutting_polygon(Contour(OUTLINE), camera(), height_mm=2000.0, tolerance_mm=0.1)
+
+
+def test_a_margin_moves_the_millimetres_and_the_pixels_follow() -> None:
+    for calibration in (SIMPLE, camera(tilt=(8.0, 3.0), distortion=(-0.1, 0.0, 0.0, 0.0, 0.0))):
+        contour = Contour(OUTLINE, (OPENING,))
+        plain = cutting_polygon(contour, calibration, height_mm=20.0, tolerance_mm=0.2)
+        moved = cutting_polygon(contour, calibration, height_mm=20.0, tolerance_mm=0.2, finish=Finish(margin_mm=2.0))
+        assert plain.millimetres is not None
+        assert moved.millimetres is not None
+        inner = shapely.Polygon(moved.millimetres.exterior, moved.millimetres.holes)
+        outer = shapely.Polygon(plain.millimetres.exterior, plain.millimetres.holes)
+        assert outer.contains(inner)
+        assert shapely.distance(outer.boundary, inner.boundary) == pytest.approx(2.0, abs=1e-5)
+        for pixels, millimetres in zip(moved.pixels.rings, moved.millimetres.rings, strict=True):
+            again = calibration.to_machine(calibration.to_work(pixels, 20.0))
+            np.testing.assert_allclose(again, millimetres, atol=1e-6)
+
+
+def test_a_margin_that_leaves_nothing_is_told_with_the_polygon_as_it_was() -> None:
+    polygon = cutting_polygon(Contour(OUTLINE), SIMPLE, height_mm=0.0, tolerance_mm=0.1, finish=Finish(margin_mm=60.0))
+    assert polygon.defect is not None
+    assert "vanishes" in polygon.defect
+    assert len(polygon.pixels.exterior) == 4
+
+
+@settings(max_examples=25)
+@given(blobs, st.integers(8, 30))
+def test_a_budget_is_kept_within_the_traced_contour_or_not_at_all(ring: np.ndarray, most: int) -> None:
+    plain = converted(Contour(ring * 10))
+    finish = Finish(max_vertices=most, budget_mm=3.0)
+    polygon = cutting_polygon(Contour(ring * 10), SIMPLE, height_mm=0.0, tolerance_mm=0.1, finish=finish)
+    assert polygon.millimetres is not None
+    if polygon.millimetres.point_count > most:
+        assert polygon.pixels.point_count == plain.pixels.point_count
+    elif polygon.given_up_px:
+        assert polygon.given_up_px * 0.375 <= 3.0
+        traced = SIMPLE.to_machine(SIMPLE.to_work(ring * 10, 0.0))
+        sent = shapely.Polygon(polygon.millimetres.exterior)
+        assert sent.difference(shapely.Polygon(traced).buffer(1e-9)).area < 1e-9
+
+
+@pytest.mark.parametrize("calibration", [SIMPLE, None])
+def test_the_first_vertex_is_the_recipes(calibration: SimpleCalibration | None) -> None:
+    for start, sign in (("lower-left", 1), ("upper-right", -1)):
+        polygon = cutting_polygon(
+            Contour(OUTLINE), calibration, height_mm=0.0, tolerance_mm=0.1, finish=Finish(start=start)
+        )
+        ring = polygon.pixels.exterior * [1, -1] if polygon.millimetres is None else polygon.millimetres.exterior
+        assert (sign * (ring @ [1, 1])).argmin() == 0
+
+
+@pytest.mark.parametrize("finish", [Finish(margin_mm=1.0), Finish(start=(0.0, 0.0))])
+def test_millimetres_without_a_calibration_are_refused(finish: Finish) -> None:
+    with pytest.raises(ParameterError, match="need a calibration"):
+        cutting_polygon(Contour(OUTLINE), None, height_mm=0.0, tolerance_mm=0.1, finish=finish)

@@ -314,6 +314,27 @@ _OF_OTHER_MODES: dict[str, set[str]] = {
 }
 
 
+class Gcode(Model):
+    """How G-code of a contour moves; heights above the table."""
+
+    feed_mm_min: float = Field(3000, gt=0, le=1e6, description="Feed along the rings, mm/min.")
+    plunge_mm_min: float = Field(600, gt=0, le=1e6, description="Feed downwards, mm/min.")
+    safe_z_mm: float | None = Field(
+        None, ge=0, le=10_000, description="Height between rings, mm; none = 20 mm above the block."
+    )
+    cut_z_mm: float | None = Field(
+        None, ge=-1000, le=10_000, description="Height along the rings, mm; none = the safe height, a dry run."
+    )
+    path_tolerance_mm: float = Field(0.01, gt=0, le=10, description="How far corners may be rounded (G64 P), mm.")
+    direction: Literal["climb", "conventional"] = Field(
+        "climb", description="climb: the material is on the right of the way; conventional: on the left."
+    )
+    lead_in_mm: float = Field(
+        0, ge=0, le=1000, description="Straight way onto each ring through what is no material, mm; 0 = none."
+    )
+    template: FilePath | None = Field(None, description="Program around $rings; none = one for LinuxCNC.")
+
+
 class Recipe(Model):
     """A block type: how it is traced and what is accepted."""
 
@@ -370,6 +391,10 @@ class Recipe(Model):
     roi_mm: tuple[Number, ...] = Field(
         (), description="The same in the machine frame, at the block's top: left, bottom, right, top, mm."
     )
+    exports: tuple[Literal["dxf", "svg", "geojson", "gcode"], ...] = Field(
+        (), description="Forms in which an accepted contour is kept in the archive: dxf, svg, geojson, gcode."
+    )
+    gcode: Gcode = Field(Gcode(), description="How G-code moves.")
     parameters: dict[str, Number] = Field(
         default_factory=dict, description="Sizes of the method; left out, they follow from the picture."
     )

@@ -11,7 +11,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from service import config as models
-from service.config import Config
+from service.config import Config, Recipe
 
 LARGEST_FILE = 1_000_000
 SAMPLES = Path(__file__).parent / "samples"
@@ -201,4 +201,12 @@ def _resolved(config: Config, folder: Path) -> Config:
         value = getattr(model, key, None)
         if value is not None:
             updates[section] = model.model_copy(update={key: folder / value})
+    updates["recipes"] = tuple(_resolved_recipe(recipe, folder) for recipe in config.recipes)
     return config.model_copy(update=updates)
+
+
+def _resolved_recipe(recipe: Recipe, folder: Path) -> Recipe:
+    if recipe.gcode.template is None:
+        return recipe
+    gcode = recipe.gcode.model_copy(update={"template": folder / recipe.gcode.template})
+    return recipe.model_copy(update={"gcode": gcode})

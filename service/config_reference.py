@@ -34,6 +34,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`controller.rs485`", (config.Rs485,)),
     ("`triggers`", (config.IntervalTrigger, config.ControllerTrigger, config.SerialTrigger)),
     ("`recipes`", (config.Recipe,)),
+    ("A recipe's `gcode`", (config.Gcode,)),
     ("`table`", (config.Table,)),
     ("`service`", (config.Service,)),
     ("`journal`", (config.JournalSettings,)),

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
+from service.cli.export_options import Exports, add_export_arguments
 from service.cli.measuring import find_recipe, guard_of, load_config_or_default, thickness_of
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--overlay", type=Path, metavar="FILE", help="picture with contour; a folder for several images"
     )
+    add_export_arguments(parser)
     parser.add_argument(
         "--language", choices=("en", "ru"), default="en", help="ru: each reason also in Russian, with what to do"
     )
@@ -86,6 +88,7 @@ class _Setup:
     overlay: Path | None
     overlay_is_folder: bool
     language: str
+    exports: Exports
 
     @classmethod
     def of(cls, args: argparse.Namespace) -> _Setup:
@@ -114,6 +117,7 @@ class _Setup:
             overlay,
             folder,
             args.language,
+            Exports.of(args, recipe, calibrated=guard is not None),
         )
 
     def overlay_for(self, image: Path) -> Path | None:
@@ -178,6 +182,9 @@ def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
     if overlay is not None:
         _write_overlay(overlay, picture, measurement)
         note = f"  [{overlay}]"
+    exports = setup.exports.write(image, measurement)
+    if exports:
+        note += f"  [{', '.join(exports)}]"
     status = EXIT_REFUSED if measurement.findings else EXIT_OK
     return _record(image, measurement), f"{image}: {_sentence(measurement, setup.language)}{note}", status
 

@@ -1,0 +1,35 @@
+"""What a recipe says of exports, made ready."""
+
+from __future__ import annotations
+
+from service.config import Recipe
+from service.export.document import ExportDocument
+from service.export.files import exported, read_template
+from service.export.forms import ENDINGS
+from service.export.gcode import TEMPLATE, GcodeSettings
+from service.measure import Measurement
+
+
+def gcode_settings(recipe: Recipe) -> GcodeSettings:
+    """How the recipe wants its G-code; raise ExportError where its template cannot be read."""
+    asked = recipe.gcode
+    return GcodeSettings(
+        feed_mm_min=asked.feed_mm_min,
+        plunge_mm_min=asked.plunge_mm_min,
+        safe_z_mm=asked.safe_z_mm,
+        cut_z_mm=asked.cut_z_mm,
+        path_tolerance_mm=asked.path_tolerance_mm,
+        direction=asked.direction,
+        lead_in_mm=asked.lead_in_mm,
+        template=TEMPLATE if asked.template is None else read_template(asked.template),
+    )
+
+
+def exports_of(recipe: Recipe, measurement: Measurement, title: str) -> dict[str, bytes]:
+    """The files that the recipe wants beside a job's evidence, by name; none of a refused one. Raise ExportError."""
+    contour, thickness_mm = measurement.millimetres, measurement.thickness_mm
+    if measurement.findings or contour is None or thickness_mm is None or not recipe.exports:
+        return {}
+    document = ExportDocument(contour, title, thickness_mm, measurement.uncertainty_mm)
+    gcode = gcode_settings(recipe)
+    return {f"contour.{ENDINGS[form]}": exported(form, document, gcode) for form in recipe.exports}

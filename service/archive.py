@@ -18,7 +18,7 @@ from service.reasons import Outcome
 
 JOBS_A_FOLDER = 1000
 DOCUMENT = re.compile(r"(\d{1,10})-(accepted|written|refused|failed)\.json")
-OURS = re.compile(r"\.?(\d{1,10})-[a-z]+\.(?:json|png|jpg)(?:\.new)?")
+OURS = re.compile(r"\.?(\d{1,10})-[a-z]+\.(?:json|png|jpg|dxf|svg|geojson|ngc)(?:\.new)?")
 FOLDER = re.compile(r"\d{7}xxx")
 TABLES = "tables"
 BLOCK = 4096  # what a file takes of most disks is a multiple of it

@@ -23,6 +23,7 @@ from service.evidence import (
     overlay_bytes,
     table_digest,
 )
+from service.recipe_exports import exports_of
 from service.table_file import TableRecord, table_bytes
 
 log = logging.getLogger("combtrace.archive")
@@ -138,9 +139,15 @@ class ArchiveWriter:
             files[FRAME] = frame_bytes(evidence.frame)
             if evidence.measurement is not None:
                 files[OVERLAY] = overlay_bytes(evidence.frame, evidence.measurement)
+        errors: list[str] = []
+        if evidence.recipe is not None and evidence.measurement is not None:
+            exports, errors = exports_of(evidence.recipe, evidence.measurement, f"job {job.job_id}")
+            files |= exports
         document = document_bytes(evidence, self._stored_table(evidence.measurer.table))
         self._archive.store(job.job_id, job.outcome, files, document)
         self._stored += 1
+        if errors:
+            raise ArchiveError(f"job {job.job_id}: not exported: {'; '.join(errors)}")
 
     def _stored_table(self, record: TableRecord | None) -> str | None:
         if record is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from service.config import Recipe
-from service.export.document import ExportDocument
+from service.export.document import ExportDocument, ExportError
 from service.export.files import exported, read_template
 from service.export.forms import ENDINGS
 from service.export.gcode import TEMPLATE, GcodeSettings
@@ -25,11 +25,16 @@ def gcode_settings(recipe: Recipe) -> GcodeSettings:
     )
 
 
-def exports_of(recipe: Recipe, measurement: Measurement, title: str) -> dict[str, bytes]:
-    """The files that the recipe wants beside a job's evidence, by name; none of a refused one. Raise ExportError."""
+def exports_of(recipe: Recipe, measurement: Measurement, title: str) -> tuple[dict[str, bytes], list[str]]:
+    """The files that the recipe wants beside a job's evidence, by name, none of a refused one; and what went wrong."""
     contour, thickness_mm = measurement.millimetres, measurement.thickness_mm
-    if measurement.findings or contour is None or thickness_mm is None or not recipe.exports:
-        return {}
+    if measurement.findings or contour is None or thickness_mm is None:
+        return {}, []
     document = ExportDocument(contour, title, thickness_mm, measurement.uncertainty_mm)
-    gcode = gcode_settings(recipe)
-    return {f"contour.{ENDINGS[form]}": exported(form, document, gcode) for form in recipe.exports}
+    files, errors = {}, []
+    for form in recipe.exports:
+        try:
+            files[f"contour.{ENDINGS[form]}"] = exported(form, document, lambda: gcode_settings(recipe))
+        except ExportError as error:
+            errors.append(f"{form}: {error}")
+    return files, errors

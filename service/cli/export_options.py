@@ -76,7 +76,7 @@ class Exports:
         for form, path, folder in self.paths:
             file = path / f"{image.stem}.{ENDINGS[form]}" if folder else path
             try:
-                write_export(file, exported(form, document, self.gcode))
+                write_export(file, exported(form, document, lambda: self.gcode))
             except ExportError as error:
                 raise UserError(f"--{form}: {error}") from error
             told.append(str(file))

@@ -13,13 +13,13 @@ from service.export.geojson import to_geojson
 from service.export.svg import to_svg
 
 
-def exported(form: str, document: ExportDocument, gcode: GcodeSettings) -> bytes:
+def exported(form: str, document: ExportDocument, gcode: Callable[[], GcodeSettings]) -> bytes:
     """The file's content; raise ExportError."""
     makers: dict[str, Callable[[ExportDocument], bytes]] = {
         "dxf": to_dxf,
         "svg": to_svg,
         "geojson": to_geojson,
-        "gcode": lambda document: to_gcode(document, gcode),
+        "gcode": lambda document: to_gcode(document, gcode()),
     }
     return makers[form](document)
 

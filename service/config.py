@@ -488,6 +488,13 @@ class ArchiveSettings(Model):
     )
 
 
+class Log(Model):
+    """The log on standard error."""
+
+    format: Literal["text", "json"] = Field("text", description="json: one object a line, with fields.")
+    level: Literal["debug", "info", "warning", "error"] = Field("info", description="Least level that is written.")
+
+
 Camera = Annotated[FilesCamera | V4l2Camera, Field(discriminator="kind")]
 Controller = Annotated[NoController | ModbusTcp | ModbusRtu | ModbusRtuOverTcp, Field(discriminator="kind")]
 Trigger = Annotated[IntervalTrigger | ControllerTrigger | SerialTrigger, Field(discriminator="kind")]
@@ -507,6 +514,7 @@ class Config(Model):
     service: Service = Field(default_factory=Service, description="The service itself.")
     journal: JournalSettings = Field(default_factory=JournalSettings, description="The durable list of jobs.")
     archive: ArchiveSettings = Field(default_factory=ArchiveSettings, description="Where evidence is kept.")
+    log: Log = Field(default_factory=Log, description="The log.")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

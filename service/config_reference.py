@@ -39,6 +39,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`service`", (config.Service,)),
     ("`journal`", (config.JournalSettings,)),
     ("`archive`", (config.ArchiveSettings,)),
+    ("`log`", (config.Log,)),
 )
 TYPES = {
     "integer": "whole number",

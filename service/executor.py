@@ -10,9 +10,10 @@ from typing import ParamSpec, Protocol, TypeVar
 
 from drivers.controller.mailbox import TEST_VALUE, ServiceBlock
 from service.health import Fault, Health, journal_fault
+from service.job_log import log_end
 from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
-from service.reasons import Outcome, Reason
+from service.reasons import Reason
 from service.state import State
 from service.trigger_queue import Queued, Ticket, TriggerQueue, TriggerRefused
 
@@ -226,7 +227,7 @@ class Executor:
         self._health.report("journal", None)
         self._told.clear()
         self.counts[trigger.kind, "taken"] += 1
-        log.info("job %d taken: trigger %s, recipe %s", job.job_id, trigger.kind, trigger.recipe or "default")
+        log.debug("job %d taken: trigger %s, recipe %s", job.job_id, trigger.kind, trigger.recipe or "default")
         if self._link is not None:
             self._link.publish(job_id=job.job_id)
         return job
@@ -374,13 +375,7 @@ class Executor:
     async def _finish(self, job: Job) -> Job:
         """Tell how the job ended: register block, log, and whoever asked to be told."""
         assert job.outcome is not None
-        done = job.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
-        text = "" if job.reason is None else f": {int(job.reason)} {job.reason.label}: {job.detail}"
-        if done and job.report.get("vertices"):
-            area = job.report.get("area_mm2")
-            text = f": {job.report['vertices']} vertices" + (f", {area:.0f} mm²" if area else "")
-            text += f" ({job.detail})" if job.detail else ""
-        log.log(logging.INFO if done else logging.WARNING, "job %d %s%s", job.job_id, job.outcome, text)
+        log_end(log, job)
         self.settled_job = job.job_id
         if self._link is not None:
             self._link.publish(settled_job=job.job_id, reject_reason=int(job.reason or 0))

@@ -6,6 +6,8 @@ import logging
 from collections.abc import Callable
 from enum import IntEnum
 
+from service.logs import event
+
 log = logging.getLogger("combtrace.state")
 
 
@@ -61,6 +63,7 @@ class StateMachine:
             sentence += f' reason="{reason}"'
         if job is not None:
             sentence += f" job={job}"
-        log.log(logging.WARNING if new is State.ERROR else logging.INFO, sentence)
+        fields = event("state", before=self.state.label, state=new.label, reason=reason, job=job)
+        log.log(logging.WARNING if new is State.ERROR else logging.INFO, sentence, extra=fields)
         self.state, self.reason = new, reason
         self._on_change(new, reason)

@@ -40,7 +40,7 @@ def run(args: argparse.Namespace) -> int:
         config = load_config(args.config)
     except ConfigError as error:
         raise UserError(str(error)) from error
-    start_logging(logging.DEBUG if args.verbose else logging.INFO)
+    start_logging(logging.DEBUG if args.verbose else getattr(logging, config.log.level.upper()), config.log.format)
     return asyncio.run(_run(config, args.config, once=args.once))
 
 

@@ -65,6 +65,15 @@ class CycleSettings:
 
 
 @dataclass(frozen=True)
+class Plan:
+    """What jobs are measured by. A job keeps the plan that it began with."""
+
+    measurer: Measurer
+    recipes: Mapping[int, Recipe]
+    default_recipe: int = 1
+
+
+@dataclass(frozen=True)
 class Observation:
     """What one job saw: for whoever draws, archives or prints it."""
 
@@ -78,6 +87,7 @@ class _Course:
     """What a job has come to so far; what it did not come to stays None."""
 
     job: Job
+    plan: Plan
     report: dict[str, Any] = field(default_factory=dict)
     recipe: Recipe | None = None
     thickness_mm: float = 0.0
@@ -118,8 +128,7 @@ class Cycle:
     ) -> None:
         """keep: is handed what an ended job leaves behind; called in the loop, so it must not block."""
         self._camera = camera
-        self._measurer = measurer
-        self._recipes = recipes
+        self._plan = Plan(measurer, recipes, settings.default_recipe)
         self._journal = journal
         self._health = health
         self._link = link
@@ -130,9 +139,13 @@ class Cycle:
         self._keep = keep
         self._now = now
 
+    def use(self, plan: Plan) -> None:
+        """From the next job on, measure by this plan."""
+        self._plan = plan
+
     async def run(self, job: Job) -> Job:
         """The job, settled."""
-        course = _Course(job)
+        course = _Course(job, self._plan)
         started = self._now()
         try:
             settlement = await self._carry_out(course)
@@ -150,7 +163,7 @@ class Cycle:
         self._keep(
             Evidence(
                 settled,
-                self._measurer,
+                course.plan.measurer,
                 course.recipe,
                 course.thickness_mm,
                 course.frame,
@@ -166,7 +179,9 @@ class Cycle:
         handshake = self._settings.transfer.handshake
         if not job.sent or self._link is None or not handshake:
             detail = "nothing of it was sent" if not job.sent else "whether it was taken cannot be known"
-            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), _Course(job))
+            return await self._settle(
+                job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), _Course(job, self._plan)
+            )
         assert job.session is not None
         expires_at_s = self._now() + self._settings.lifetime_s
         transfer = self._transfer(self._link, job, job.session, job.pages, expires_at_s, sent=True)
@@ -179,19 +194,19 @@ class Cycle:
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
         else:
             settlement = await transfer.run()
-        return await self._settle(job, settlement, _Course(job))
+        return await self._settle(job, settlement, _Course(job, self._plan))
 
     # --- the steps ----------------------------------------------------------------------------------------------
 
     async def _carry_out(self, course: _Course) -> Settlement:
         job = course.job
-        recipe = course.recipe = self._recipe(job)
+        recipe = course.recipe = _recipe(job, course.plan)
         course.thickness_mm = job.trigger.thickness_um / 1000 if job.trigger.thickness_um else recipe.thickness_mm
-        course.terms = Terms(recipe.model_dump(mode="json"), self._measurer.calibration_digest)
+        course.terms = Terms(recipe.model_dump(mode="json"), course.plan.measurer.calibration_digest)
         stamp = await self._stamp(job)
         stamped_at = self._now()
         frame = course.frame = await self._frame(course.report)
-        measurement = course.measurement = await self._measure(frame, recipe, course.thickness_mm)
+        measurement = course.measurement = await self._measure(course.plan.measurer, frame, recipe, course.thickness_mm)
         course.report.update(measurement.summary())
         self._observe(Observation(job, frame, measurement))
         if measurement.reasons:
@@ -228,13 +243,6 @@ class Cycle:
         except MailboxError as error:  # what passed the checks in float64 degenerates in whole micrometres
             raise _Stop(Reason.SELF_INTERSECTING, str(error)) from error
         return course.pages
-
-    def _recipe(self, job: Job) -> Recipe:
-        number = job.trigger.recipe or self._settings.default_recipe
-        if number not in self._recipes:
-            known = ", ".join(str(number) for number in sorted(self._recipes))
-            raise _Stop(Reason.UNKNOWN_RECIPE, f"recipe {number} is not configured; there are {known}")
-        return self._recipes[number]
 
     async def _stamp(self, job: Job) -> Stamp:
         """Session and clock of the controller, read before the exposure."""
@@ -285,11 +293,11 @@ class Cycle:
             raise _Stop(Reason.STALE_FRAME, f"{frame.source}: exposed {late_ms:.0f} ms before the trigger")
         return frame
 
-    async def _measure(self, frame: Frame, recipe: Recipe, thickness_mm: float) -> Measurement:
+    async def _measure(self, measurer: Measurer, frame: Frame, recipe: Recipe, thickness_mm: float) -> Measurement:
         loop = asyncio.get_running_loop()
         try:
             return await loop.run_in_executor(
-                self._pool, self._measurer.measure, frame.pixels, recipe, thickness_mm, frame.camera
+                self._pool, measurer.measure, frame.pixels, recipe, thickness_mm, frame.camera
             )
         except PictureError as error:
             raise _Stop(Reason.NO_FRAME, f"{frame.source}: {error}") from error
@@ -415,3 +423,11 @@ def _figures(stamp: Stamp, pages: tuple[Page, ...]) -> dict[str, Any]:
         "registers": sum(len(page.header) + len(page.payload) for page in pages),
         "crc32": [f"{crc32_of(page.header, page.payload):08X}" for page in pages],
     }
+
+
+def _recipe(job: Job, plan: Plan) -> Recipe:
+    number = job.trigger.recipe or plan.default_recipe
+    if number not in plan.recipes:
+        known = ", ".join(str(number) for number in sorted(plan.recipes))
+        raise _Stop(Reason.UNKNOWN_RECIPE, f"recipe {number} is not configured; there are {known}")
+    return plan.recipes[number]

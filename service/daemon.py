@@ -20,6 +20,7 @@ from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
 from service.lock import Held
 from service.reasons import Reason
+from service.reload import Reloader
 from service.state import State
 from service.storage_watch import StorageWatch
 from service.trigger_queue import Ticket, TriggerRefused
@@ -49,6 +50,7 @@ class Parts:
     warm_up_s: float = 0.0
     archive: ArchiveWriter | None = None
     storage: StorageWatch | None = None
+    reloader: Reloader | None = None
 
 
 class Daemon:
@@ -63,7 +65,10 @@ class Daemon:
         self._stop.set()
 
     async def run(self, *, on_signals: Iterable[signal.Signals] = ()) -> None:
-        """Run until `stop` or a signal."""
+        """Run until `stop` or a signal; SIGHUP has the configuration read again."""
+        reloader = self._parts.reloader
+        if reloader is not None:
+            asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, reloader.ask)
         for number in on_signals:
             asyncio.get_running_loop().add_signal_handler(number, self.stop)
         for port in self._parts.ports:
@@ -105,6 +110,8 @@ class Daemon:
         ]
         if parts.storage is not None:
             runs.append(parts.storage.run)
+        if parts.reloader is not None:
+            runs.append(parts.reloader.run)
         if parts.archive is not None:
             parts.archive.start()
         if parts.link is not None:

@@ -35,6 +35,7 @@ class Health:
     def __init__(self, machine: StateMachine) -> None:
         self._machine = machine
         self._faults: dict[str, Fault] = {}
+        self._warnings: dict[str, str] = {}
         self._job: int | None = None
         self._started = False
 
@@ -69,6 +70,18 @@ class Health:
         else:
             self._faults[part] = fault
         self._follow()
+
+    @property
+    def warnings(self) -> dict[str, str]:
+        """What a person should see to though jobs go on, by part."""
+        return dict(self._warnings)
+
+    def warn(self, part: str, text: str | None) -> None:
+        """Set or clear the warning of a part; the state does not follow it."""
+        if text is None:
+            self._warnings.pop(part, None)
+        else:
+            self._warnings[part] = text
 
     def start(self) -> None:
         """From here on the state follows the faults; before it is Preoperational."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ from service.config import (
     NoController,
 )
 from service.config import SerialTrigger as SerialTriggerSettings
-from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation
+from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation, Plan
 from service.daemon import Parts
 from service.executor import Executor
 from service.health import Fault, Health
@@ -44,6 +45,7 @@ from service.link import Link, LinkSettings
 from service.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
 from service.measure import Measurer
 from service.reasons import Reason
+from service.reload import BadPlan, Reloader
 from service.state import State, StateMachine
 from service.status import status_line
 from service.storage_watch import StorageLimits, StorageWatch
@@ -60,11 +62,18 @@ class WiringError(Exception):
     """The configuration names what cannot be had: seen, expected, next step."""
 
 
-def build(config: Config, *, observe: Callable[[Observation], None] = lambda _observation: None) -> Parts:
-    """The daemon's parts; raise WiringError. Must be called in the event loop's thread."""
-    guard, calibration_fault = find_guard(config)
+def build(
+    config: Config,
+    *,
+    path: Path | None = None,
+    observe: Callable[[Observation], None] = lambda _observation: None,
+) -> Parts:
+    """The daemon's parts; raise WiringError. Must be called in the event loop's thread.
+
+    path: the configuration's file, to be read again when asked; None = never.
+    """
+    plan, calibration_fault = _make_plan(config)
     camera = make_camera(config)
-    table = find_table(config)
     lock, journal = _make_journal(config)
     link = _make_link(config)
     health = Health(StateMachine(_publisher(link)))
@@ -73,10 +82,8 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
     archive = _make_archive(config)
     cycle = Cycle(
         camera,
-        Measurer(
-            guard.record.calibration if guard else None, guard=guard, work_area_mm=_work_area(config), table=table
-        ),
-        {recipe.number: recipe for recipe in config.recipes},
+        plan.measurer,
+        plan.recipes,
         journal,
         health,
         link,
@@ -110,8 +117,33 @@ def build(config: Config, *, observe: Callable[[Observation], None] = lambda _ob
         StorageLimits(config.journal.min_free_bytes, config.journal.max_jobs),
     )
     parts.warm_up_s = getattr(config.camera, "warm_up_s", 0.0)
+    if path is not None:
+        parts.reloader = Reloader(path, config, health, sound_plan, cycle.use)
     _add_triggers(config, parts)
     return parts
+
+
+def _make_plan(config: Config) -> tuple[Plan, Fault | None]:
+    """What jobs are measured by, and the fault of the calibration; raise WiringError."""
+    guard, fault = find_guard(config)
+    measurer = Measurer(
+        guard.record.calibration if guard else None,
+        guard=guard,
+        work_area_mm=_work_area(config),
+        table=find_table(config),
+    )
+    return Plan(measurer, {recipe.number: recipe for recipe in config.recipes}, config.default_recipe), fault
+
+
+def sound_plan(config: Config) -> Plan:
+    """What jobs are measured by; raise BadPlan where the calibration or the table cannot be used."""
+    try:
+        plan, fault = _make_plan(config)
+    except WiringError as error:
+        raise BadPlan(str(error)) from error
+    if fault is not None:
+        raise BadPlan(fault.text)
+    return plan
 
 
 def _make_archive(config: Config) -> ArchiveWriter | None:

@@ -20,7 +20,9 @@ log = logging.getLogger("combtrace.daemon")
 
 HELP = "run the daemon"
 DESCRIPTION = """\
-Run until stopped (SIGTERM, SIGINT). With --once: one immediate manual trigger, then end.
+Run until stopped (SIGTERM, SIGINT). SIGHUP has the configuration read again: recipes,
+calibration, table and work area are those of the next job; what else changed, or
+is wrong, is told, and then all stays as it was. With --once: one immediate manual trigger, then end.
 Exit status of --once: 0 accepted or written, 3 refused, 1 failed, 2 bad configuration."""
 
 
@@ -66,7 +68,7 @@ async def _run(config: Config, config_path: Path, *, once: bool) -> int:
     from service.wiring import WiringError, build
 
     try:
-        parts = build(config)
+        parts = build(config, path=config_path)
     except WiringError as error:
         raise UserError(str(error)) from error
     log.info("%s, process %d, %s: %s", version(), os.getpid(), config_path, summary(config))

@@ -23,8 +23,10 @@ class Cell:
         calibration: Path = SAMPLES / "calibration.yaml",
         link: str = "",
         more: str = "",
+        recipe: int = 0,
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
+        self._trigger_every += ("--recipe", str(recipe))
         camera = camera or f"{{kind: files, path: {SAMPLES}, loop: true}}"
         self.folder = folder
         self.port = free_port()

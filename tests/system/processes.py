@@ -59,6 +59,10 @@ class Process:
                 self._process.wait()
             self._file.close()
 
+    def reload(self) -> None:
+        """SIGHUP."""
+        self._process.send_signal(signal.SIGHUP)
+
     @property
     def running(self) -> bool:
         return self._process.poll() is None

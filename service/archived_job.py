@@ -21,7 +21,7 @@ from service.archive import TABLES, document_of
 from service.calibration_file import CalibrationFileError, record_of
 from service.calibration_guard import CalibrationGuard, GuardLimits
 from service.config import Recipe
-from service.config_file import describe
+from service.config_mistakes import describe
 from service.evidence import FRAME, VERSION
 from service.job_pages import Envelope
 from service.journal import pages_from_text

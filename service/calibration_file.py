@@ -18,7 +18,8 @@ from contour.calibration import Calibration, CameraCalibration
 from contour.errors import CalibrationError
 from contour.sentinels import Sentinels
 from service.calibration_models import MODELS, calibration_of, data_of, sentinels_of
-from service.config_file import ConfigError, describe, read_yaml
+from service.config_file import ConfigError, line_of, read_yaml
+from service.config_mistakes import describe
 
 HASH_PREFIX = "sha256:"
 
@@ -70,7 +71,8 @@ def record_of(data: dict[str, Any], path: str) -> CalibrationRecord:
     try:
         file = model.model_validate(data)
     except ValidationError as error:
-        raise CalibrationFileError("; ".join(f"{path}: {line}" for line in describe(error, model))) from error
+        told = describe(error, model, lambda where: line_of(Path(path), where))
+        raise CalibrationFileError("; ".join(f"{path}: {line}" for line in told)) from error
     if file.hash is not None and file.hash != content_hash(data):
         raise CalibrationChanged(
             f"{path}: its hash is {file.hash}, its content gives {content_hash(data)}: it was changed after it was "

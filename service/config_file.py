@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
-from service import config as models
 from service.config import Config, Recipe
+from service.config_mistakes import Location, describe
 
 LARGEST_FILE = 1_000_000
 SAMPLES = Path(__file__).parent / "samples"
@@ -86,6 +84,28 @@ def read_yaml(path: Path, option: str = "--config") -> Any:
         raise ConfigError(f"{path}: is no YAML: {' '.join(str(error).split())}") from error
 
 
+def line_of(path: Path, location: Location) -> int | None:
+    """The line where a key or entry stands in a YAML file, or the nearest one around it; None where none is known."""
+    try:
+        node = yaml.compose(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        return None
+    line = None
+    for part in location:
+        if isinstance(node, yaml.MappingNode):
+            found = [(key, value) for key, value in node.value if key.value == str(part)]
+            if not found:
+                return line
+            key, node = found[-1]
+            line = key.start_mark.line + 1
+        elif isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            node = node.value[part]
+            line = node.start_mark.line + 1
+        else:
+            return line
+    return line
+
+
 def load_config(path: Path) -> Config:
     """The configuration of a file; raise ConfigError."""
     data = read_yaml(path)
@@ -95,7 +115,8 @@ def load_config(path: Path) -> Config:
     try:
         config = Config.model_validate(data)
     except ValidationError as error:
-        raise ConfigError("\n".join(f"{path}: {line}" for line in describe(error, Config))) from error
+        told = describe(error, Config, lambda where: line_of(path, where))
+        raise ConfigError("\n".join(f"{path}: {line}" for line in told)) from error
     return _resolved(config, path.resolve().parent)
 
 
@@ -113,84 +134,6 @@ def default_config() -> Config:
 def config_schema() -> dict[str, Any]:
     """The JSON schema of config.yaml."""
     return {"$schema": SCHEMA_DIALECT, **Config.model_json_schema(), "title": "combtrace configuration"}
-
-
-def describe(error: ValidationError, model: type[BaseModel]) -> Iterator[str]:
-    """Each mistake in the data of `model` as a line: path of the key, what was seen, what is expected."""
-    for mistake in error.errors(include_url=False):
-        where = _where(mistake["loc"])
-        seen = mistake.get("input")
-        message = mistake["msg"].removeprefix("Value error, ")
-        if mistake["type"] == "extra_forbidden":
-            yield f"{where}: unknown key{_did_you_mean(model, mistake['loc'])}"
-        elif mistake["type"] == "missing":
-            yield f"{where}: is missing"
-        elif mistake["type"] == "union_tag_invalid":
-            yield f"{where}.kind: seen {seen.get('kind')!r}, expected {mistake['ctx']['expected_tags']}"
-        elif mistake["type"] == "union_tag_not_found":
-            yield f"{where}.kind: is missing"
-        elif mistake["type"] == "value_error" or isinstance(seen, dict | list | tuple):
-            yield f"{where}: {message}" if where else message
-        else:
-            yield f"{where}: seen {seen!r}: {message}"
-
-
-def _where(location: tuple[int | str, ...]) -> str:
-    """`recipes[0].tolerance_mm`; the kinds that pydantic puts into the path of a union are left out."""
-    text = ""
-    before: int | str = ""
-    for part in location:
-        if isinstance(part, int):
-            text += f"[{part}]"
-        elif not (_is_kind(part, before) or "[" in part or "-int" in part):  # branches of a union of plain types
-            text += f".{part}" if text else part
-        before = part
-    return text
-
-
-def _is_kind(part: str, before: int | str) -> bool:
-    return part in _KINDS and (isinstance(before, int) or before in ("camera", "controller"))
-
-
-def _did_you_mean(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
-    """The nearest of the keys that may stand there, or else the keys themselves."""
-    known = sorted({name for there in _models_at(model, location[:-1]) for name in there.model_fields})
-    near = difflib.get_close_matches(str(location[-1]), known, n=1)
-    return f"; did you mean {near[0]}?" if near else f", expected one of {', '.join(known)}"
-
-
-def _models_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[type[BaseModel]]:
-    """The models whose keys stand at a place in the data of `model`; more than one where `kind` is not known."""
-    here = [model]
-    for part in location:
-        of_kind = [there for there in here if part in _kinds_of(there)]
-        if of_kind:
-            here = of_kind
-        elif isinstance(part, str):
-            fields = [there.model_fields[part] for there in here if part in there.model_fields]
-            here = [inner for field in fields for inner in _models_in(field.annotation)]
-    return here
-
-
-def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
-    for inner in get_args(annotation):
-        yield from _models_in(inner)
-
-
-def _kinds_of(model: type[BaseModel]) -> tuple[Any, ...]:
-    kind = model.model_fields.get("kind")
-    return get_args(kind.annotation) if kind is not None else ()
-
-
-# The words that choose a model of a union, which pydantic puts into an error's path.
-_KINDS = frozenset(
-    word
-    for model in vars(models).values()
-    if isinstance(model, type) and issubclass(model, BaseModel)
-    for word in _kinds_of(model)
-)
 
 
 def _resolved(config: Config, folder: Path) -> Config:

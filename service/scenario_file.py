@@ -12,7 +12,8 @@ from drivers.controller.simulated_faults import Fault as FaultRule
 from drivers.controller.simulated_scenario import EVENT_KINDS, EventKind, MachineSettings, Scenario
 from drivers.controller.simulated_scenario import Event as MachineEvent
 from service.config import Model
-from service.config_file import SCHEMA_DIALECT, ConfigError, describe, read_yaml
+from service.config_file import SCHEMA_DIALECT, ConfigError, line_of, read_yaml
+from service.config_mistakes import describe
 
 Word = Annotated[int, Field(ge=1, le=65_535)]
 Seconds = Annotated[float, Field(ge=0, le=86_400)]
@@ -99,7 +100,8 @@ def load_scenario(path: Path) -> Scenario:
     try:
         found = ScenarioFile.model_validate(data)
     except ValidationError as error:
-        raise ConfigError("\n".join(f"{path}: {line}" for line in describe(error, ScenarioFile))) from error
+        told = describe(error, ScenarioFile, lambda where: line_of(path, where))
+        raise ConfigError("\n".join(f"{path}: {line}" for line in told)) from error
     return Scenario(
         seed=found.seed,
         machine=MachineSettings(**found.machine.model_dump()),

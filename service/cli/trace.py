@@ -155,7 +155,7 @@ def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
     try:
         return Recipe.model_validate({**found.model_dump(), **changes})
     except ValidationError as error:
-        from service.config_file import describe
+        from service.config_mistakes import describe
 
         raise UserError("; ".join(describe(error, Recipe))) from error
 

@@ -25,7 +25,8 @@ from drivers.controller import Controller, ControllerError, LinkBlock, Page, Ser
 from drivers.controller.mailbox import ContourMessage, MailboxLayout, crc32_of, encode_pages, withdrawal
 from drivers.controller.simulated import SimulatedController
 from service.config import Config
-from service.config_file import ConfigError, describe, load_config
+from service.config_file import ConfigError, load_config
+from service.config_mistakes import describe
 from service.ownership import WATCH_S
 from service.wiring import mailbox_layout, make_controller
 

@@ -205,7 +205,7 @@ def changed(data: dict[str, Any], **changes: Any) -> dict[str, Any]:
         (changed(SIMPLE, mm_per_pixle=1, mm_per_pixel=None), "unknown key; did you mean mm_per_pixel?"),
         (changed(SIMPLE, version=2), "version: seen 2"),
         (changed(SIMPLE, version=None), "version: is missing"),
-        (changed(SIMPLE, mm_per_pixel=0), "mm_per_pixel: seen 0: Input should be greater than 0"),
+        (changed(SIMPLE, mm_per_pixel=0), "mm_per_pixel: seen 0, expected a number above 0"),
         (changed(SIMPLE, mm_per_pixel=float("nan")), "mm_per_pixel: seen nan"),
         (changed(SIMPLE, mm_per_pixel=None), "mm_per_pixel: is missing"),
         (changed(SIMPLE, mm_per_pixle=1), "mm_per_pixle: unknown key"),

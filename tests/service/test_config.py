@@ -117,7 +117,10 @@ def test_the_embedded_defaults_need_no_file() -> None:
     [
         (SMALL.replace("path: in", "path: in, lop: true"), "camera.lop: unknown key; did you mean loop?"),
         (SMALL.replace("modbus-tcp", "modbus-tpc"), "controller.kind: seen 'modbus-tpc', expected"),
-        (SMALL.replace("modbus-tcp", "modbus-tcp, port: 70000"), "controller.port: seen 70000: Input should be less"),
+        (
+            SMALL.replace("modbus-tcp", "modbus-tcp, port: 70000"),
+            "controller.port: seen 70000, expected 65535 at most (TCP port)",
+        ),
         (SMALL.replace("modbus-tcp", "modbus-tcp, port: true"), "controller: port is a truth value (True)"),
         (
             SMALL.replace("modbus-tcp", "modbus-tcp, link_addres: 1"),
@@ -126,7 +129,7 @@ def test_the_embedded_defaults_need_no_file() -> None:
         (SMALL.replace("modbus-tcp", "modbus-tcp, timeout_s: .nan"), "controller.timeout_s: seen nan"),
         (
             SMALL.replace("modbus-tcp", "modbus-tcp, timeout_s: 0"),
-            "controller.timeout_s: seen 0: Input should be greater",
+            "controller.timeout_s: seen 0, expected a number above 0",
         ),
         (SMALL.replace("modbus-tcp", "modbus-tcp, word_order: huge"), "controller.word_order: seen 'huge'"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, payload_capacity: 99"), "payload_capacity: is 99, expected an even"),

@@ -488,6 +488,15 @@ class ArchiveSettings(Model):
     )
 
 
+class Metrics(Model):
+    """Figures for Prometheus over HTTP; needs the extra combtrace[metrics]."""
+
+    host: str = Field(
+        "127.0.0.1", min_length=1, description="Address to listen on; anything but loopback is open to the network."
+    )
+    port: Port = Field(9771, description="TCP port.")
+
+
 class Log(Model):
     """The log on standard error."""
 
@@ -514,6 +523,7 @@ class Config(Model):
     service: Service = Field(default_factory=Service, description="The service itself.")
     journal: JournalSettings = Field(default_factory=JournalSettings, description="The durable list of jobs.")
     archive: ArchiveSettings = Field(default_factory=ArchiveSettings, description="Where evidence is kept.")
+    metrics: Metrics | None = Field(None, description="Figures for Prometheus; none = not served.")
     log: Log = Field(default_factory=Log, description="The log.")
 
     @model_validator(mode="after")

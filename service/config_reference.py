@@ -39,6 +39,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`service`", (config.Service,)),
     ("`journal`", (config.JournalSettings,)),
     ("`archive`", (config.ArchiveSettings,)),
+    ("`metrics`", (config.Metrics,)),
     ("`log`", (config.Log,)),
 )
 TYPES = {

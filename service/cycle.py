@@ -143,6 +143,11 @@ class Cycle:
         """From the next job on, measure by this plan."""
         self._plan = plan
 
+    @property
+    def measurer(self) -> Measurer:
+        """What traces and converts now."""
+        return self._plan.measurer
+
     async def run(self, job: Job) -> Job:
         """The job, settled."""
         course = _Course(job, self._plan)

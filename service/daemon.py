@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import Any, Protocol
 
 from drivers.camera import Camera
 from service.archive_writer import ArchiveWriter
@@ -33,6 +33,13 @@ TELL_AFTER_S = 1.0
 STOP_BOUND_S = 8.0
 
 
+class Closeable(Protocol):
+    """What is let go at the end."""
+
+    def close(self) -> None:
+        """Let it go."""
+
+
 @dataclass
 class Parts:
     """What wiring built from a configuration."""
@@ -51,6 +58,7 @@ class Parts:
     archive: ArchiveWriter | None = None
     storage: StorageWatch | None = None
     reloader: Reloader | None = None
+    metrics: Closeable | None = None
 
 
 class Daemon:
@@ -207,6 +215,8 @@ class Daemon:
         parts.pool.shutdown(wait=True)
         if parts.serial_pool is not None:
             parts.serial_pool.shutdown(wait=True)
+        if parts.metrics is not None:
+            await asyncio.to_thread(parts.metrics.close)
         parts.camera.close()
         if parts.archive is not None:
             await asyncio.to_thread(parts.archive.close)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from typing import ParamSpec, Protocol, TypeVar
 
 from drivers.controller.mailbox import TEST_VALUE, ServiceBlock
@@ -55,7 +55,7 @@ class Executor:
         *,
         controller_triggers: bool,
         queue: TriggerQueue | None = None,
-        on_settled: Callable[[Job], Awaitable[None]] | None = None,
+        on_settled: Callable[[Job], None] | None = None,
     ) -> None:
         """queue: where triggers wait while a job is executed; None = they are refused as busy."""
         self._journal = journal
@@ -64,7 +64,7 @@ class Executor:
         self._link = link
         self._controller_triggers = controller_triggers and link is not None
         self._queue = TriggerQueue(0, 0.0) if queue is None else queue
-        self._on_settled = on_settled
+        self.on_settled = [] if on_settled is None else [on_settled]  # told of each job's end; they must not block
         self._tickets: dict[int, asyncio.Future[Job]] = {}
         self.counts: Counter[tuple[str, str]] = Counter()
         self._wake = asyncio.Event()
@@ -382,6 +382,6 @@ class Executor:
         waited_for = self._tickets.pop(job.job_id, None)
         if waited_for is not None and not waited_for.done():
             waited_for.set_result(job)
-        if self._on_settled is not None:
-            await self._on_settled(job)
+        for tell in self.on_settled:
+            tell(job)
         return job

@@ -59,6 +59,10 @@ class Health:
         """The fault of one part."""
         return self._faults.get(part)
 
+    def faults(self) -> dict[str, Fault]:
+        """All faults by part, as they are now; may be called from any thread."""
+        return self._faults.copy()
+
     def halt(self, reason: str) -> None:
         """Halted by a person or at shutdown: no fault ends it."""
         self._machine.change(State.HALTED, reason=reason)

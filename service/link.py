@@ -100,6 +100,7 @@ class Link:
         self._trouble: str | None = "not connected yet"
         self._served = False
         self.connections = 0  # opened so far: what was confirmed on one says nothing of the controller on the next
+        self.round_trip_s: float | None = None  # of the last read of the controller's block
         self._connected_at = 0.0
         self._heard_at = 0.0
         self._lost_at: float | None = None
@@ -223,8 +224,10 @@ class Link:
     async def look(self) -> LinkBlock:
         """The controller's block, as two reads in a row show it; raise ControllerError."""
         for _ in range(READS_FOR_TWO_ALIKE):
+            asked_at = self._now()
             block = await self.controller.read_link()
             self._heard(block)
+            self.round_trip_s = self._heard_at - asked_at
             previous, self._previous = self._previous, block
             if previous is not None and steady(previous) == steady(block):
                 before, self.view = self.view, block

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from contour.error_budget import ErrorBudget, error_budget
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
 from contour.geometry import Contour, Ring, densified
 from contour.polygon import Finish, Polygon, cutting_polygon
+from contour.quality import Quality
 from contour.region import Region
 from contour.taught_table import TableLimits, look_at
 from contour.tracing import Trace, TraceSettings, check_picture, trace
@@ -46,6 +47,7 @@ class Measurement:
     uncertainty: ErrorBudget | None = None
     thickness_mm: float | None = None
     aligned: bool = False
+    quality: Quality | None = None
     findings: tuple[tuple[Reason, str], ...] = ()
     timings_ms: dict[str, float] = field(default_factory=dict)
 
@@ -82,6 +84,7 @@ class Measurement:
             "area_mm2": _rounded(self.area_mm2),
             "uncertainty_mm": _rounded(self.uncertainty_mm),
             "thickness_mm": self.thickness_mm,
+            "quality": None if self.quality is None else {k: _rounded(v) for k, v in asdict(self.quality).items()},
             "timings_ms": {name: _rounded(value) for name, value in self.timings_ms.items()},
         }
 
@@ -197,7 +200,9 @@ class Measurer:
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
         traced: Trace = trace(picture, trace_settings(recipe), region=region, rectifier=rectifier, on_stage=watch.lap)
-        result = replace(result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour)
+        result = replace(
+            result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour, quality=traced.quality
+        )
         polygon = cutting_polygon(
             traced.contour,
             calibration,

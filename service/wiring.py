@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import secrets
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -34,6 +35,7 @@ from service.config import (
     ModbusTcp,
     NoController,
 )
+from service.config import Metrics as MetricsSettings
 from service.config import SerialTrigger as SerialTriggerSettings
 from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation, Plan
 from service.daemon import Parts
@@ -120,6 +122,8 @@ def build(
     if path is not None:
         parts.reloader = Reloader(path, config, health, sound_plan, cycle.use)
     _add_triggers(config, parts)
+    if config.metrics is not None:
+        _add_metrics(config.metrics, parts, cycle)
     return parts
 
 
@@ -144,6 +148,33 @@ def sound_plan(config: Config) -> Plan:
     if fault is not None:
         raise BadPlan(fault.text)
     return plan
+
+
+def _add_metrics(settings: MetricsSettings, parts: Parts, cycle: Cycle) -> None:
+    try:
+        from service.metrics import MetricsError, Sources, serve
+    except ImportError as error:
+        parts.journal.close()
+        parts.lock.release()
+        raise WiringError(
+            f"metrics: {error.name} is not installed. Install combtrace[metrics], or remove metrics"
+        ) from error
+    sources = Sources(
+        importlib.metadata.version("combtrace"),
+        parts.health,
+        parts.executor,
+        parts.link,
+        parts.archive,
+        parts.storage,
+        lambda: cycle.measurer.guard,
+    )
+    try:
+        metrics, parts.metrics = serve(settings, sources)
+    except MetricsError as error:
+        parts.journal.close()
+        parts.lock.release()
+        raise WiringError(str(error)) from error
+    parts.executor.on_settled.append(metrics.job_ended)
 
 
 def _make_archive(config: Config) -> ArchiveWriter | None:

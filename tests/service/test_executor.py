@@ -63,7 +63,7 @@ class Bench:
             self.journal, self.runner, self.health, self.link, controller_triggers=True, on_settled=self._note
         )
 
-    async def _note(self, job: Job) -> None:
+    def _note(self, job: Job) -> None:
         self.settled.append(job)
 
     def controller_says(self, **fields: int) -> None:

@@ -53,6 +53,9 @@ class Controller(Protocol):
     async def read_link(self) -> LinkBlock:
         """The controller's block, one FC3 of 16 registers."""
 
+    def glance(self) -> LinkBlock | None:
+        """The same where it can be had at once, holding the event loop for milliseconds at most; else None."""
+
     async def read_service(self) -> ServiceBlock:
         """The service's own block as the controller holds it, one FC3 of 16 registers."""
 

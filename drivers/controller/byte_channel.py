@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import select
 from collections.abc import Callable
 
 # A reply has at most 260 bytes. asyncio's own transports ask for 256 KiB at each read: 10 µs more a request.
@@ -32,6 +33,8 @@ class ByteChannel:
         self._closed = False
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(descriptor, self._read)
+        self._poll = select.poll()
+        self._poll.register(descriptor, select.POLLIN)
 
     def write(self, data: bytes) -> None:
         """Send `data` as the other end takes it."""
@@ -49,6 +52,13 @@ class ByteChannel:
         if not self._unsent:
             self._loop.add_writer(self._descriptor, self._write_rest)
         self._unsent += data[sent:]
+
+    def wait(self, longest_s: float) -> bool:
+        """True where something came within `longest_s`, which the receiver has by then. It holds the event loop."""
+        if self._closed or self._unsent or not self._poll.poll(1000 * longest_s):
+            return False
+        self._read()
+        return True
 
     def close(self) -> None:
         """Forget what is unsent and let the descriptor go; a second call does nothing."""

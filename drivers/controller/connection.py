@@ -15,6 +15,7 @@ from drivers.controller.errors import (
     ControllerTimeout,
     ControllerUnavailable,
 )
+from drivers.controller.promptness import WAIT_S, Promptness
 from drivers.controller.requests import EXCEPTION, Request
 from drivers.controller.wires import Descriptor, Wire
 
@@ -78,6 +79,9 @@ class Connection:
         self._alarm: asyncio.TimerHandle | None = None
         self._rest: asyncio.Handle | None = None
         self._listening = False
+        self._sent_at = 0.0
+        self._promptness = Promptness()
+        self._in_place = bool(wire.pace.silence_s)  # a serial line is never prompt
         self._channel = ByteChannel(*descriptor, self._receive, self._lost)
 
     def end(self, fault: ControllerUnavailable) -> None:
@@ -107,6 +111,10 @@ class Connection:
         exchange = _Exchange(requests, self._loop.create_future())
         self._turns.append(exchange)
         self._send_next()
+        if len(requests) == 1:
+            self._wait_in_place()
+        else:  # first let those that want to go in between take their turn in the queue
+            self._loop.call_soon(self._wait_in_place)
         try:
             return await exchange.done
         except asyncio.CancelledError:
@@ -114,6 +122,25 @@ class Connection:
                 what = f"{exchange.request} was cancelled on its way, its reply may still come"
                 self.end(ControllerUnavailable(f"{self.name}: {what}"))
             raise
+
+    def at_once(self, request: Request) -> bytes | None:
+        """The reply's PDU where it comes promptly and is no refusal; None where `run` must ask for it."""
+        if (
+            self._turns
+            or self._under_way
+            or self.fault
+            or self._in_place
+            or not self._promptness.worth(self._loop.time())
+        ):
+            return None
+        exchange = _Exchange((request,), self._loop.create_future())
+        self._turns.append(exchange)
+        self._send_next()
+        self._wait_in_place()
+        if exchange.done.done() and exchange.done.exception() is None:
+            return exchange.replies[0]
+        exchange.done.add_done_callback(asyncio.Future.exception)  # nobody else asks for it
+        return None
 
     async def wait_out(self, silence_s: float, longest_s: float) -> None:
         """Return when nothing has come for `silence_s`; what comes is dropped. Raises ControllerUnavailable."""
@@ -150,12 +177,26 @@ class Connection:
         exchange = self._under_way = self._turns.popleft()
         request = exchange.request
         data = self._frames.request(request)
+        self._sent_at = now
         self._deadline = now + self._timeout_s + self._pace.byte_s * self._frames.wire_length(request)
         if self._alarm is None:
             self._alarm = self._loop.call_at(self._deadline, self._look_at_deadline)
         if self._pace.echo:
             self._echo = data
         self._channel.write(data)
+
+    def _wait_in_place(self) -> None:
+        """Hold the event loop while replies come promptly, as long as `Promptness` allows."""
+        if self._in_place:
+            return
+        self._in_place = True
+        came, begun = True, self._loop.time()
+        while came and self._under_way is not None and self._promptness.worth(begun):
+            came = self._channel.wait(WAIT_S)
+            now = self._loop.time()
+            self._promptness.waited(now - begun, now, came)
+            begun = now
+        self._in_place = False
 
     def _rest_for(self, left_s: float) -> asyncio.Handle:
         """Come back after `left_s`, or a little earlier: the loop's timers are late by up to `TIMER_STEP_S`."""
@@ -185,6 +226,8 @@ class Connection:
     def _receive(self, data: bytes) -> None:
         if self._pace.silence_s:
             self._silent_from = self._loop.time()
+        elif not self._in_place:
+            self._promptness.came_by_loop(self._loop.time() - self._sent_at)
         if self._listening:
             return
         try:
@@ -195,6 +238,7 @@ class Connection:
             self._take(data)
         except ControllerNonsense as error:
             self.end(ControllerNonsense(f"{self.name}: {error}. {self._wire.mismatch}"))
+        self._wait_in_place()
 
     def _take(self, data: bytes) -> None:
         exchange = self._under_way

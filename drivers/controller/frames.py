@@ -49,7 +49,7 @@ class TcpFrames:
         self._request = request
         self._head = MBAP_HEADER.pack(self._transaction, 0, length, self._device_id) + request.reply_head
         self._length = MBAP_HEADER.size - 1 + length
-        return self._library.encode(request.pdu, self._device_id, self._transaction)
+        return MBAP_HEADER.pack(self._transaction, 0, 1 + len(request.pdu), self._device_id) + request.pdu
 
     def reply(self, received: bytes) -> bytes | None:
         """The reply's PDU; see `Frames`."""

@@ -65,6 +65,8 @@ class ModbusController:
         self._wire = wire
         self._device_id = device_id
         self._layout = layout or MailboxLayout()
+        self._read_link = (read_registers(self._layout.link_address, BLOCK_REGISTERS),)
+        self._read_service = (read_registers(self._layout.service_address, BLOCK_REGISTERS),)
         self._timeout_s = timeout_s
         self._limits = limits or RequestLimits()
         self._connecting = asyncio.Lock()
@@ -112,12 +114,17 @@ class ModbusController:
 
     async def read_link(self) -> LinkBlock:
         """The controller's block, one FC3 of 16 registers."""
-        registers = await self._read_block(self._layout.link_address)
+        registers = await self._read_block(self._read_link)
         return decode_link(registers, self._layout.word_order)
+
+    def glance(self) -> LinkBlock | None:
+        """The same where the controller is prompt, else None: then `read_link` asks, and tells what is wrong."""
+        reply = None if self._connection is None else self._connection.at_once(self._read_link[0])
+        return None if reply is None else decode_link(registers_of(reply), self._layout.word_order)
 
     async def read_service(self) -> ServiceBlock:
         """The service's own block as the controller holds it, one FC3 of 16 registers."""
-        registers = await self._read_block(self._layout.service_address)
+        registers = await self._read_block(self._read_service)
         return decode_service(registers, self._layout.word_order)
 
     async def write_service(self, block: ServiceBlock) -> None:
@@ -196,8 +203,8 @@ class ModbusController:
 
     # --- registers ----------------------------------------------------------------------------------------------
 
-    async def _read_block(self, address: int) -> tuple[int, ...]:
-        (reply,) = await self._held().run([read_registers(address, BLOCK_REGISTERS)])
+    async def _read_block(self, row: Sequence[Request]) -> tuple[int, ...]:
+        (reply,) = await self._held().run(row)
         return registers_of(reply)
 
     def _stream(self, page: Page) -> bytes:

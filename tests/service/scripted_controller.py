@@ -59,6 +59,13 @@ class ScriptedController:
 
     async def read_link(self) -> LinkBlock:
         self._meet("read_link")
+        return self.shown()
+
+    def glance(self) -> LinkBlock | None:
+        return None
+
+    def shown(self) -> LinkBlock:
+        """The block at this moment."""
         beat = int(time.monotonic() * 50) & 0xFFFF if self.beating else 0
         clock = int((time.monotonic() - self.started_at) * 1000) + 1000 if self.clock_runs else 0
         return replace(self.link, controller_heartbeat=beat, clock=clock)

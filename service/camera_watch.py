@@ -9,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from drivers.camera import Camera, CameraError
+from service.beat import until_beat
 from service.health import Fault, Health
 from service.reasons import Reason
 
@@ -56,7 +57,7 @@ class CameraWatch:
         """Look after the camera for ever."""
         while True:
             await self.look()
-            await asyncio.sleep(WATCH_PERIOD_S)
+            await asyncio.sleep(until_beat(asyncio.get_running_loop().time(), WATCH_PERIOD_S))
 
     async def look(self) -> None:
         """One look: check, reopen or warm up, whichever is due; nothing while a job has the camera."""

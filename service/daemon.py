@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from drivers.camera import Camera
 from service.archive_writer import ArchiveWriter
+from service.beat import until_beat
 from service.camera_watch import CameraWatch
 from service.executor import Executor
 from service.health import Fault, Health
@@ -139,13 +140,13 @@ class Daemon:
                     log.debug("journal: %s", error)
                 else:
                     parts.health.report("journal", None)
-            await asyncio.sleep(JOURNAL_RETRY_S)
+            await asyncio.sleep(until_beat(asyncio.get_running_loop().time(), JOURNAL_RETRY_S))
 
     async def _watch_link(self, link: Link) -> None:
         """Let health follow the link: some faults show by silence, so looking at each reply would not find them."""
         while True:
             self._report_link(link)
-            await asyncio.sleep(WATCH_PERIOD_S)
+            await asyncio.sleep(until_beat(asyncio.get_running_loop().time(), WATCH_PERIOD_S))
 
     def _report_link(self, link: Link) -> None:
         fault = link.fault()

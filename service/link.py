@@ -16,6 +16,7 @@ from typing import Any
 
 from drivers.controller import Controller, ControllerError, ControllerUnavailable
 from drivers.controller.mailbox import LinkBlock, ServiceBlock
+from service.beat import until_beat
 from service.ownership import Ownership
 from service.reasons import Reason
 
@@ -93,6 +94,7 @@ class Link:
         self._now = now
         self._up = asyncio.Event()
         self._wake = asyncio.Event()
+        self._timer: asyncio.TimerHandle
         self._written = asyncio.Event()
         self._block = ServiceBlock()
         self._dirty = True
@@ -115,7 +117,7 @@ class Link:
     def _forget(self) -> None:
         """Drop all that an earlier connection said: nothing of it may be combined with what comes next."""
         self.view = None
-        self._previous: LinkBlock | None = None
+        self._previous: tuple[int, ...] | None = None
         self._unsteady: str | None = None
         self._beat_at: float | None = None
         self._beat: int | None = None
@@ -226,14 +228,7 @@ class Link:
         for _ in range(READS_FOR_TWO_ALIKE):
             asked_at = self._now()
             block = await self.controller.read_link()
-            self._heard(block)
-            self.round_trip_s = self._heard_at - asked_at
-            previous, self._previous = self._previous, block
-            if previous is not None and steady(previous) == steady(block):
-                before, self.view = self.view, block
-                self._unsteady = None
-                if before is None or steady(before) != steady(block):
-                    self.on_look()
+            if self._shows_the_same(block, asked_at):
                 return block
         self.view = None
         text = (
@@ -243,6 +238,20 @@ class Link:
         log.log(logging.DEBUG if self._unsteady else logging.WARNING, "link: %s", text)
         self._unsteady = text
         raise LinkUnsteady(text)
+
+    def _shows_the_same(self, block: LinkBlock, asked_at: float) -> bool:
+        """True where `block` is like the one read before it, so that it is the view."""
+        self._heard(block)
+        self.round_trip_s = self._heard_at - asked_at
+        shown = steady(block)
+        previous, self._previous = self._previous, shown
+        if previous is None or previous != shown:
+            return False
+        before, self.view = self.view, block
+        self._unsteady = None
+        if before is None or steady(before) != shown:
+            self.on_look()
+        return True
 
     def _heard(self, block: LinkBlock) -> None:
         now = self._heard_at = self._now()
@@ -300,10 +309,14 @@ class Link:
                 return True
         return False
 
+    def _service_due(self) -> bool:
+        if self.settings.observe or self.ownership.conflict:
+            return False
+        return self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S or not self.ownership.decided
+
     async def _keep_service(self) -> None:
         """Write the service block where a change, the heartbeat or the ownership asks for it, and where it is ours."""
-        due = self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S or not self.ownership.decided
-        if self.settings.observe or self.ownership.conflict or not due:
+        if not self._service_due():
             return
         found = await self.controller.read_service()
         if not self.ownership.saw(found):
@@ -400,10 +413,29 @@ class Link:
             await self._pause()
 
     async def _pause(self) -> None:
-        """Wait for the poll period, or until something is published."""
-        timer = asyncio.get_running_loop().call_later(self.settings.poll_period_s, self._wake.set)
+        """Wait until something is published, or a beat of the poll period finds something to do."""
+        self._set_timer()
         try:
             await self._wake.wait()
         finally:
-            timer.cancel()
+            self._timer.cancel()
         self._wake.clear()
+
+    def _set_timer(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._timer = loop.call_later(until_beat(loop.time(), self.settings.poll_period_s), self._beat_of_poll)
+
+    def _beat_of_poll(self) -> None:
+        """Poll in place where the controller lets us: at rest, waking the task each time costs more than the poll."""
+        if self._nothing_new():
+            self._set_timer()
+        else:
+            self._wake.set()
+
+    def _nothing_new(self) -> bool:
+        """True where nothing is to be written and the controller's block, read now, shows what it showed."""
+        if not self.settings.handshake or self.view is None or self._service_due():
+            return False
+        asked_at = self._now()
+        block = self.controller.glance()
+        return block is not None and self._shows_the_same(block, asked_at)

@@ -14,7 +14,7 @@ import numpy as np
 from contour.errors import ContourError
 from contour.geometry import Contour, hausdorff
 from drivers.controller.mailbox import HEADER_FIELDS, ContourTooLarge, MailboxError, Page
-from drivers.controller.words import WordOrder, unpack
+from drivers.controller.words import Unpacking, WordOrder
 from service.archived_job import ArchivedJob, EvidenceError, recipe_with
 from service.evidence import measurement_fields
 from service.job_pages import Envelope, contour_pages
@@ -177,8 +177,8 @@ def _page_changes(was: tuple[Page, ...], now: tuple[Page, ...], word_order: Word
         yield Change("pages", len(was), len(now))
         return
     for number, (old, new) in enumerate(zip(was, now, strict=True), start=1):
-        before = unpack(HEADER_FIELDS, (0, *old.header), word_order)
-        after = unpack(HEADER_FIELDS, (0, *new.header), word_order)
+        before = Unpacking(HEADER_FIELDS)((0, *old.header), word_order)
+        after = Unpacking(HEADER_FIELDS)((0, *new.header), word_order)
         for name, value in before.items():
             if value != after[name]:
                 yield Change(f"page {number} {name}", value, after[name])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from enum import IntEnum
 
 from drivers.controller.errors import MailboxError
-from drivers.controller.words import WordOrder, fields, pack, unpack
+from drivers.controller.words import Unpacking, WordOrder, fields, pack
 
 BLOCK_REGISTERS = 16
 TEST_VALUE = 0x01020304
@@ -110,11 +112,12 @@ SERVICE_FIELDS = fields(
     (11, "owner", "u16"),
     (12, "settled_job", "u32"),
 )
+_UNPACK_LINK, _UNPACK_SERVICE = Unpacking(LINK_FIELDS), Unpacking(SERVICE_FIELDS)
 
 
 def decode_link(registers: Sequence[int], word_order: WordOrder) -> LinkBlock:
     """The controller's block from its 16 registers."""
-    return LinkBlock(**unpack(LINK_FIELDS, _checked_block(registers, "link"), word_order))
+    return LinkBlock(**_unpacked(_UNPACK_LINK, registers, "link", word_order))
 
 
 def encode_link(block: LinkBlock, word_order: WordOrder) -> tuple[int, ...]:
@@ -124,7 +127,7 @@ def encode_link(block: LinkBlock, word_order: WordOrder) -> tuple[int, ...]:
 
 def decode_service(registers: Sequence[int], word_order: WordOrder) -> ServiceBlock:
     """The service's block from its 16 registers."""
-    return ServiceBlock(**unpack(SERVICE_FIELDS, _checked_block(registers, "service"), word_order))
+    return ServiceBlock(**_unpacked(_UNPACK_SERVICE, registers, "service", word_order))
 
 
 def encode_service(block: ServiceBlock, word_order: WordOrder) -> tuple[int, ...]:
@@ -132,9 +135,8 @@ def encode_service(block: ServiceBlock, word_order: WordOrder) -> tuple[int, ...
     return tuple(pack(SERVICE_FIELDS, asdict(block), BLOCK_REGISTERS, word_order))
 
 
-def _checked_block(registers: Sequence[int], name: str) -> Sequence[int]:
-    if len(registers) != BLOCK_REGISTERS or not all(0 <= register <= 0xFFFF for register in registers):
-        raise MailboxError(
-            f"the {name} block came as {list(registers)}, expected {BLOCK_REGISTERS} registers of 16 bits"
-        )
-    return registers
+def _unpacked(unpacking: Unpacking, registers: Sequence[int], name: str, word_order: WordOrder) -> dict[str, int]:
+    with suppress(struct.error):
+        if len(registers) == BLOCK_REGISTERS:
+            return unpacking(registers, word_order)
+    raise MailboxError(f"the {name} block came as {list(registers)}, expected {BLOCK_REGISTERS} registers of 16 bits")

@@ -36,16 +36,16 @@ RULES = (
     # --- conventions ---
     Rule(
         "Conventions: a block is acted on only when two reads in a row show the same",
-        f"{LINK}::Link.look",
+        f"{LINK}::Link._shows_the_same",
         f"{IN_LINK}::test_a_block_counts_only_when_two_reads_in_a_row_show_it",
-        "if previous is not None and steady(previous) == steady(block):",
-        "if previous is not None:",
+        "if previous is None or previous != shown:",
+        "if previous is None:",
     ),
     Rule(
         "Conventions: what an earlier connection said is not combined with what comes next",
         f"{LINK}::Link._forget",
         f"{IN_LINK}::test_what_an_earlier_connection_said_does_not_count_as_one_of_the_two",
-        "self._previous: LinkBlock | None = None",
+        "self._previous: tuple[int, ...] | None = None",
         "self._previous = getattr(self, '_previous', None)",
     ),
     Rule(
@@ -87,10 +87,10 @@ RULES = (
     ),
     Rule(
         "Service block: service_heartbeat changes at least once a second",
-        f"{LINK}::Link._keep_service",
+        f"{LINK}::Link._service_due",
         f"{IN_LINK}::test_our_heartbeat_changes_at_least_once_a_second_and_the_block_is_written_whole",
-        "due = self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S or not self.ownership.decided",
-        "due = self._dirty or not self.ownership.decided",
+        "return self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S or not self.ownership.decided",
+        "return self._dirty or not self.ownership.decided",
     ),
     Rule(
         "Service block: what its reply did not confirm is written again",

@@ -42,6 +42,9 @@ class Reading:
     async def read_link(self) -> LinkBlock:
         return self.blocks.pop(0)
 
+    def glance(self) -> LinkBlock | None:
+        return self.blocks.pop(0)
+
 
 def link_over(*blocks: LinkBlock, times: list[float] | None = None) -> Link:
     ticks = iter(times) if times else None
@@ -290,6 +293,68 @@ async def test_a_controller_known_to_have_no_clock_is_known_after_a_reconnection
     link = link_over(*(LinkBlock(session=9) for _ in range(3)), times=[0.0, 60.0, 61.0])
     await link.look()
     link._forget()
-    link._previous = LinkBlock(session=9)
+    link._previous = steady(LinkBlock(session=9))
     await link.look()
     assert link.stamp().clock_ms == 0
+
+
+class Glanced(ScriptedController):
+    """A prompt controller: its block can be had in place. torn: what is seen there, where it is not what it holds."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.glances = 0
+        self.torn: LinkBlock | None = None
+
+    def glance(self) -> LinkBlock | None:
+        self.glances += 1
+        return (self.torn or self.shown()) if self.reachable else None
+
+
+async def at_rest(controller: Glanced, link: Link) -> None:
+    """Until the block is looked at in place."""
+    seen = controller.glances
+    await until(lambda: link.fault() is None and controller.glances >= seen + 5)
+
+
+async def test_at_rest_the_block_is_looked_at_in_place_and_the_heartbeat_goes_on() -> None:
+    controller = Glanced()
+    async with linked(controller) as link:
+        await at_rest(controller, link)
+        beat = controller.service.service_heartbeat
+        await until(lambda: controller.service.service_heartbeat != beat)
+
+
+async def test_a_change_seen_in_place_is_acted_on_and_so_is_what_is_published() -> None:
+    controller = Glanced()
+    async with linked(controller) as link:
+        await at_rest(controller, link)
+        controller.link = replace(controller.link, trigger_counter=5)
+        await until(lambda: link.view is not None and link.view.trigger_counter == 5)
+        await at_rest(controller, link)
+        link.publish(job_id=9)
+        await until(lambda: controller.service.job_id == 9)
+
+
+async def test_what_one_look_in_place_shows_counts_only_when_a_second_read_shows_it() -> None:
+    controller = Glanced()
+    async with linked(controller) as link:
+        views: list[int] = []
+        link.on_look = lambda: views.append(link.view.last_job if link.view else 0)
+        await at_rest(controller, link)
+        controller.torn = replace(controller.link, last_job=77)
+        seen = controller.glances
+        await until(lambda: controller.glances >= seen + 10)
+        assert 77 not in views
+        assert link.view is not None
+        assert link.view.last_job == 0
+
+
+async def test_a_loss_seen_in_place_is_told_and_the_link_comes_back() -> None:
+    controller = Glanced()
+    async with linked(controller) as link:
+        await at_rest(controller, link)
+        controller.reachable = False
+        await until(lambda: link.fault() is not None)
+        controller.reachable = True
+        await at_rest(controller, link)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller import MailboxError
-from drivers.controller.words import fields, pack, unpack, words32
+from drivers.controller.words import Unpacking, fields, pack, words32
 
 TABLE = fields((0, "short", "u16"), (1, "long", "u32"), (4, "signed", "i32"))
 ORDERS = st.sampled_from(["big", "little"])
@@ -21,7 +21,7 @@ def test_what_is_packed_is_unpacked(short: int, long: int, signed: int, order: s
     registers = pack(TABLE, values, 7, order)
     assert len(registers) == 7
     assert registers[3] == registers[6] == 0
-    assert unpack(TABLE, registers, order) == values
+    assert Unpacking(TABLE)(registers, order) == values
 
 
 @given(st.lists(st.integers(-(2**31), 2**32 - 1), max_size=20))

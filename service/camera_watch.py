@@ -34,12 +34,14 @@ class CameraWatch:
         health: Health,
         *,
         warm_up_s: float = 0.0,
+        beat: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._camera = camera
         self._pool = pool
         self._health = health
         self._warm_up_s = warm_up_s
+        self._beat = beat
         self._now = now
         self._told: str | None = None
         self._lost_at_s: float | None = None
@@ -57,6 +59,7 @@ class CameraWatch:
         """Look after the camera for ever."""
         while True:
             await self.look()
+            self._beat()
             await asyncio.sleep(until_beat(asyncio.get_running_loop().time(), WATCH_PERIOD_S))
 
     async def look(self) -> None:

@@ -124,6 +124,7 @@ class Cycle:
         *,
         observe: Callable[[Observation], None] = lambda _observation: None,
         keep: Callable[[Evidence], None] = lambda _evidence: None,
+        beat: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         """keep: is handed what an ended job leaves behind; called in the loop, so it must not block."""
@@ -137,6 +138,7 @@ class Cycle:
         self._pool = pool
         self._observe = observe
         self._keep = keep
+        self._beat = beat
         self._now = now
 
     def use(self, plan: Plan) -> None:
@@ -211,7 +213,9 @@ class Cycle:
         stamp = await self._stamp(job)
         stamped_at = self._now()
         frame = course.frame = await self._frame(course.report)
+        self._beat()
         measurement = course.measurement = await self._measure(course.plan.measurer, frame, recipe, course.thickness_mm)
+        self._beat()
         course.report.update(measurement.summary())
         self._observe(Observation(job, frame, measurement))
         if measurement.reasons:
@@ -280,6 +284,7 @@ class Cycle:
         loop = asyncio.get_running_loop()
         try:
             await loop.run_in_executor(self._pool, self._camera.open)
+            self._beat()
             frame = await loop.run_in_executor(self._pool, self._camera.grab, asked_at, self._settings.camera_timeout_s)
         except CameraUnavailable as error:
             self._health.report("camera", Fault(Reason.NO_FRAME, str(error)))
@@ -362,6 +367,7 @@ class Cycle:
             before_withdrawal=before_withdrawal,
             on_stuck=on_stuck,
             sent=sent,
+            beat=self._beat,
             now=self._now,
         )
 
@@ -383,6 +389,7 @@ class Cycle:
         """Read or write the journal, again and again until it is done: no step goes on without it."""
         told = ""
         while True:
+            self._beat()
             try:
                 result = await asyncio.to_thread(write, *args, **kwargs)
             except JournalError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import signal
+import threading
 from collections.abc import Awaitable, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -24,6 +25,8 @@ from service.reasons import Reason
 from service.reload import Reloader
 from service.state import State
 from service.storage_watch import StorageWatch
+from service.supervisor import Supervisor
+from service.systemd import Notifier, Watchdog
 from service.trigger_queue import Ticket, TriggerRefused
 
 log = logging.getLogger("combtrace.daemon")
@@ -31,7 +34,8 @@ log = logging.getLogger("combtrace.daemon")
 JOURNAL_RETRY_S = 1.0
 WATCH_PERIOD_S = 0.25
 TELL_AFTER_S = 1.0
-STOP_BOUND_S = 8.0
+STOP_BOUND_S = 8.0  # for the running job
+THREADS_END_S = 2.0
 
 
 class Closeable(Protocol):
@@ -52,10 +56,12 @@ class Parts:
     link: Link | None
     pool: ThreadPoolExecutor
     lock: Held
-    triggers: list[Callable[[], Awaitable[None]]] = field(default_factory=list)
+    triggers: list[tuple[str, Callable[[], Awaitable[None]]]] = field(default_factory=list)
     ports: list[str] = field(default_factory=list)
     serial_pool: ThreadPoolExecutor | None = None
     warm_up_s: float = 0.0
+    notifier: Notifier = field(default_factory=Notifier)
+    watchdog: Watchdog = field(default_factory=lambda: Watchdog(Notifier({})))
     archive: ArchiveWriter | None = None
     storage: StorageWatch | None = None
     reloader: Reloader | None = None
@@ -65,12 +71,18 @@ class Parts:
 class Daemon:
     """Runs the parts until it is stopped, or, with `once`, until one manual trigger has come to its end."""
 
-    def __init__(self, parts: Parts) -> None:
+    def __init__(self, parts: Parts, *, on_stop: Callable[[], None] = lambda: None) -> None:
+        """on_stop: called when the end is asked for."""
         self._parts = parts
+        self._on_stop = on_stop
         self._stop = asyncio.Event()
+        self.supervisor = Supervisor(parts.health, beat=parts.watchdog.beat)
+        self.abandoned = False  # a call that hangs was left behind: the process must not wait for its thread
 
     def stop(self) -> None:
         """Ask for the end: no new trigger, the running job gets a bounded time."""
+        if not self._stop.is_set():
+            self._on_stop()
         self._stop.set()
 
     async def run(self, *, on_signals: Iterable[signal.Signals] = ()) -> None:
@@ -83,51 +95,63 @@ class Daemon:
         for port in self._parts.ports:
             opening = Fault(Reason.NOT_READY, f"{port} is being opened", starting=True)
             self._parts.health.report(f"serial {port}", opening)
-        tasks = self._start(self._parts.triggers)
+        notifier = self._parts.notifier
+        self._parts.health.listen(lambda state, reason: notifier.send(STATUS=_status(state, reason)))
+        keeping = self._start(self._parts.triggers)
+        notifier.send(READY=1, STATUS=_status(self._parts.health.state, self._parts.health.reason))
         try:
-            await self._stopped_or_dead(tasks)
+            await self._stopped_or_dead(keeping)
+            notifier.send(STOPPING=1)
             await self._let_the_job_end()
         finally:
-            await self._end(tasks)
+            await self._end(keeping)
 
     async def run_once(self, ready_timeout_s: float, *, on_signals: Iterable[signal.Signals] = ()) -> Job:
         """The settled job of one immediate manual trigger; raise TriggerRefused where it is not taken in time."""
         for number in on_signals:
             asyncio.get_running_loop().add_signal_handler(number, self.stop)
         self._parts.executor.ignore_controller()
-        tasks = self._start([])
+        keeping = self._start([])
         try:
             ticket = await self._submit_when_ready(ready_timeout_s)
-            job = await self._settled_or_dead(ticket, tasks)
+            job = await self._settled_or_dead(ticket, keeping)
             if self._parts.link is not None:
                 await self._parts.link.flush(1.0)
             return job
         finally:
-            await self._end(tasks)
+            await self._end(keeping)
 
     # --- parts --------------------------------------------------------------------------------------------------
 
-    def _start(self, triggers: Iterable[Callable[[], Awaitable[None]]]) -> list[asyncio.Task[None]]:
-        parts = self._parts
-        watch = CameraWatch(parts.camera, parts.pool, parts.health, warm_up_s=parts.warm_up_s)
+    def _start(self, triggers: Iterable[tuple[str, Callable[[], Awaitable[None]]]]) -> asyncio.Task[None]:
+        parts, beat = self._parts, self._parts.watchdog.beat
+        watch = CameraWatch(
+            parts.camera, parts.pool, parts.health, warm_up_s=parts.warm_up_s, beat=partial(beat, "camera")
+        )
         watch.start()
-        runs: list[Callable[[], Awaitable[None]]] = [
-            watch.run,
-            self._watch_journal,
-            parts.executor.run,
-            *triggers,
-        ]
+        add = self.supervisor.add
+        add("camera", watch.run)
+        add("journal", self._watch_journal)
+        add("jobs", parts.executor.run)
+        watched = ["camera", "jobs"]
+        for name, run in triggers:
+            add(name, run)
+            watched += [name] if name.startswith("serial") else []
         if parts.storage is not None:
-            runs.append(parts.storage.run)
+            add("storage", parts.storage.run)
         if parts.reloader is not None:
-            runs.append(parts.reloader.run)
+            add("reload", parts.reloader.run)
         if parts.archive is not None:
             parts.archive.start()
         if parts.link is not None:
-            runs += [parts.link.run, partial(self._watch_link, parts.link)]
+            add("link", parts.link.run)
+            add("link watch", partial(self._watch_link, parts.link))
+            parts.link.on_round = partial(beat, "link")
+            watched.append("link")
             self._report_link(parts.link)
+        parts.watchdog.watch(watched)
         parts.health.start()
-        return [asyncio.ensure_future(_as_task(run)) for run in runs]
+        return asyncio.create_task(self.supervisor.run())
 
     async def _watch_journal(self) -> None:
         """Try the journal again after it could not be written; until then no trigger is taken."""
@@ -173,67 +197,79 @@ class Daemon:
                 raise TriggerRefused(Reason.ABORTED, "stopped before the service was ready")
             await asyncio.sleep(WATCH_PERIOD_S / 5)
 
-    async def _settled_or_dead(self, ticket: Ticket, tasks: list[asyncio.Task[None]]) -> Job:
+    async def _settled_or_dead(self, ticket: Ticket, keeping: asyncio.Task[None]) -> Job:
         stop = asyncio.ensure_future(self._stop.wait())
         try:
-            waiting: list[asyncio.Future[Any]] = [ticket.settled, stop, *tasks]
+            waiting: list[asyncio.Future[Any]] = [ticket.settled, stop, keeping]
             await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
         finally:
             stop.cancel()
-        _raise_first(tasks)
+        _raise_if_dead(keeping)
         if not ticket.settled.done():
             await self._let_the_job_end()
         if not ticket.settled.done():
             raise TriggerRefused(Reason.ABORTED, f"stopped; job {ticket.job.job_id} is settled by the next start")
         return ticket.settled.result()
 
-    async def _stopped_or_dead(self, tasks: list[asyncio.Task[None]]) -> None:
+    async def _stopped_or_dead(self, keeping: asyncio.Task[None]) -> None:
         stop = asyncio.ensure_future(self._stop.wait())
         try:
-            await asyncio.wait([stop, *tasks], return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait([stop, keeping], return_when=asyncio.FIRST_COMPLETED)
         finally:
             stop.cancel()
-        _raise_first(tasks)
+        _raise_if_dead(keeping)
 
     async def _let_the_job_end(self) -> None:
         """Give the running job its bounded time; what is sent and not decided by then stays in flight."""
         log.info("stopping")
         self._parts.health.halt("the service is being stopped")
+        self._parts.executor.refuse_all_queued(TriggerRefused(Reason.ABORTED, "the service is being stopped"))
         loop = asyncio.get_running_loop()
         give_up_at = loop.time() + STOP_BOUND_S
         while self._parts.health.job is not None and loop.time() < give_up_at:
             await asyncio.sleep(WATCH_PERIOD_S / 5)
 
-    async def _end(self, tasks: list[asyncio.Task[None]]) -> None:
+    async def _end(self, keeping: asyncio.Task[None]) -> None:
         parts = self._parts
         if parts.health.state is not State.HALTED:
             parts.health.halt("the service is being stopped")
         if parts.link is not None and parts.link.fault() is None:
             await parts.link.flush(1.0)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-        parts.pool.shutdown(wait=True)
+        keeping.cancel()
+        await asyncio.gather(keeping, return_exceptions=True)
+        if await self._freed(parts.pool, "camera"):
+            parts.camera.close()
         if parts.serial_pool is not None:
-            parts.serial_pool.shutdown(wait=True)
+            await self._freed(parts.serial_pool, "serial port")
         if parts.metrics is not None:
             await asyncio.to_thread(parts.metrics.close)
-        parts.camera.close()
         if parts.archive is not None:
             await asyncio.to_thread(parts.archive.close)
         parts.journal.close()
         parts.lock.release()
 
+    async def _freed(self, pool: ThreadPoolExecutor, what: str) -> bool:
+        """True once the pool's threads have ended; one that hangs in a call is left behind, and told."""
+        ender = threading.Thread(target=pool.shutdown, kwargs={"cancel_futures": True}, daemon=True)
+        ender.start()
+        loop = asyncio.get_running_loop()
+        give_up_at = loop.time() + THREADS_END_S
+        while ender.is_alive():
+            if loop.time() >= give_up_at:
+                log.error("a call to the %s has not returned for %g s; ending without it", what, THREADS_END_S)
+                self.abandoned = True
+                return False
+            await asyncio.sleep(WATCH_PERIOD_S / 25)
+        return True
 
-async def _as_task(run: Callable[[], Awaitable[None]]) -> None:
-    await run()
+
+def _status(state: State, reason: str | None) -> str:
+    """The state as systemd shows it."""
+    return state.label if reason is None else f"{state.label}: {reason}"
 
 
-def _raise_first(tasks: list[asyncio.Task[None]]) -> None:
-    """Raise what ended a task: each runs for ever, so the end of one is a defect that ends the service."""
-    for task in tasks:
-        if task.done():
-            log.critical("a part of the service has ended, so the service ends: %s", task)
-            if not task.cancelled():
-                task.result()
-            raise RuntimeError(f"{task} ended, expected it to run for ever. Report it with the log")
+def _raise_if_dead(keeping: asyncio.Task[None]) -> None:
+    """Raise what ended the supervisor: it outlives every part, so that is a defect of its own."""
+    if keeping.done():
+        keeping.result()
+        raise RuntimeError("the supervisor ended, expected it to run for ever. Report it with the log")

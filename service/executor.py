@@ -24,6 +24,7 @@ R = TypeVar("R")
 
 JOURNAL_PAUSE_S = 1.0
 QUEUE_LOOK_S = 0.25  # how often those that wait are looked at where nothing else wakes the loop
+IDLE_LOOK_S = 1.0  # a loop that turns shows that it lives
 COUNTER_VALUES = 65535  # a trigger counter runs 1…65535; 0 means none yet
 
 
@@ -56,6 +57,7 @@ class Executor:
         controller_triggers: bool,
         queue: TriggerQueue | None = None,
         on_settled: Callable[[Job], None] | None = None,
+        beat: Callable[[], None] = lambda: None,
     ) -> None:
         """queue: where triggers wait while a job is executed; None = they are refused as busy."""
         self._journal = journal
@@ -65,6 +67,7 @@ class Executor:
         self._controller_triggers = controller_triggers and link is not None
         self._queue = TriggerQueue(0, 0.0) if queue is None else queue
         self.on_settled = [] if on_settled is None else [on_settled]  # told of each job's end; they must not block
+        self._beat = beat
         self._tickets: dict[int, asyncio.Future[Job]] = {}
         self.counts: Counter[tuple[str, str]] = Counter()
         self._wake = asyncio.Event()
@@ -243,6 +246,7 @@ class Executor:
         """Execute jobs for ever; first those that a restart found in flight."""
         self._found = True
         while True:
+            self._beat()
             self._wake.clear()
             if self._found and not self._taking:  # a job that is only being taken is none of before
                 self._found = False
@@ -258,13 +262,13 @@ class Executor:
                 await self._pause()
 
     async def _pause(self) -> None:
-        """Wait until something changes; while triggers wait, look after them too."""
-        timer = asyncio.get_running_loop().call_later(QUEUE_LOOK_S, self._wake.set) if len(self._queue) else None
+        """Wait until something changes, but not for long: triggers that wait are looked after."""
+        look_s = QUEUE_LOOK_S if len(self._queue) else IDLE_LOOK_S
+        timer = asyncio.get_running_loop().call_later(look_s, self._wake.set)
         try:
             await self._wake.wait()
         finally:
-            if timer is not None:
-                timer.cancel()
+            timer.cancel()
 
     async def _execute_submitted(self, ticket: Ticket) -> None:
         try:

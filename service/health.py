@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from service.journal import JournalError, JournalFull
@@ -43,6 +44,15 @@ class Health:
     def state(self) -> State:
         """The service's state."""
         return self._machine.state
+
+    @property
+    def reason(self) -> str | None:
+        """Why the state is as it is, where it is a fault or a halt."""
+        return self._machine.reason
+
+    def listen(self, listener: Callable[[State, str | None], None]) -> None:
+        """Tell `listener` of every change of the state."""
+        self._machine.listen(listener)
 
     @property
     def job(self) -> int | None:

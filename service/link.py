@@ -89,6 +89,7 @@ class Link:
         self.settings = settings
         self.view: LinkBlock | None = None
         self.on_look = on_look
+        self.on_round: Callable[[], None] = lambda: None  # after each round or attempt, well or not
         self.on_found: Callable[[ServiceBlock], Awaitable[None]] = _nothing
         self.ownership = Ownership(0, now=now)
         self._now = now
@@ -365,6 +366,7 @@ class Link:
                     # A connection alone is no success: there are those who answer it, and then no request.
                     failures = 0 if self._served else failures
                     self._lost(error)
+                self.on_round()
                 await asyncio.sleep(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
                 failures += 1
         finally:
@@ -410,6 +412,7 @@ class Link:
                     await self.look()
             await self._keep_service()
             self._serves()
+            self.on_round()
             await self._pause()
 
     async def _pause(self) -> None:

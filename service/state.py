@@ -50,7 +50,11 @@ class StateMachine:
     def __init__(self, on_change: Callable[[State, str | None], None] = lambda _state, _reason: None) -> None:
         self.state = State.PREOPERATIONAL
         self.reason: str | None = None
-        self._on_change = on_change
+        self._listeners = [on_change]
+
+    def listen(self, listener: Callable[[State, str | None], None]) -> None:
+        """Tell `listener` of every change from now on."""
+        self._listeners.append(listener)
 
     def change(self, new: State, *, reason: str | None = None, job: int | None = None) -> None:
         """Change to `new`, with a reason where it is a fault; raise IllegalTransition. The same again does nothing."""
@@ -66,4 +70,5 @@ class StateMachine:
         fields = event("state", before=self.state.label, state=new.label, reason=reason, job=job)
         log.log(logging.WARNING if new is State.ERROR else logging.INFO, sentence, extra=fields)
         self.state, self.reason = new, reason
-        self._on_change(new, reason)
+        for listener in self._listeners:
+            listener(new, reason)

@@ -11,6 +11,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -23,6 +24,7 @@ log = logging.getLogger("combtrace.transfer")
 
 FIRST_LOOKS_S = 0.002  # between looks for an answer, growing to the poll period: most answers come within a scan
 WITHDRAWAL_PAUSE_S = 0.5
+WAIT_SLICE_S = 1.0
 CAN_BE_REPEATED = (Answer.BAD_CRC, Answer.BAD_LAYOUT, Answer.OUTDATED)
 
 
@@ -88,6 +90,7 @@ class Transfer:
         before_withdrawal: Callable[[Reason], Awaitable[None]],
         on_stuck: Callable[[str], None] = lambda _why: None,
         sent: bool = False,
+        beat: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._link = link
@@ -102,6 +105,7 @@ class Transfer:
         self._before_withdrawal = before_withdrawal
         self._on_stuck = on_stuck
         self._sent = sent
+        self._beat = beat
         self._now = now
         self._withdrawn_for: tuple[Reason, str] | None = None
         self._trouble = ""
@@ -130,7 +134,7 @@ class Transfer:
                     await self._gate()
                     await self._attempt(self._withdrawal)
                 except ControllerUnavailable:
-                    await self._link.wait_connected()
+                    await self._connected()
                 except ControllerError as error:
                     self._told(str(error))
                 in_vain += 1
@@ -144,6 +148,7 @@ class Transfer:
 
     async def _look(self) -> LinkBlock:
         """The controller's block; raise _Ended where it settles the job."""
+        self._beat()
         view = await self._link.look()
         self._check_owner()
         if view.session == 0:
@@ -338,14 +343,23 @@ class Transfer:
     async def _reconnected(self) -> bool:
         """Wait for a new connection, at most until the job expires; a withdrawal waits for ever."""
         if self._withdrawn_for is not None:
-            await self._link.wait_connected()
+            await self._connected()
             return True
         try:
             async with asyncio.timeout(max(0.0, self._expires_at_s - self._now())):
-                await self._link.wait_connected()
+                await self._connected()
         except TimeoutError:
             return False
         return True
+
+    async def _connected(self) -> None:
+        """Wait for the link's connection, however long. To wait for the link, which shows its own life, is no hang."""
+        while True:
+            self._beat()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(WAIT_SLICE_S):
+                    await self._link.wait_connected()
+                    return
 
     # --- handshake: none ----------------------------------------------------------------------------------------
 

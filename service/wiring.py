@@ -6,6 +6,7 @@ import importlib.metadata
 import secrets
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,7 @@ from service.reload import BadPlan, Reloader
 from service.state import State, StateMachine
 from service.status import status_line
 from service.storage_watch import StorageLimits, StorageWatch
+from service.systemd import Notifier, Watchdog
 from service.table_file import TableFileError, TableRecord, load_table
 from service.transfer import TransferCounter, TransferSettings
 from service.trigger_queue import TriggerQueue
@@ -82,6 +84,8 @@ def build(
     health.report("calibration", calibration_fault)
     pool = ThreadPoolExecutor(1, "camera")
     archive = _make_archive(config)
+    notifier = Notifier()
+    watchdog = Watchdog(notifier)
     cycle = Cycle(
         camera,
         plan.measurer,
@@ -94,6 +98,7 @@ def build(
         pool,
         observe=observe,
         keep=archive.keep if archive is not None else lambda _evidence: None,
+        beat=partial(watchdog.beat, "jobs"),
     )
     kinds = {type(trigger) for trigger in config.triggers}
     try:
@@ -104,12 +109,13 @@ def build(
             link,
             controller_triggers=ControllerTrigger in kinds,
             queue=TriggerQueue(config.service.queue_depth, cycle_settings(config).lifetime_s),
+            beat=partial(watchdog.beat, "jobs"),
         )
     except JournalError as error:
         raise WiringError(str(error)) from error
     if link is not None:
         link.on_look = executor.wake
-    parts = Parts(camera, journal, health, executor, link, pool, lock)
+    parts = Parts(camera, journal, health, executor, link, pool, lock, notifier=notifier, watchdog=watchdog)
     parts.archive = archive
     parts.storage = StorageWatch(
         journal,
@@ -374,9 +380,9 @@ def _add_triggers(config: Config, parts: Parts) -> None:
         parts.serial_pool = ThreadPoolExecutor(ports, "serial")
     for trigger in config.triggers:
         if isinstance(trigger, IntervalTrigger):
-            parts.triggers.append(_interval(parts.executor, trigger.period_s))
+            parts.triggers.append((f"interval {trigger.period_s:g} s", _interval(parts.executor, trigger.period_s)))
         elif isinstance(trigger, SerialTriggerSettings):
-            parts.triggers.append(_serial(parts, trigger))
+            parts.triggers.append((f"serial {trigger.port}", _serial(parts, trigger)))
 
 
 def _interval(executor: Executor, period_s: float) -> Callable[[], Awaitable[None]]:
@@ -388,6 +394,7 @@ def _interval(executor: Executor, period_s: float) -> Callable[[], Awaitable[Non
 
 def _serial(parts: Parts, trigger: SerialTriggerSettings) -> Callable[[], Awaitable[None]]:
     assert parts.serial_pool is not None
+    beat = partial(parts.watchdog.beat, f"serial {trigger.port}")
     shared = parts.executor, parts.health
     parts.ports.append(trigger.port)
     if trigger.mode == "text":
@@ -397,9 +404,10 @@ def _serial(parts: Parts, trigger: SerialTriggerSettings) -> Callable[[], Awaita
             *shared,
             lambda: status_line(parts.health, parts.executor.settled_job, parts.executor.missed),
             parts.serial_pool,
+            beat=beat,
         ).run
     stamp = TriggerStamp(trigger.mode)
-    return SerialPulses(make_pulses(trigger), trigger.port, stamp, *shared, parts.serial_pool).run
+    return SerialPulses(make_pulses(trigger), trigger.port, stamp, *shared, parts.serial_pool, beat=beat).run
 
 
 def make_serial_port(trigger: SerialTriggerSettings) -> LineTrigger | PulseTrigger:

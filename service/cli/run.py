@@ -7,6 +7,7 @@ import asyncio
 import logging
 import os
 import signal
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,9 +15,12 @@ from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_REFUSED, UserError
 
 if TYPE_CHECKING:
     from service.config import Config
+    from service.daemon import Daemon
     from service.journal import Job
 
 log = logging.getLogger("combtrace.daemon")
+
+LAST_RESORT_S = 15.0  # after a stop was asked for; the parts of a stop have their own bounds, together less
 
 HELP = "run the daemon"
 DESCRIPTION = """\
@@ -72,19 +76,44 @@ async def _run(config: Config, config_path: Path, *, once: bool) -> int:
     except WiringError as error:
         raise UserError(str(error)) from error
     log.info("%s, process %d, %s: %s", version(), os.getpid(), config_path, summary(config))
-    daemon = Daemon(parts)
+    daemon = Daemon(parts, on_stop=_end_within_bound)
     signals = (signal.SIGTERM, signal.SIGINT)
     if not once:
         await daemon.run(on_signals=signals)
-        return EXIT_OK
+        return _left(daemon, EXIT_OK)
     try:
         job = await daemon.run_once(config.controller.ready_timeout_s, on_signals=signals)
     except TriggerRefused as refused:
         refusal = refused.reason.outcome is Outcome.REFUSED and not refused.not_ready
         status = EXIT_REFUSED if refusal else EXIT_FAILED
         raise UserError(f"not triggered: {int(refused.reason)} {refused.reason.label}: {refused}", status) from refused
-    print(job_line(job))
+    print(job_line(job), flush=True)
+    return _left(daemon, _status(job))
+
+
+def _status(job: Job) -> int:
+    from service.reasons import Outcome
+
     return {Outcome.REFUSED: EXIT_REFUSED, Outcome.FAILED: EXIT_FAILED}.get(job.outcome or Outcome.FAILED, EXIT_OK)
+
+
+def _end_within_bound() -> None:
+    """See that a process that was told to end is gone in time: a hanging disk can hold up any step of a stop."""
+    last = threading.Timer(LAST_RESORT_S, _leave, args=(EXIT_FAILED,))
+    last.daemon = True
+    last.start()
+
+
+def _left(daemon: Daemon, status: int) -> int:
+    """`status`; does not return where a thread hangs in a call, for which the interpreter's own end would wait."""
+    if daemon.abandoned:
+        _leave(status)
+    return status
+
+
+def _leave(status: int) -> None:
+    logging.shutdown()
+    os._exit(status)
 
 
 def job_line(job: Job) -> str:

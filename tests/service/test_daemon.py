@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import socket
+import threading
 import time
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +17,7 @@ import pytest
 
 from drivers.camera import CameraUnavailable
 from drivers.camera.simulated import SimulatedCamera
-from drivers.controller.mailbox import Answer
+from drivers.controller.mailbox import Answer, ServiceBlock
 from service.config import Recipe
 from service.cycle import Cycle, CycleSettings
 from service.daemon import Daemon, Parts
@@ -26,6 +28,7 @@ from service.link import Link, LinkSettings
 from service.lock import Lock, LockError
 from service.reasons import Outcome, Reason
 from service.state import State, StateMachine
+from service.systemd import Notifier, Watchdog
 from service.transfer import TransferCounter, TransferSettings
 from service.trigger_queue import TriggerRefused
 from tests.service.scripted_controller import ScriptedController
@@ -82,6 +85,41 @@ class Built:
         jobs = [job for number in range(1, 20) if (job := journal.find(number))]
         journal.close()
         return jobs
+
+
+class Systemd:
+    """The far end of systemd's socket, with a watchdog that wants a sign every 0.1 s or so."""
+
+    def __init__(self, folder: Path) -> None:
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+        self._address = str(folder / "notify")
+        self._heard: list[str] = []
+
+    def __enter__(self) -> Systemd:
+        self._socket.bind(self._address)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+    def joined(self, built: Built) -> Parts:
+        """The parts, joined to this."""
+        parts = built.parts
+        parts.notifier = Notifier({"NOTIFY_SOCKET": self._address, "WATCHDOG_USEC": "300000"})
+        parts.watchdog = Watchdog(parts.notifier)
+        parts.executor._beat = lambda: parts.watchdog.beat("jobs")
+        return parts
+
+    def heard(self) -> list[str]:
+        """What was told so far."""
+        with suppress(BlockingIOError):
+            while True:
+                self._heard.append(self._socket.recv(4096).decode())
+        return self._heard
+
+    def forget(self) -> None:
+        self.heard()
+        self._heard = []
 
 
 @asynccontextmanager
@@ -152,19 +190,72 @@ async def test_a_camera_that_goes_and_comes_back_is_error_and_ready_again(tmp_pa
         assert job.outcome is Outcome.ACCEPTED
 
 
-async def test_a_part_that_ends_by_a_defect_ends_the_service_and_says_so(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+async def test_a_part_that_fails_by_a_defect_is_started_again_and_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    built = Built(tmp_path, ScriptedController())
+    monkeypatch.setattr("service.supervisor.SOUND_AFTER_S", 0.1)
+    controller = ScriptedController()
+    write, failures = controller.write_service, [ZeroDivisionError("a defect")]
 
-    async def broken(_block: object) -> None:
-        raise ZeroDivisionError("a defect")
+    async def broken(block: ServiceBlock) -> None:
+        if failures:
+            raise failures.pop()
+        await write(block)
 
-    built.controller.write_service = broken  # type: ignore[method-assign,assignment]
-    with pytest.raises(ZeroDivisionError):
-        await asyncio.wait_for(built.daemon.run(), 10)
-    assert "a part of the service has ended" in caplog.text
-    Lock(tmp_path / "lock").release()
+    controller.write_service = broken  # type: ignore[method-assign]
+    async with running(tmp_path, controller) as (built, _task):
+        await built.until(lambda: built.parts.health.fault("part link"))
+        assert built.parts.health.state is State.ERROR
+        await built.ready()
+        (link,) = (part for part in built.daemon.supervisor.parts if part.name == "link")
+        assert (link.restarts, link.last_error) == (1, "ZeroDivisionError: a defect")
+        job = await (await built.parts.executor.submit(TriggerStamp("serial"))).settled
+        assert job.outcome is Outcome.ACCEPTED
+    assert "part link has failed" in caplog.text
+
+
+async def test_a_stop_does_not_wait_for_a_camera_call_that_hangs_and_the_job_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("service.daemon.STOP_BOUND_S", 0.2)
+    monkeypatch.setattr("service.daemon.THREADS_END_S", 0.2)
+    let_go = threading.Event()
+    async with running(tmp_path, ScriptedController()) as (built, task):
+        await built.ready()
+        built.camera._make_picture = lambda _n: let_go.wait() and np.zeros((6, 8), np.uint8)
+        await built.parts.executor.submit(TriggerStamp("serial"))
+        await built.until(lambda: built.parts.health.job)
+        (job,) = await built.stop(task)
+        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.ABORTED)
+        assert built.daemon.abandoned
+    assert "a call to the camera has not returned" in caplog.text
+    let_go.set()
+
+
+async def test_systemd_hears_nothing_while_a_camera_call_hangs_and_again_after_it(tmp_path: Path) -> None:
+    with Systemd(tmp_path) as systemd:
+        built = Built(tmp_path, ScriptedController())
+        let_go = threading.Event()
+        built.daemon = Daemon(systemd.joined(built))
+        task = asyncio.ensure_future(built.daemon.run())
+        await built.ready()
+        await built.until(lambda: systemd.heard().count("WATCHDOG=1") >= 3)
+        assert any(text.startswith("READY=1\nSTATUS=") for text in systemd.heard())
+        good = built.camera._make_picture
+        built.camera._make_picture = lambda _n: let_go.wait() and np.zeros((6, 8), np.uint8)
+        ticket = await built.parts.executor.submit(TriggerStamp("serial"))
+        await built.until(lambda: built.parts.health.job)
+        await built.until(lambda: built.parts.watchdog.silent == {"jobs"})
+        systemd.forget()
+        await asyncio.sleep(0.5)  # it heard three in less
+        assert "WATCHDOG=1" not in systemd.heard()
+        built.camera._make_picture = good
+        let_go.set()
+        await ticket.settled
+        await built.until(lambda: "WATCHDOG=1" in systemd.heard())
+        built.daemon.stop()
+        await asyncio.wait([task])
+        assert "STOPPING=1" in systemd.heard()
 
 
 async def test_it_stops_before_anything_is_there(tmp_path: Path) -> None:

@@ -28,12 +28,10 @@ CALIBRATION = (
 QUICK = {"timeout_s": 0.2, "poll_period_s": 0.01, "ready_timeout_s": 1.0, "ack_timeout_s": 0.5}
 
 
-class Rectangles:
-    """Stands in for the measurer."""
-
-    def measure(self, *_: object, **__: object) -> Measurement:
-        contour = Contour(RECTANGLE)
-        return Measurement("find-contours", pixels=contour, millimetres=contour, area_mm2=5000.0)
+def measure(*_: object, **__: object) -> Measurement:
+    """Stands in for the measurer's tracing."""
+    contour = Contour(RECTANGLE)
+    return Measurement("find-contours", pixels=contour, millimetres=contour, area_mm2=5000.0)
 
 
 class WiredDaemon:
@@ -56,7 +54,7 @@ class WiredDaemon:
         )
         self.parts: Parts = wiring.build(self.config)
         cycle: Any = self.parts.executor._runner
-        cycle._measurer = Rectangles()
+        cycle._plan.measurer.measure = measure
         cycle._camera = self.parts.camera = SimulatedCamera(lambda _number: np.zeros((6, 8), np.uint8))
 
     @property

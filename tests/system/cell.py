@@ -22,6 +22,7 @@ class Cell:
         service: str = "{state_dir: state}",
         calibration: Path = SAMPLES / "calibration.yaml",
         link: str = "",
+        journal: str = "{path: journal.sqlite}",
         more: str = "",
         recipe: int = 0,
     ) -> None:
@@ -38,7 +39,7 @@ class Cell:
             f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: 0.5, ack_timeout_s: 1{link}}}\n"
             f"triggers: {triggers}\n"
             f"service: {service}\n"
-            "journal: {path: journal.sqlite}\n"
+            f"journal: {journal}\n"
             f"{more}"
         )
         self.service = self.start_service()

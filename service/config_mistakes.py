@@ -54,10 +54,36 @@ def describe(
     told: dict[Location, list[ErrorDetails]] = {}
     for mistake in error.errors(include_url=False):
         told.setdefault(_plain(mistake["loc"]), []).append(mistake)
+    _gather_foreign_keys(told, model)
     for location, mistakes in told.items():
         line = line_of(location)
         where = f"line {line}: " if line is not None else ""
         yield where + _sentence(path_of(location), mistakes, model)
+
+
+def _gather_foreign_keys(told: dict[Location, list[ErrorDetails]], model: type[BaseModel]) -> None:
+    """Keys of other kinds, which all come at once where the kind was changed, become one mistake."""
+    for location, mistakes in list(told.items()):
+        mistake = mistakes[0]
+        if mistake["type"] != "extra_forbidden" or str(location[-1]) not in _keys(model, location[:-1]):
+            continue
+        first = next(
+            (place for place in told if place[:-1] == location[:-1] and _FOREIGN in told[place][0]["msg"]), None
+        )
+        if first is None:
+            kind = mistake["loc"][-2]
+            mistakes[0] = {**mistake, "type": "value_error", "msg": f"kind {kind} {_FOREIGN} {location[-1]}"}
+        else:
+            told[first][0]["msg"] += f", {location[-1]}"
+            del told[location]
+
+
+_FOREIGN = "has not the keys of other kinds, take them out:"
+
+
+def _keys(model: type[BaseModel], location: Location) -> set[str]:
+    """All keys that some kind has at a place."""
+    return {name for there in _models_at(model, location) for name in there.model_fields}
 
 
 def _sentence(where: str, mistakes: list[ErrorDetails], model: type[BaseModel]) -> str:
@@ -78,6 +104,8 @@ def _sentence(where: str, mistakes: list[ErrorDetails], model: type[BaseModel]) 
             return f"{where}.kind: is missing. Add it: one of {kinds}"
         case "value_error":
             message = mistake["msg"].removeprefix("Value error, ")
+            if _FOREIGN in message:
+                where = where.rpartition(".")[0]
             return f"{where}: {message}" if where else message
     expected = " or ".join(dict.fromkeys(_expected(one) for one in mistakes))
     return f"{where}: seen {_shown(seen)}, expected {expected}{_purpose(model, location)}"

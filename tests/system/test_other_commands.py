@@ -66,8 +66,30 @@ def test_check_says_that_all_is_well(cell: Cell) -> None:
     done = combtrace("check", "--config", cell.folder / "config.yaml")
     assert done.returncode == 0, done.stdout
     assert [line.split()[:2] for line in done.stdout.splitlines()] == [
-        ["ok", part] for part in ("config", "calibration", "camera", "controller", "journal")
-    ]
+        ["ok", part]
+        for part in ("config", "service", "calibration", "camera", "controller", "state", "archive", "journal")
+    ] + [["ok", "disk"]] * 2 + [["ok", "clock"]]
+
+
+def test_check_of_a_running_service_takes_nothing_from_it(cell: Cell) -> None:
+    cell.goes_on(1)
+    done = combtrace("check", "--config", cell.folder / "config.yaml", "--json", "-")
+    assert done.returncode == 0, done.stderr
+    told = {one["part"]: one["text"] for one in json.loads(done.stdout)["findings"]}
+    assert told["service"] == f"runs as process {cell.service.process_id}"
+    for part in ("camera", "controller"):
+        assert told[part].startswith(f"in use by the running service (process {cell.service.process_id})")
+    # Another configuration for the same controller does not become its second client either.
+    other = cell.folder / "other.yaml"
+    text = (cell.folder / "config.yaml").read_text()
+    other.write_text(text.replace("state_dir: state", "state_dir: other").replace("path: journal", "path: other"))
+    done = combtrace("check", "--config", other)
+    assert done.returncode == 0, done.stdout
+    assert "in use by another combtrace on this machine" in done.stdout
+    assert combtrace("check", "--config", other, "--strict").returncode == 1
+    cell.goes_on(1)
+    assert "-> Error" not in cell.service.text
+    assert json.loads(combtrace("check", "--config", other, "--json", "-").stdout)["status"] == "warning"
 
 
 def test_check_names_each_thing_that_is_wrong(tmp_path: Path) -> None:

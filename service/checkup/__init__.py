@@ -1,0 +1,1 @@
+"""Everything that can be checked of a configuration and its machine, without disturbing a running service."""

@@ -1,0 +1,78 @@
+"""The files of a configuration: recipes, calibration, table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from service.calibration_guard import CalibrationGuard
+from service.checkup.finding import Finding, fault, ok, warning
+from service.config import Config
+from service.wiring import WiringError, find_guard, find_table
+
+_SOON = 0.9
+"""Share of a calibration's allowed age from which on it is a warning."""
+
+
+def summary(config: Config) -> str:
+    """What a sound configuration holds, in a few words."""
+    recipes, triggers = len(config.recipes), len(config.triggers)
+    text = f"{recipes} recipe{'s' * (recipes != 1)}, {triggers or 'no'} trigger{'s' * (triggers != 1)}"
+    return text if triggers else f"{text}: jobs begin by hand only"
+
+
+def check_files(config: Config) -> Iterator[Finding]:
+    """Calibration and table."""
+    yield from check_calibration(config)
+    if config.table is not None:
+        yield _table(config)
+
+
+def check_calibration(config: Config) -> Iterator[Finding]:
+    """The calibration's file, its age, and whether it knows the scale at the recipes' thickness."""
+    guard, trouble = find_guard(config)
+    if trouble is not None:
+        yield fault("calibration", trouble.text)
+        return
+    if guard is None:
+        yield ok("calibration", "none: contours stay in pixels")
+        return
+    expired = guard.expired()
+    yield fault("calibration", expired[1]) if expired else ok("calibration", _told(config, guard))
+    allowed, age = guard.limits.max_age_days, guard.age_days
+    if not expired and allowed and age is not None and age > _SOON * allowed:
+        yield warning("calibration", f"it expires in {allowed - age:.1f} days", "Calibrate again: docs/calibrating.md")
+    calibration = guard.record.calibration
+    blind = [recipe.name for recipe in config.recipes if not calibration.height_known(recipe.thickness_mm)]
+    if blind:
+        yield warning(
+            "calibration",
+            f"its scale is not known at the thickness of {', '.join(blind)}",
+            "Use the camera form (`combtrace calibrate` with pictures of a board), or the height it was made at",
+        )
+
+
+def _told(config: Config, guard: CalibrationGuard) -> str:
+    calibration = guard.record.calibration
+    age = "age not stated" if guard.age_days is None else f"{guard.age_days:.1f} days old"
+    aligned = "aligned to the machine" if calibration.aligned else "not aligned: machine frame = work frame"
+    sure = calibration.uncertainty
+    heights = sorted({0.0, *(recipe.thickness_mm for recipe in config.recipes)})
+    told = ", ".join(f"{sure.figure_mm(height):.3f} at {height:g} mm" for height in heights) if sure else "not stated"
+    text = (
+        f"for pictures of {calibration.image_width} x {calibration.image_height} px, {age}, {aligned}; "
+        f"95 % of positions within, mm: {told}"
+    )
+    marks = guard.record.sentinels
+    return text if marks is None else f"{text}; {len(marks.marks)} fixed marks"
+
+
+def _table(config: Config) -> Finding:
+    assert config.table is not None
+    try:
+        found = find_table(config)
+    except WiringError as error:
+        return fault("table", str(error))
+    if found is None:
+        next_step = "Teach it with `combtrace teach-table`, or take `table` out"
+        return warning("table", f"{config.table.file}: not there, so blocks are told from any table", next_step)
+    return ok("table", f"{config.table.file}: taught" + (f" with camera {found.camera}" if found.camera else ""))

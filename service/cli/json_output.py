@@ -1,0 +1,77 @@
+"""Where a command's JSON goes: standard output, or a file that is whole or as it was before."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from service.cli.errors import UserError
+
+
+@contextmanager
+def json_output(name: str | None, option: str = "--json") -> Iterator[Callable[[str], None]]:
+    """A function that takes text: nowhere for None, to standard output for `-`, else into the file of that name.
+
+    The file is opened before any work is done, beside its place, and takes it when all went well; an error leaves what
+    was there. Raises UserError where it cannot be written.
+    """
+    if name is None:
+        yield lambda _text: None
+    elif name == "-":
+        yield lambda text: print(text, end="", flush=True)
+    elif Path(name).exists() and not Path(name).is_file():  # a device or pipe is written to, never replaced
+        yield from _straight(Path(name), option)
+    else:
+        yield from _replaced(Path(name), option)
+
+
+def _straight(path: Path, option: str) -> Iterator[Callable[[str], None]]:
+    try:
+        with path.open("w", encoding="utf-8") as file:
+            yield lambda text: print(text, end="", file=file, flush=True)
+    except OSError as error:
+        raise _cannot(option, path, error) from error
+
+
+def _replaced(path: Path, option: str) -> Iterator[Callable[[str], None]]:
+    target = path.resolve()
+    try:
+        number, beside = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    except OSError as error:
+        raise _cannot(option, path, error) from error
+    try:
+        with open(number, "w", encoding="utf-8") as file:
+
+            def write(text: str) -> None:
+                try:
+                    file.write(text)
+                except OSError as error:
+                    raise _cannot(option, path, error) from error
+
+            yield write
+            try:
+                file.flush()
+                os.fsync(number)
+                os.fchmod(number, _mode(target))
+            except OSError as error:
+                raise _cannot(option, path, error) from error
+        os.replace(beside, target)
+    finally:
+        with suppress(FileNotFoundError):
+            os.unlink(beside)
+
+
+def _mode(target: Path) -> int:
+    """The mode of the file that is there, or what a new one would get."""
+    if target.exists():
+        return target.stat().st_mode & 0o777
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask
+
+
+def _cannot(option: str, path: Path, error: OSError) -> UserError:
+    return UserError(f"{option} {path}: cannot be written: {error.strerror}. Name another file")

@@ -1,0 +1,184 @@
+"""What `combtrace check` finds, and that it disturbs nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from service.checkup.devices import check_devices
+from service.checkup.finding import Finding, Level
+from service.checkup.running import holder
+from service.checkup.storage import check_storage
+from service.cli.main import main
+from service.config import Config
+from service.config_file import SAMPLES, load_config
+from service.journal import Journal, TriggerStamp
+from service.lock import Lock, NameLock, name_is_held
+
+
+def written(folder: Path, camera: str = "{kind: files, path: in}", more: str = "") -> Path:
+    path = folder / "config.yaml"
+    (folder / "in").mkdir(exist_ok=True)
+    path.write_text(
+        f"camera: {camera}\ncontroller: {{kind: none}}\nservice: {{state_dir: state}}\n"
+        f"journal: {{path: journal.sqlite}}\narchive: {{path: archive}}\n{more}\n"
+    )
+    return path
+
+
+def config(folder: Path, camera: str = "{kind: files, path: in}", more: str = "") -> Config:
+    return load_config(written(folder, camera, more))
+
+
+def part(found: list[Finding], name: str) -> Finding:
+    return next(one for one in found if one.part == name)
+
+
+WATCHED = "{kind: files, path: in, loop: false, watch: true, move_to: done}"
+
+
+def test_an_empty_watched_folder_is_no_fault_and_a_picture_in_it_is_not_taken(tmp_path: Path) -> None:
+    watched = config(tmp_path, WATCHED)
+    camera = part(list(check_devices(watched, None)), "camera")
+    assert (camera.level, "no picture yet" in camera.text) == (Level.OK, True)
+    shutil.copy(SAMPLES / "1-rectangle.jpg", tmp_path / "in")
+    assert "1 picture waiting" in part(list(check_devices(watched, None)), "camera").text
+    assert (tmp_path / "in" / "1-rectangle.jpg").exists()
+    shutil.rmtree(tmp_path / "in")
+    assert part(list(check_devices(watched, None)), "camera").level is Level.FAULT
+
+
+def test_a_running_service_is_found_without_taking_its_lock(tmp_path: Path) -> None:
+    path = tmp_path / "combtrace.lock"
+    assert holder(path) is None
+    lock = Lock(path)
+    assert holder(path) == os.getpid()
+    lock.release()
+    assert holder(path) is None
+
+
+def test_a_held_name_is_seen_and_an_other_is_not() -> None:
+    lock = NameLock("127.0.0.1:5020/1")
+    assert name_is_held("127.0.0.1:5020/1")
+    assert not name_is_held("127.0.0.1:5020/11")
+    assert not name_is_held("27.0.0.1:5020/1")
+    lock.release()
+    assert not name_is_held("127.0.0.1:5020/1")
+
+
+def test_disks_are_a_fault_a_warning_or_well_by_what_is_kept_free(tmp_path: Path) -> None:
+    free = shutil.disk_usage(tmp_path).free
+    for share, level in ((2.0, Level.FAULT), (0.75, Level.WARNING), (0.1, Level.OK)):
+        text = f"journal: {{path: j.sqlite, min_free_bytes: {int(free * share)}}}\narchive: {{max_bytes: 0}}"
+        path = tmp_path / "config.yaml"
+        path.write_text(f"camera: {{kind: files, path: in}}\ncontroller: {{kind: none}}\n{text}\n")
+        found = list(check_storage(load_config(path), running=False))
+        assert part(found, "disk").level is level
+        assert bool(part(found, "disk").next_step) == (level is not Level.OK)
+        assert "archive" not in {one.part for one in found}
+
+
+def test_the_journal_is_read_and_neither_made_nor_migrated(tmp_path: Path) -> None:
+    settings = config(tmp_path)
+    assert part(list(check_storage(settings, running=False)), "journal").text.endswith("no job yet")
+    assert not settings.journal.path.exists()
+    journal = Journal(settings.journal.path)
+    journal.take(TriggerStamp("manual"))
+    text = part(list(check_storage(settings, running=True)), "journal").text
+    assert text.endswith("no job yet, 1 in flight")
+    journal.close()
+
+
+def test_a_damaged_journal_is_a_fault_that_says_what_comes_of_it(tmp_path: Path) -> None:
+    settings = config(tmp_path)
+    settings.journal.path.write_bytes(b"SQLite format 3\0" + bytes(5000))
+    found = part(list(check_storage(settings, running=False)), "journal")
+    assert found.level is Level.FAULT
+    assert "moved aside" in found.next_step
+
+
+def test_a_clock_behind_the_last_job_is_a_warning(tmp_path: Path) -> None:
+    settings = config(tmp_path)
+    journal = Journal(settings.journal.path)
+    journal.take(TriggerStamp("manual"))
+    journal.close()
+    assert part(list(check_storage(settings, running=False)), "clock").level is Level.OK
+    yesterday = (datetime.now(UTC) - timedelta(days=1)).timestamp()
+    found = part(list(check_storage(settings, running=False, now=lambda: yesterday)), "clock")
+    assert (found.level, "before the last job" in found.text) == (Level.WARNING, True)
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="needs root to become somebody else")
+def test_what_the_user_may_not_use_names_the_group_that_may(tmp_path: Path) -> None:
+    device = tmp_path / "ttyUSB0"
+    device.touch(mode=0o660)
+    os.chown(device, 0, 20)  # dialout
+    for folder in (tmp_path, *tmp_path.parents):
+        if folder.stat().st_uid == 0 and folder != Path("/"):
+            folder.chmod(folder.stat().st_mode | 0o055)
+    path = written(tmp_path, more=f"triggers: [{{kind: serial, port: {device}}}]")
+    code = (
+        "import os, sys; from pathlib import Path; from service.config_file import load_config\n"
+        "import service.checkup.devices as devices; import service.checkup.storage as storage\n"
+        "config = load_config(Path(sys.argv[1])); os.setgroups([]); os.setgid(65534); os.setuid(65534)\n"
+        "for one in (*devices.check_permissions(config), *storage.check_storage(config, running=False)):\n"
+        "    print(one.level.label, one.part, one.text, one.next_step)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True)
+    assert f"FAULT permissions {device}: user nobody may not read and write it, group dialout may" in done.stdout
+    assert "usermod -aG dialout nobody" in done.stdout
+    for name in ("state", "archive", "journal"):
+        assert f"FAULT {name} " in done.stdout
+
+
+# --- the command ------------------------------------------------------------------------------------------------------
+
+
+def test_one_recipe_is_one_recipe(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    shutil.copy(SAMPLES / "1-rectangle.jpg", written(tmp_path).parent / "in")
+    assert main(["check", "--config", str(tmp_path / "config.yaml")]) == 0
+    told = capsys.readouterr().out
+    assert "1 recipe, no triggers: jobs begin by hand only" in told
+    assert "calibration  none" in told
+
+
+def test_each_mistake_is_a_finding_and_keys_of_other_kinds_are_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = written(tmp_path)
+    keys = "host: a, port: 1, device_id: 1, word_order: big, readback: true, timeout_s: 1, colour: red"
+    path.write_text(path.read_text().replace("{kind: none}", f"{{kind: none, {keys}}}"))
+    assert main(["check", "--config", str(path), "--json", "-"]) == 2
+    out = json.loads(capsys.readouterr().out)
+    texts = [one["text"] for one in out["findings"]]
+    assert (out["status"], len(texts)) == ("fault", 2)
+    assert "controller: kind none has not the keys of other kinds, take them out: host, port, device_id" in texts[0]
+    assert "controller.colour: unknown key" in texts[1]
+
+
+def test_warnings_are_exit_status_0_unless_strict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(tmp_path, more="table: {file: table.npz}")
+    shutil.copy(SAMPLES / "1-rectangle.jpg", tmp_path / "in")
+    assert main(["check", "--config", str(path)]) == 0
+    assert "warn  table" in capsys.readouterr().out
+    assert main(["check", "--config", str(path), "--strict"]) == 1
+
+
+def test_a_result_file_is_whole_or_as_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, result = written(tmp_path), tmp_path / "result.json"
+    result.write_text("old")
+    assert main(["check", "--config", str(path), "--json", str(tmp_path / "nowhere" / "x.json")]) == 2
+    error = capsys.readouterr()
+    assert "cannot be written" in error.err
+    assert "ok " not in error.out, "nothing is done before the file is there"
+    assert result.read_text() == "old"
+    main(["check", "--config", str(path), "--no-devices", "--json", str(result)])
+    assert json.loads(result.read_text())["config"] == str(path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["config.yaml", "in", "result.json"]

@@ -20,6 +20,11 @@ CHECK_S = 1.0
 WATCH_PERIOD_S = 0.25
 
 
+def camera_is_being_opened(health: Health) -> None:
+    """Have the camera opened, anew where it is open."""
+    health.report("camera", Fault(Reason.NO_FRAME, "the camera is being opened", starting=True))
+
+
 class CameraWatch:
     """Reports the camera's fault to `health`, under "camera", where jobs report theirs too.
 
@@ -53,7 +58,7 @@ class CameraWatch:
 
     def start(self) -> None:
         """Say that the camera is being opened: no fault yet, but nothing can be done without it."""
-        self._report(Fault(Reason.NO_FRAME, "the camera is being opened", starting=True))
+        camera_is_being_opened(self._health)
 
     async def run(self) -> None:
         """Look after the camera for ever."""

@@ -10,17 +10,20 @@ from collections.abc import Awaitable, Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any, Protocol
 
 from drivers.camera import Camera
 from service.archive_writer import ArchiveWriter
 from service.beat import until_beat
-from service.camera_watch import CameraWatch
+from service.camera_watch import CameraWatch, camera_is_being_opened
+from service.control import ControlServer
 from service.executor import Executor
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
 from service.lock import Held
+from service.operations import CONTROL_PART, Halt, Operations
 from service.reasons import Reason
 from service.reload import Reloader
 from service.state import State
@@ -66,6 +69,7 @@ class Parts:
     storage: StorageWatch | None = None
     reloader: Reloader | None = None
     metrics: Closeable | None = None
+    state_dir: Path | None = None
 
 
 class Daemon:
@@ -92,9 +96,8 @@ class Daemon:
             asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, reloader.ask)
         for number in on_signals:
             asyncio.get_running_loop().add_signal_handler(number, self.stop)
-        for port in self._parts.ports:
-            opening = Fault(Reason.NOT_READY, f"{port} is being opened", starting=True)
-            self._parts.health.report(f"serial {port}", opening)
+        self._ports_are_being_opened()
+        self._add_control()
         notifier = self._parts.notifier
         self._parts.health.listen(lambda state, reason: notifier.send(STATUS=_status(state, reason)))
         keeping = self._start(self._parts.triggers)
@@ -120,6 +123,24 @@ class Daemon:
             return job
         finally:
             await self._end(keeping)
+
+    def _ports_are_being_opened(self) -> None:
+        for port in self._parts.ports:
+            opening = Fault(Reason.NOT_READY, f"{port} is being opened", starting=True)
+            self._parts.health.report(f"serial {port}", opening)
+
+    def _add_control(self) -> None:
+        parts = self._parts
+        if parts.state_dir is None:
+            return
+        operations = Operations(
+            parts.health, parts.executor, self.supervisor, Halt(parts.state_dir), self._before_reset
+        )
+        self.supervisor.add(CONTROL_PART, ControlServer(parts.state_dir, operations.commands()).run)
+
+    def _before_reset(self) -> None:
+        self._ports_are_being_opened()
+        camera_is_being_opened(self._parts.health)
 
     # --- parts --------------------------------------------------------------------------------------------------
 
@@ -150,7 +171,10 @@ class Daemon:
             watched.append("link")
             self._report_link(parts.link)
         parts.watchdog.watch(watched)
+        halted = Halt(parts.state_dir).reason() if parts.state_dir is not None else None
         parts.health.start()
+        if halted is not None:
+            parts.health.halt(f"halted: {halted}. `combtrace resume` ends it")
         return asyncio.create_task(self.supervisor.run())
 
     async def _watch_journal(self) -> None:
@@ -191,7 +215,7 @@ class Daemon:
                 fault = self._parts.health.first()
                 log.warning("waiting up to %g s to be ready: %s", ready_timeout_s, fault.text if fault else why_not)
                 told_at = give_up_at + TELL_AFTER_S
-            if ready or loop.time() >= give_up_at:
+            if ready or loop.time() >= give_up_at or self._parts.health.state is State.HALTED:
                 return await self._parts.executor.submit(TriggerStamp("manual"))
             if self._stop.is_set():
                 raise TriggerRefused(Reason.ABORTED, "stopped before the service was ready")

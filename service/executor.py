@@ -76,6 +76,7 @@ class Executor:
         self._missed = 0
         self._told: set[str] = set()
         self.settled_job = 0
+        self.last_settled: Job | None = None
         self._last_pair = journal.last_controller_trigger()
         self._found = False
         self._observing_since: tuple[int, int] | None = None
@@ -87,6 +88,7 @@ class Executor:
         """What the service block said before the restart: it is true still."""
         taken, settled = self._journal.last_taken(), self._journal.last_settled()
         self.settled_job = settled.job_id if settled else 0
+        self.last_settled = settled
         if self._link is None:
             return
         self._link.publish(
@@ -146,6 +148,11 @@ class Executor:
     def ignore_controller(self) -> None:
         """Take no triggers of the controller; they stay pending."""
         self._controller_triggers = False
+
+    @property
+    def idle(self) -> bool:
+        """True where no job is being taken or executed."""
+        return self._health.job is None and self._submitted is None and not self._taking
 
     @property
     def waiting(self) -> int:
@@ -209,7 +216,7 @@ class Executor:
     def _not_ready(self) -> TriggerRefused:
         fault = self._health.first()
         if fault is None or self._health.state is State.HALTED:
-            return TriggerRefused(Reason.NOT_READY, f"state {self._health.state.label}")
+            return TriggerRefused(Reason.NOT_READY, self._health.reason or f"state {self._health.state.label}")
         # What to do about a full disk is in the reason's name.
         reason = Reason.STORAGE_FULL if fault.reason is Reason.STORAGE_FULL else Reason.NOT_READY
         return TriggerRefused(reason, fault.text)
@@ -282,7 +289,9 @@ class Executor:
             self._refuse_queued(expired, self._queue.refusal_of_expired())
         if self._health.state is not State.READY:
             halted = self._health.state is State.HALTED
-            refused = TriggerRefused(Reason.ABORTED, "state Halted") if halted else self._not_ready()
+            refused = (
+                TriggerRefused(Reason.ABORTED, self._health.reason or "state Halted") if halted else self._not_ready()
+            )
             self.refuse_all_queued(refused)
         if self._taking or (self._link is not None and self._link.controller_not_ready() is not None):
             return False
@@ -380,7 +389,7 @@ class Executor:
         """Tell how the job ended: register block, log, and whoever asked to be told."""
         assert job.outcome is not None
         log_end(log, job)
-        self.settled_job = job.job_id
+        self.settled_job, self.last_settled = job.job_id, job
         if self._link is not None:
             self._link.publish(settled_job=job.job_id, reject_reason=int(job.reason or 0))
         waited_for = self._tickets.pop(job.job_id, None)

@@ -77,6 +77,17 @@ class Health:
         """Halted by a person or at shutdown: no fault ends it."""
         self._machine.change(State.HALTED, reason=reason)
 
+    def resume(self) -> None:
+        """End a halt: the state follows the faults again."""
+        self._machine.change(State.INITIALIZED)
+        self._follow()
+
+    def reset(self) -> None:
+        """Begin anew, as at the start, but for a halt."""
+        if self._machine.state is not State.HALTED:
+            self._machine.change(State.PREOPERATIONAL)
+            self._machine.change(State.INITIALIZED)
+
     def report(self, part: str, fault: Fault | None) -> None:
         """Set or clear the fault of a part."""
         if fault is None:

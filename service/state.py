@@ -29,12 +29,15 @@ class State(IntEnum):
 
 
 # From a state to those it may change to. Halted is reached from everywhere a person may stop the service in.
+# Preoperational is reached again by a reset.
 TRANSITIONS: dict[State, frozenset[State]] = {
     State.PREOPERATIONAL: frozenset({State.INITIALIZED, State.ERROR, State.HALTED}),
     State.HALTED: frozenset({State.INITIALIZED, State.PREOPERATIONAL}),
-    State.ERROR: frozenset({State.INITIALIZED, State.READY, State.HALTED}),
-    State.INITIALIZED: frozenset({State.READY, State.ERROR, State.HALTED}),
-    State.READY: frozenset({State.SINGLE_EXECUTION, State.CONTINUOUS_EXECUTION, State.ERROR, State.HALTED}),
+    State.ERROR: frozenset({State.INITIALIZED, State.READY, State.HALTED, State.PREOPERATIONAL}),
+    State.INITIALIZED: frozenset({State.READY, State.ERROR, State.HALTED, State.PREOPERATIONAL}),
+    State.READY: frozenset(
+        {State.SINGLE_EXECUTION, State.CONTINUOUS_EXECUTION, State.ERROR, State.HALTED, State.PREOPERATIONAL}
+    ),
     State.SINGLE_EXECUTION: frozenset({State.READY, State.ERROR, State.HALTED}),
     State.CONTINUOUS_EXECUTION: frozenset({State.READY, State.ERROR, State.HALTED}),
 }

@@ -22,6 +22,16 @@ SOUND_AFTER_S = 2.0  # a part that has run so long again is no fault any more
 FORGIVEN_AFTER_S = 300.0  # and after that the pauses begin anew
 
 
+@dataclass(frozen=True)
+class PartReport:
+    """How often a part was started again, and its last error with the time of it."""
+
+    name: str
+    restarts: int
+    last_error: str | None
+    failed_at: str | None
+
+
 @dataclass
 class Part:
     """A part as it is kept: how often it was started again, and its last error with the time of it."""
@@ -54,9 +64,15 @@ class Supervisor:
             for part in self.parts:
                 group.create_task(self._keep(part), name=part.name)
 
-    def restart(self) -> None:
-        """Start all parts anew, those too that wait for their next attempt."""
+    def kept(self) -> tuple[PartReport, ...]:
+        """How each part fared."""
+        return tuple(PartReport(part.name, part.restarts, part.last_error, part.failed_at) for part in self.parts)
+
+    def restart(self, *, but: str = "") -> None:
+        """Start all parts anew, those too that wait for their next attempt. but: the one that asks for it."""
         for part in self.parts:
+            if part.name == but:
+                continue
             part.failures = 0
             if part.task is not None:
                 part.task.cancel()
@@ -64,9 +80,9 @@ class Supervisor:
     async def _keep(self, part: Part) -> None:
         while True:
             error = await self._run_once(part)
-            part.restarts += 1
             if error is None:
                 continue
+            part.restarts += 1
             part.last_error, part.failed_at = error, datetime.now(UTC).isoformat(timespec="seconds")
             pause_s = RESTART_PAUSES_S[min(part.failures, len(RESTART_PAUSES_S) - 1)]
             part.failures += 1

@@ -116,6 +116,7 @@ def build(
     if link is not None:
         link.on_look = executor.wake
     parts = Parts(camera, journal, health, executor, link, pool, lock, notifier=notifier, watchdog=watchdog)
+    parts.state_dir = config.service.state_dir
     parts.archive = archive
     parts.storage = StorageWatch(
         journal,

@@ -13,6 +13,7 @@ COMMANDS = (
     *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
     *("board", "calibrate", "align", "verify", "repeat", "teach-table"),
     *("probe", "jobs", "replay"),
+    *("status", "halt", "resume", "reset"),
     *("schema", "reasons", "register-map"),
 )
 

@@ -1,0 +1,139 @@
+"""status, halt, resume and reset at a running daemon, over its local socket."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from service.control import ControlError, ask
+from tests.system.cell import Cell
+from tests.system.processes import combtrace, until
+from tests.system.terminal import Terminal
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    opened = Terminal()
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def cell(tmp_path: Path, terminal: Terminal) -> Iterator[Cell]:
+    started = Cell(tmp_path, triggers=f"[{{kind: serial, port: {terminal.name}}}]", trigger_every_s=None)
+    try:
+        started.ready()
+        yield started
+    finally:
+        started.stop()
+
+
+def state_of(cell: Cell) -> str:
+    return str(ask(cell.folder / "state", {"command": "status"})["state"])
+
+
+def test_a_halt_holds_over_a_restart_until_it_is_resumed(cell: Cell, terminal: Terminal) -> None:
+    config = ("--config", cell.folder / "config.yaml")
+    halted = combtrace("halt", *config, "--reason", "blade is being changed")
+    assert (halted.returncode, halted.stdout) == (0, "state Halted\n"), halted.stderr
+    terminal.type(b"TRIG\nSTAT\n")
+    assert [terminal.line(), terminal.line()] == ["NAK 121 not_ready", "STAT Halted 0 0 1 0 ok"]
+    cell.service.kill()
+    cell.service = cell.start_service()
+    until(lambda: cell.service.text.count("-> Halted") == 2, what="Halted again")
+    status = combtrace("status", *config)
+    assert status.returncode == 1
+    assert "state     Halted" in status.stdout
+    assert "blade is being changed" in status.stdout
+    resumed = combtrace("resume", *config)
+    assert resumed.returncode == 0, resumed.stderr
+    until(lambda: state_of(cell) == "Ready", what="Ready")
+    again = combtrace("resume", *config)
+    assert (again.returncode, "nothing to resume" in again.stderr) == (1, True)
+    terminal.type(b"TRIG\n")
+    assert terminal.line() == "ACK 1"
+    assert terminal.line().startswith("DONE 1 ")
+    told = json.loads(combtrace("status", *config, "--json").stdout)
+    assert (told["state"], told["service_state"], told["settled_job"]) == ("Ready", 5, 1)
+    assert told["last_job"]["outcome"] == "accepted"
+    assert {"kind": "serial", "what": "taken", "count": 1} in told["triggers"]
+
+
+def test_a_reset_opens_everything_anew(cell: Cell, terminal: Terminal) -> None:
+    reset = combtrace("reset", "--config", cell.folder / "config.yaml")
+    assert reset.returncode == 0, reset.stderr
+    assert "Ready -> Preoperational" in cell.service.text
+    until(lambda: state_of(cell) == "Ready", what="Ready")
+    terminal.type(b"TRIG\n")
+    assert terminal.line() == "ACK 1"
+    assert terminal.line().startswith("DONE 1 ")
+
+
+def test_the_socket_is_the_owners_and_groups_and_serves_several_and_odd_clients(cell: Cell) -> None:
+    path = cell.folder / "state" / "control.sock"
+    assert stat.S_IMODE(path.stat().st_mode) == 0o660
+    clients = [socket.socket(socket.AF_UNIX) for _ in range(3)]
+    for client in clients:
+        client.settimeout(10)
+        client.connect(str(path))
+    for line, expected in (
+        (b"\x00\xff no json\n", "no line of JSON"),
+        (b'{"command": "explode"}\n', "expected one of halt, reset, resume, status"),
+        (b'["status"]\n', "expected one of"),
+    ):
+        clients[0].sendall(line)
+        answer = json.loads(clients[0].makefile("rb").readline())
+        assert not answer["ok"]
+        assert expected in answer["error"]
+    clients[1].sendall(b"x" * 10_000)
+    assert b"beyond 4096 bytes" in clients[1].makefile("rb").readline()
+    clients[2].sendall(b'{"command": "status"}\n{"command": "status"}\n')
+    answers = clients[2].makefile("rb")
+    assert [json.loads(answers.readline())["state"] for _ in range(2)] == ["Ready", "Ready"]
+    for client in clients:
+        client.close()
+    assert state_of(cell) == "Ready"
+
+
+def test_a_dead_daemons_socket_is_told_and_taken_over(cell: Cell) -> None:
+    cell.service.kill()
+    assert (cell.folder / "state" / "control.sock").exists()
+    status = combtrace("status", "--config", cell.folder / "config.yaml")
+    assert status.returncode == 1
+    assert "no daemon listens" in status.stderr
+    cell.service = cell.start_service()
+    until(lambda: cell.service.text.count("-> Ready") == 2, what="Ready")
+    assert state_of(cell) == "Ready"
+    cell.service.stop()
+    assert not (cell.folder / "state" / "control.sock").exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to become somebody without rights")
+def test_without_rights_the_error_says_who_may(cell: Cell) -> None:
+    cell.folder.chmod(0o755)
+    folder = os.open(cell.folder / "state", os.O_PATH)  # pytest's own folders are closed to others
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.setgroups([])
+        os.setgid(65534)
+        os.setuid(65534)
+        try:
+            ask(Path(f"/proc/self/fd/{folder}"), {"command": "halt"})
+            told = "it was done"
+        except ControlError as error:
+            told = str(error)
+        os.write(writing, told.encode())
+        os._exit(0)
+    os.waitpid(child, 0)
+    told = os.read(reading, 1000).decode()
+    for descriptor in (folder, reading, writing):
+        os.close(descriptor)
+    assert "you may not use it. User root and group root may" in told
+    assert state_of(cell) == "Ready"

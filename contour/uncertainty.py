@@ -4,9 +4,11 @@ Between each two witnesses that lie on the outline there is a stretch of it. Its
 variance that is a sum of squares:
 
 - blur: a blurred edge shifts as one where light, side walls and table differ; no number of witnesses averages that out;
-- leverage: witnesses scatter by about the blur and by what they show; a fit divides that by the root of their number,
-  less so beyond the last of them and at the corners of short edges;
-- gap: where no witness lies for more than a pitch, the outline is a guess that grows with the gap;
+- dark: once more where walls are dark, whose ends fade into the shadow beside them;
+- leverage: witnesses scatter as they show; a fit divides that by the root of their number, less so beyond the last of
+  them and at the corners of short edges;
+- gap: where no witness lies for more than a pitch, the outline is a guess that grows with the gap, if slowly: most gaps
+  lie in straight edges;
 - misfit: neighbours in a row that lie off on one side say that the outline has left the cut;
 - outside: a wall end beyond the outline is material that the outline leaves out, even if it is a single one.
 
@@ -44,12 +46,12 @@ _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
 class Coefficients:
     """Standard deviation that one pixel of each cause stands for."""
 
-    blur: float = 0.31
-    leverage_blur: float = 0.46
-    leverage_spread: float = 0.20
-    gap: float = 0.015
-    misfit: float = 0.30
-    outside: float = 0.80
+    blur: float = 0.275
+    dark: float = 0.42
+    leverage: float = 1.03
+    gap: float = 0.004
+    misfit: float = 0.28
+    outside: float = 1.2
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,8 @@ class Stretches:
 
     length: Vector
     blur: Vector
-    leverage_blur: Vector
-    leverage_spread: Vector
+    dark: Vector
+    leverage: Vector
     gap: Vector
     misfit: Vector
     outside: Vector
@@ -78,10 +80,14 @@ def uncertainty(
     *,
     pitch_px: float,
     blur_px: float,
+    dark: bool = False,
     coefficients: Coefficients | None = None,
 ) -> float:
-    """95 % bound on the distance between outline and truth, pixels, of all rings together."""
-    stretches = [ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px) for ring in rings]
+    """95 % bound on the distance between outline and truth, pixels, of all rings together.
+
+    dark: whether walls are darker than the table.
+    """
+    stretches = [ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, dark=dark) for ring in rings]
     sigma = np.concatenate([one.sigma(coefficients or Coefficients()) for one in stretches])
     return max(bound(sigma, np.concatenate([one.length for one in stretches])), LEAST_PX)
 
@@ -100,7 +106,9 @@ def bound(sigma: Vector, length: Vector) -> float:
     return high
 
 
-def ring_stretches(evidence: RingEvidence, fitted: FittedRing, *, pitch_px: float, blur_px: float) -> Stretches:
+def ring_stretches(
+    evidence: RingEvidence, fitted: FittedRing, *, pitch_px: float, blur_px: float, dark: bool = False
+) -> Stretches:
     """The stretches of one ring and the causes of error in each."""
     on_line = np.flatnonzero(fitted.inlier)
     if len(on_line) < 2:
@@ -115,8 +123,8 @@ def ring_stretches(evidence: RingEvidence, fitted: FittedRing, *, pitch_px: floa
     return Stretches(
         length=length,
         blur=np.full(len(length), blur_px),
-        leverage_blur=leverage * blur_px,
-        leverage_spread=leverage * fitted.spread_px,
+        dark=np.full(len(length), blur_px if dark else 0.0),
+        leverage=leverage * fitted.spread_px,
         gap=np.maximum(length - pitch_px, 0.0),
         misfit=_largest_between(np.abs(_middle_of_five(residual)), on_line),
         outside=_largest_between(np.where(left_out, np.maximum(residual, 0.0), 0.0), on_line),

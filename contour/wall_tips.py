@@ -61,7 +61,12 @@ def wall_tips(
     # Rings are fitted with the material on their left in pixels; seen in the work frame, whose y runs up, that is
     # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
-    sure_px = uncertainty(list(zip(seen.rings, rings, strict=True)), pitch_px=seen.pitch_px, blur_px=seen.blur_px)
+    sure_px = uncertainty(
+        list(zip(seen.rings, rings, strict=True)),
+        pitch_px=seen.pitch_px,
+        blur_px=seen.blur_px,
+        dark=seen.polarity == "dark",
+    )
     on_stage("trace")
     return _told(seen, contour, uncertainty_px=sure_px)
 

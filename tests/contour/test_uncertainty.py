@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from benchmarks.metrics import distances, samples
 from contour.outline_fit import fit_ring
 from contour.tracing import TraceSettings
-from contour.uncertainty import LEAST_PX, bound, ring_stretches, uncertainty
+from contour.uncertainty import LEAST_PX, Coefficients, bound, ring_stretches, uncertainty
 from contour.wall_evidence import RingEvidence, WitnessKind
 from contour.wall_tips import wall_tips
 from tests.contour.outline_scenes import PITCH, blob, circle, perimeter, rectangle, witnesses
@@ -22,6 +22,7 @@ from tests.contour.scenes import block
 WIDE = rectangle(500.0, 320.0)
 shapes = st.sampled_from([WIDE, circle(180.0), blob(170.0)])
 seeds = st.integers(0, 50)
+NO_YES = (False, True)
 few = settings(max_examples=12)
 """Each example is a fit or two."""
 
@@ -151,9 +152,38 @@ def test_a_twentieth_of_the_outline_may_be_unknown() -> None:
 
 
 def test_a_hole_counts_by_its_length() -> None:
-    outer = witnesses(WIDE, seed=3)
-    hole = witnesses(circle(60.0), seed=4, sigma=1.6, hole=True)
-    assert stated(outer) < stated(outer, hole)
+    """A noisy hole pulls the bound of both from the outer ring's towards its own, the longer it is the farther."""
+    outer = witnesses(WIDE, seed=3, sigma=0.15)
+    noisy = witnesses(circle(100.0), seed=4, sigma=1.6, hole=True)
+    alone, both, hole = stated(outer), stated(outer, noisy), stated(noisy)
+    assert alone < both < hole
+    fitted = [fit_ring(ring, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None) for ring in (outer, noisy)]
+    calm, rough = (
+        ring_stretches(*ring, pitch_px=PITCH, blur_px=0.9) for ring in zip((outer, noisy), fitted, strict=True)
+    )
+    sigma = np.concatenate([calm.sigma(Coefficients()), rough.sigma(Coefficients())])
+    bounds = [bound(sigma, np.concatenate([calm.length, share * rough.length])) for share in (0.1, 0.5, 1.0, 3.0)]
+    assert bounds == sorted(bounds)
+    assert bounds[2] == pytest.approx(both)
+    assert bounds[3] > 1.1 * bounds[0]
+
+
+def test_the_bound_weighs_rings_by_length_alone() -> None:
+    """The same stretch cut in two, or written as a second ring, changes nothing; twice its length does."""
+    sigma, length = np.array([0.2, 1.5]), np.array([900.0, 60.0])
+    halved = bound(np.array([0.2, 1.5, 1.5]), np.array([900.0, 30.0, 30.0]))
+    assert halved == pytest.approx(bound(sigma, length))
+    assert bound(sigma, length * [1.0, 2.0]) > bound(sigma, length) * 1.1
+    assert bound(sigma, length * 7.0) == pytest.approx(bound(sigma, length))
+
+
+def test_dark_walls_leave_it_less_sure() -> None:
+    evidence = witnesses(WIDE, seed=1)
+    fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
+    bright, dark = (
+        uncertainty([(evidence, fitted)], pitch_px=PITCH, blur_px=1.0, dark=is_dark) for is_dark in (False, True)
+    )
+    assert dark > bright
 
 
 @pytest.mark.parametrize("kind", ["easy", "shop", "dim", "dark"])

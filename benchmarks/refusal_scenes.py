@@ -43,6 +43,9 @@ PATTERN = NO_BLOCK | BORDER
 # Prints that look like cells end somewhere else than the sheet they are on.
 PRINT = NO_BLOCK | {"methods_disagree"}
 
+# A number that was looked at and led to a change is not fresh any more: begin after it then.
+FIRST = 3
+
 # No lens: far from the picture's middle its model folds back, and a block that is out of view would be in it.
 _CAMERA = camera_above(1280, 960, 0.375, target_mm=MIDDLE, tilt_deg=(1.2, -0.8), roll_deg=0.5)
 _FAR_AWAY = rectangle((240.0, 3000.0), 100.0, 100.0)
@@ -62,12 +65,12 @@ class RefusalScene:
         return self.name.startswith("tuned-")
 
 
-def refusal_scenes(measured_of_each: int = 2) -> tuple[RefusalScene, ...]:
-    """One tuned picture of every family, and as many for measuring as asked for."""
+def refusal_scenes(measured_of_each: int = 2, first: int = FIRST) -> tuple[RefusalScene, ...]:
+    """One tuned picture of every family, and as many for measuring as asked for, numbered from `first`."""
     return tuple(
         _scene(f"tuned-{name}" if number == 0 else f"{name}-{number}", family, right)
         for name, (family, right) in FAMILIES.items()
-        for number in range(measured_of_each + 1)
+        for number in (0, *range(first, first + measured_of_each))
     )
 
 

@@ -25,13 +25,16 @@ _TINTS = {
 
 Changes = dict[str, Any]
 
+# A number that was looked at and led to a change is not fresh any more: begin after it then.
+FIRST = 3
 
-def table_scenes(measured_of_each: int = 2) -> tuple[BenchScene, ...]:
-    """One tuned scene of every kind of table, and as many for measuring as asked for."""
+
+def table_scenes(measured_of_each: int = 3, first: int = FIRST) -> tuple[BenchScene, ...]:
+    """One tuned scene of every kind of table, and as many for measuring as asked for, numbered from `first`."""
     return tuple(
         BenchScene(_scene(f"{prefix}table-{name}-{number}", kind), tuned=number == 0)
         for name, kind in _KINDS.items()
-        for number in range(measured_of_each + 1)
+        for number in (0, *range(first, first + measured_of_each))
         for prefix in (["tuned-"] if number == 0 else [""])
     )
 

@@ -353,8 +353,8 @@ class Recipe(Model):
         2.0,
         ge=0,
         le=1000,
-        description="Widest place where the contour may differ from the busy part of the picture, cell pitches; "
-        "0 = not checked.",
+        description="How far contour and busy part of the picture may be apart in one place, cell pitches, and an "
+        "eighth of it everywhere; 0 = not checked.",
     )
     margin_mm: float = Field(
         0,

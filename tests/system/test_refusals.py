@@ -61,7 +61,7 @@ CASES = (
         "method: sliding-matrix, parameters: {core_px: 80, threshold: 30}",
         113,
         "methods_disagree",
-        "cells wide, 2 are",
+        "cells, 2 are",
     ),
     Provoked(SAMPLE, "max_uncertainty_mm: 0.05", 114, "uncertainty_too_large", "mm only (picture 0."),
     Provoked(SAMPLE, "method: sliding-matrix, max_uncertainty_mm: 0.5", 114, "uncertainty_too_large", "0.5 mm"),

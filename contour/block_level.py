@@ -1,0 +1,45 @@
+"""Where a picture is as light as the block and never the table, or as the table and never the block."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Picture = NDArray[np.uint8]
+Mask = NDArray[np.uint8]
+Levels = NDArray[np.float64]
+
+# What is usual for one, and what the other one ever has: lowest, highest, percent.
+_USUAL = (4.0, 96.0)
+_EVER = (0.5, 99.5)
+# Scratches and dust shift a level: so much of the way to the other's is still one's own.
+_NEAR = 0.25
+_FEW = 50
+_HOP = 3
+
+
+def told_by_level(level: Picture, block: Mask, table: Mask) -> tuple[Mask, Mask]:
+    """Pixels (0 or 255) whose level only the block has, and those whose level only the table has.
+
+    level: the picture's mean over a cell, grey (H, W) or BGR (H, W, 3). block, table: samples of both (not 0). Where
+    one has hardly a sample nothing is told.
+    """
+    of_block, of_table = (level[::_HOP, ::_HOP][mask[::_HOP, ::_HOP] > 0] for mask in (block, table))
+    if min(len(of_block), len(of_table)) < _FEW:
+        return np.zeros(level.shape[:2], np.uint8), np.zeros(level.shape[:2], np.uint8)
+    return _only(level, of_block, of_table), _only(level, of_table, of_block)
+
+
+def _only(level: Picture, own: Picture, others: Picture) -> Mask:
+    """Where the level is usual for `own`, or near to that, and no other has it; samples, shape (N,) or (N, 3)."""
+    (low, high), (least, most) = _percentiles(own, _USUAL), _percentiles(others, _EVER)
+    slack = _NEAR * np.maximum(np.maximum(low - most, least - high), 0.0)
+    usual = cv2.inRange(level, low - slack, high + slack)
+    return np.asarray(cv2.bitwise_and(usual, cv2.bitwise_not(cv2.inRange(level, least, most))), np.uint8)
+
+
+def _percentiles(samples: Picture, percent: tuple[float, float]) -> tuple[Levels, Levels]:
+    """Two percentiles of the samples, one figure a channel each."""
+    low, high = np.percentile(samples.reshape(len(samples), -1), percent, axis=0)
+    return low, high

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera bench-camera bench bench-link bench-daemon accuracy refusals rules soak soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon accuracy refusals rules soak soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -25,6 +25,10 @@ test-camera: install
 		$(BIN)/python -m pytest tests/camera_guest tests/contracts/test_camera_contract.py -p no:cacheprovider
 
 # FRAMES=100000: how memory fares over that many, half an hour.
+# Contours driven by a real CNC controller, in simulation (Debian's linuxcnc-uspace).
+test-linuxcnc: install
+	COMBTRACE_LINUXCNC=1 $(BIN)/python -m pytest tests/linuxcnc
+
 bench-camera: install
 	$(BIN)/python tests/camera_guest/guest.py --timeout 6000 -- $(BIN)/python -m benchmarks.cameras --frames $(or $(FRAMES),3000)
 

@@ -9,6 +9,8 @@ from hypothesis import settings
 
 # Those need a kernel with the virtual camera: `make test-camera` boots one and says so.
 collect_ignore = [] if os.environ.get("COMBTRACE_CAMERA_GUEST") else ["camera_guest"]
+# Those run a CNC controller for a minute: `make test-linuxcnc`.
+collect_ignore += [] if os.environ.get("COMBTRACE_LINUXCNC") else ["linuxcnc"]
 
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("explore", deadline=None, max_examples=1000)

@@ -1,0 +1,172 @@
+"""The bridge's mailbox, which knows nothing of our code, on the golden vectors and behind its own Modbus server."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+from pymodbus.client import ModbusTcpClient
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "controllers" / "linuxcnc"))
+import mailbox as bridge  # noqa: E402
+
+from modbus_server import ModbusServer, answer  # noqa: E402
+
+VECTORS = json.loads((ROOT / "docs" / "golden-vectors.json").read_text())
+
+
+class FixedMailbox(bridge.Mailbox):
+    """A mailbox whose clock and session are those of a vector."""
+
+    def __init__(self, memory, vector, judge=lambda _: bridge.ACCEPTED):
+        self.taken = []
+        capacity = vector.get("payload_capacity", 1984)
+        super().__init__(memory, judge, self.taken.append, vector["word_order"], capacity)
+        self.now_ms = vector.get("captured_at", 0) + 10
+        self.session = self.registers[13] = vector["session"]
+        self.registers[2] = vector.get("trigger", 0)
+        self.set_state(bridge.READY_STATE)
+
+    def clock_ms(self):
+        return self.now_ms
+
+    def send(self, page, transfer):
+        """Write a page, scan, and give the answer."""
+        words = [transfer, *page["header"], *page["payload"]]
+        self.registers[bridge.CONTOUR : bridge.CONTOUR + len(words)] = words
+        self.scan()
+        assert self.registers[6] == transfer
+        return self.registers[7]
+
+
+@pytest.fixture
+def memory(tmp_path):
+    return bridge.Memory(str(tmp_path / "memory.json"))
+
+
+@pytest.mark.parametrize("vector", VECTORS["contours"], ids=lambda vector: vector["name"])
+def test_every_golden_contour_arrives_as_it_was_written(vector, memory):
+    mailbox = FixedMailbox(memory, vector)
+    answers = [mailbox.send(page, number) for number, page in enumerate(vector["pages"], 1)]
+    assert answers == [bridge.ACCEPTED] * len(answers)
+    (contour,) = mailbox.taken
+    rings = [[(x / 1000, y / 1000) for x, y in ring] for ring in (vector["exterior"], *vector["holes"])]
+    assert contour.rings == rings
+    assert contour.area_mm2 == vector["area"]
+    assert (contour.flags & 1 == 0) == vector["from_a_live_camera"]
+    assert memory.last_job == vector["job_id"]
+    assert mailbox.send(vector["pages"][-1], 77) == bridge.BEFORE
+    assert len(mailbox.taken) == 1
+
+
+@pytest.mark.parametrize("vector", VECTORS["withdrawals"], ids=lambda vector: vector["word_order"])
+def test_every_golden_withdrawal_ends_its_job(vector, memory):
+    mailbox = FixedMailbox(memory, vector)
+    assert mailbox.send(vector, 1) == bridge.WITHDRAWN
+    assert memory.last_job == vector["job_id"]
+    assert mailbox.taken == []
+
+
+@pytest.mark.parametrize("word", range(1, 32))
+def test_a_page_with_one_wrong_bit_is_never_taken(word, memory):
+    vector = VECTORS["contours"][0]
+    mailbox = FixedMailbox(memory, vector)
+    page = json.loads(json.dumps(vector["pages"][0]))
+    page["header"][word - 1] ^= 0x10
+    assert mailbox.send(page, 1) in (bridge.BAD_CRC, bridge.BAD_LAYOUT)
+    assert mailbox.taken == []
+    assert memory.last_job == 0
+
+
+def test_too_old_foreign_and_unready_are_told_apart(memory):
+    vector = VECTORS["contours"][0]
+    mailbox = FixedMailbox(memory, vector)
+    mailbox.set_state(bridge.BUSY_STATE)
+    assert mailbox.send(vector["pages"][0], 1) == bridge.NOT_READY
+    mailbox.session = 8
+    assert mailbox.send(vector["pages"][0], 2) == bridge.OUTDATED
+    mailbox.session, mailbox.now_ms = vector["session"], vector["captured_at"] + vector["valid_for"] + 1
+    assert mailbox.send(vector["pages"][0], 3) == bridge.EXPIRED
+    assert mailbox.taken == []
+
+
+def test_what_was_answered_is_remembered_over_a_restart(tmp_path):
+    path = str(tmp_path / "memory.json")
+    vector = VECTORS["contours"][0]
+    FixedMailbox(bridge.Memory(path), vector).send(vector["pages"][0], 1)
+    again = FixedMailbox(bridge.Memory(path), vector)
+    assert again.registers[11] == vector["job_id"]
+    assert again.registers[12] == bridge.ACCEPTED
+    assert again.send(vector["pages"][0], 1) == bridge.BEFORE
+    assert again.taken == []
+
+
+def test_two_starts_have_two_sessions(tmp_path):
+    sessions = {bridge.Mailbox(bridge.Memory(str(tmp_path / "memory.json")), None, None).session for _ in range(3)}
+    assert len(sessions) == 3
+    assert 0 not in sessions
+
+
+def test_a_memory_that_cannot_be_read_is_no_memory_to_guess(tmp_path):
+    (tmp_path / "memory.json").write_text("{")
+    with pytest.raises(SystemExit, match="The last job is not known"):
+        bridge.Memory(str(tmp_path / "memory.json"))
+
+
+# --- its Modbus server -----------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def client(memory):
+    mailbox = bridge.Mailbox(memory, lambda _: bridge.ACCEPTED, lambda _: None)
+    server = ModbusServer(("127.0.0.1", 0), mailbox)
+    thread = threading.Thread(target=server.serve_forever, args=(0.05,))
+    thread.start()
+    client = ModbusTcpClient("127.0.0.1", port=server.server_address[1], timeout=5)
+    assert client.connect()
+    client.mailbox = mailbox
+    yield client
+    client.close()
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_a_foreign_client_reads_and_writes_registers(client):
+    assert not client.write_registers(16, [1, 2, 3]).isError()
+    assert not client.write_register(20, 65535).isError()
+    assert client.read_holding_registers(16, count=5).registers == [1, 2, 3, 0, 65535]
+    assert client.read_holding_registers(0, count=125).registers == client.mailbox.registers[:125]
+
+
+def test_what_is_not_there_or_not_the_clients_is_an_exception(client):
+    assert client.read_holding_registers(2000, count=100).exception_code == 2
+    assert client.write_register(0, 1).exception_code == 2
+    assert client.write_registers(15, [1, 2]).exception_code == 2
+    assert client.read_coils(0, count=1).exception_code == 1
+    assert client.mailbox.registers[0] == 0
+
+
+@pytest.mark.parametrize("body", [b"", b"\0", b"\0\0\0\0", b"\0\0\0\x7e", b"\0\x10\0\x02\x04\0\1"])
+@pytest.mark.parametrize("function", [3, 6, 16, 99])
+def test_a_torn_request_changes_nothing(function, body, memory):
+    mailbox = bridge.Mailbox(memory, None, None)
+    before = list(mailbox.registers)
+    reply = answer(mailbox, function, body)
+    assert reply[0] in (function, function | 0x80)
+    if reply[0] & 0x80:
+        assert mailbox.registers == before
+
+
+def test_it_runs_on_the_standard_library_alone():
+    folder = ROOT / "controllers" / "linuxcnc"
+    code = f"import sys; sys.path.insert(0, {str(folder)!r}); import mailbox, modbus_server, program"
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", f"{code}; print(*sys.modules)"], capture_output=True, text=True, check=True
+    )
+    assert not {"pymodbus", "numpy", "yaml"} & set(done.stdout.split())

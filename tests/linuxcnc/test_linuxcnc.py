@@ -1,0 +1,180 @@
+"""A contour from picture to motion: service, Modbus, bridge and a real CNC controller that moves along it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+import yaml
+
+from benchmarks.sample_scenes import sample_scenes
+from contour.geometry import Contour
+from tests.linuxcnc.machine import bridge_on, linuxcnc_session
+from tests.linuxcnc.way_picture import draw_way
+from tests.real_parts import need_program
+from tests.system.processes import Process, combtrace, until
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = Path(__file__).parents[2] / "service" / "samples"
+PICTURE = "4-with-holes"
+ROTATION_DEG, SHIFT_MM = 25.0, (120.0, -80.0)  # of the machine's frame against the camera's
+CUT_Z, SAFE_Z = 1.0, 50.0
+PATH_TOLERANCE_MM = 0.01
+
+
+@pytest.fixture(scope="module")
+def machine():
+    need_program("linuxcnc", "apt-get install linuxcnc-uspace")
+    with linuxcnc_session() as session:
+        yield session
+
+
+class Cell:
+    """A configuration of the service for the bridge, aligned to the machine."""
+
+    def __init__(self, folder, bridge, shift_mm=SHIFT_MM, valid_for_s=30, aligned=True):
+        self.folder = folder
+        calibration = yaml.safe_load((SAMPLES / "calibration.yaml").read_text())
+        del calibration["alignment"]
+        if aligned:
+            calibration["alignment"] = {"rotation_deg": ROTATION_DEG, "translation_mm": list(shift_mm)}
+        (folder / "calibration.yaml").write_text(yaml.safe_dump(calibration))
+        shutil.copy(SAMPLES / f"{PICTURE}.jpg", folder)
+        (folder / "config.yaml").write_text(
+            f"camera: {{kind: files, path: {PICTURE}.jpg, loop: true}}\n"
+            "calibration: {file: calibration.yaml}\n"
+            f"controller: {{kind: modbus-tcp, port: {bridge.port}, valid_for_s: {valid_for_s}}}\n"
+            "triggers: [{kind: controller}]\n"
+            "recipes: [{number: 1, name: default, thickness_mm: 20}]\n"
+            "service: {state_dir: state}\n"
+            "journal: {path: journal.sqlite}\n"
+            "archive: {path: archive}\n"
+        )
+
+    def run_once(self):
+        """`combtrace run --once`: its exit status and what it wrote."""
+        done = combtrace("run", "--once", "--config", self.folder / "config.yaml")
+        return done.returncode, done.stdout + done.stderr
+
+    def service(self):
+        """The daemon."""
+        return Process(self.folder / "service.log", "run", "--config", self.folder / "config.yaml")
+
+    def sent(self):
+        """The polygon of the last job, as archived, mm."""
+        (path,) = self.folder.glob("archive/*/*-accepted.json")
+        rings = json.loads(path.read_text())["measurement"]["millimetres"]
+        return [np.array(rings["exterior"]), *map(np.array, rings["holes"])]
+
+
+def in_machine_frame(contour: Contour):
+    angle = np.radians(ROTATION_DEG)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return [ring @ turn.T + SHIFT_MM for ring in contour.rings]
+
+
+def lines_of(rings):
+    return shapely.MultiLineString([shapely.LinearRing(ring) for ring in rings])
+
+
+def test_the_machine_moves_along_the_true_outline_of_the_block_in_the_picture(machine, tmp_path):
+    """The whole way: picture, contour, millimetres, Modbus, bridge, motion; sampled from the controller itself."""
+    way = machine.folder / "way.json"
+    with bridge_on(machine, "--run", "--cut-z", str(CUT_Z), "--simulated-too") as bridge:
+        sampling = machine.sampling(way)
+        cell = Cell(tmp_path, bridge)
+        status, told = cell.run_once()
+        assert status == 0, told + bridge.log.read_text()
+        bridge.says("job 1 done", 60)
+        assert sampling.wait(30) == 0
+    sent = cell.sent()
+    truth = in_machine_frame(next(scene for scene in sample_scenes() if scene.name == PICTURE).outline)
+    positions = np.array(json.loads(way.read_text()))
+    positions = positions[int(np.argmax(positions[:, 2] >= SAFE_Z - 1e-3)) :]  # it begins by going up
+    cutting = positions[positions[:, 2] < CUT_Z + 1e-3][:, :2]
+    assert len(cutting) > 500
+    points = shapely.points(cutting)
+    assert shapely.distance(points, lines_of(sent)).max() <= PATH_TOLERANCE_MM + 0.01
+    assert shapely.distance(points, lines_of(truth)).max() <= 0.6
+    went = shapely.MultiPoint(cutting)
+    step_mm = np.hypot(*np.diff(cutting, axis=0).T)
+    for ring in sent:  # nothing of it left out: between samples lies what the feed makes of a sample's time
+        along = [shapely.LinearRing(ring).interpolate(s, normalized=True) for s in np.linspace(0, 1, 400)]
+        assert shapely.distance(shapely.points([p.coords[0] for p in along]), went).max() <= step_mm[step_mm < 50].max()
+    fast = positions[positions[:, 2] >= CUT_Z + 1e-3]
+    assert fast[:, 2].max() <= SAFE_Z + 1e-3
+    if picture := os.environ.get("COMBTRACE_PICTURE"):
+        angle = np.radians(-ROTATION_DEG)
+        back = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        draw_way(Path(picture), *[[(part - SHIFT_MM) @ back.T for part in parts] for parts in (truth, sent, [cutting])])
+
+
+def test_without_run_it_is_shown_and_waits_for_the_operators_cycle_start(machine, tmp_path):
+    with bridge_on(machine, "--simulated-too") as bridge:
+        status, told = Cell(tmp_path, bridge).run_once()
+        assert status == 0, told
+        bridge.says("shown: cycle start runs it")
+        assert "started" not in bridge.log.read_text()
+        machine.operate("start")
+        bridge.says("job 1 started by the operator")
+        bridge.says("job 1 done", 60)
+
+
+def test_a_contour_that_waits_too_long_is_let_go(machine, tmp_path):
+    with bridge_on(machine, "--simulated-too") as bridge:
+        status, told = Cell(tmp_path, bridge, valid_for_s=3).run_once()
+        assert status == 0, told
+        bridge.says("job 1 let go: it is too old to be cut")
+        assert "started" not in bridge.log.read_text()
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "why"),
+    [
+        ({"shift_mm": (1900.0, 0.0)}, ["--simulated-too"], "the machine goes from -2000 to 2000"),
+        ({"aligned": False}, ["--simulated-too"], "its frame is not the machine's"),
+        ({}, [], "its frame is not from a live camera"),
+    ],
+    ids=["outside the limits", "not aligned", "from a file"],
+)
+def test_what_the_machine_must_not_cut_is_refused_with_why(machine, tmp_path, changes, options, why):
+    with bridge_on(machine, *options) as bridge:
+        status, told = Cell(tmp_path, bridge, **changes).run_once()
+        assert status == 3
+        assert "151" in told
+        assert why in bridge.log.read_text()
+
+
+def test_the_operator_asks_for_a_measurement_and_an_emergency_stop_ends_the_readiness(machine, tmp_path):
+    with bridge_on(machine, "--run", "--simulated-too") as bridge:
+        service = Cell(tmp_path, bridge).service()
+        try:
+            log = tmp_path / "service.log"
+            until(lambda: "-> Ready" in log.read_text(), what="the service is ready")
+            bridge.request()
+            bridge.says("a measurement is asked for")
+            bridge.says("job 1 started")
+            machine.operate("estop")
+            bridge.says("job 1 stopped: emergency stop")
+            bridge.request()
+            bridge.says("no measurement asked for: the machine is not ready")
+            machine.operate("prepare")
+            until(lambda: "-> Ready" in log.read_text().split("emergency")[-1], what="ready again")
+        finally:
+            service.stop()
+
+
+def test_the_bridge_keeps_the_protocols_rules_as_the_hardware_in_loop_suite_tries_them(machine):
+    with bridge_on(machine) as bridge:
+        command = [sys.executable, "-m", "pytest", "tests/hil/test_controller.py", "-p", "no:cacheprovider"]
+        command += [f"--hil-controller=tcp://127.0.0.1:{bridge.port}"]
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stdout
+        assert " passed" in done.stdout

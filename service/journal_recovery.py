@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import os
 import re
+import shutil
 import sqlite3
 import time
 from collections.abc import Callable, Iterator
@@ -37,6 +39,8 @@ def open_journal(
     try:
         if path.exists() and path.stat().st_size > 0:
             return Journal(path)
+        kept = _broken_off(path)
+        alarm = f"{path}: is damaged, and moving it aside was broken off. It is in {kept}. " if kept else ""
     except JournalDamaged as error:
         if not ran_before and highest_job(path) == 0:
             raise
@@ -64,17 +68,54 @@ def set_aside(path: Path) -> list[Path]:
 
 
 def _move_aside(path: Path, unix_s: float) -> Path:
-    """Rename the journal with its write-ahead log; nothing of it is lost."""
+    """Give the journal and its write-ahead log another name; nothing of them is lost, killed at whatever moment.
+
+    First all have both names, then the old ones go, the database's before its log's: without its log a database looks
+    sound and older than it is.
+    """
     stamp = datetime.fromtimestamp(unix_s, UTC).strftime("%Y%m%dT%H%M%SZ")
     kept = path.with_name(f"{path.name}.damaged-{stamp}")
     try:
-        for part in PARTS:
-            source = path.with_name(path.name + part)
-            if source.exists():
-                source.rename(kept.with_name(kept.name + part))
+        for source in _files(path):
+            target = kept.with_name(kept.name + source.name.removeprefix(path.name))
+            if not (target.exists() and target.samefile(source)):
+                _name_also(source, target)
+        for source in _files(path):
+            source.unlink()
     except OSError as error:
         raise JournalError(f"{path}: is damaged and cannot be moved aside: {error.strerror}. Move it away") from error
     return kept
+
+
+def _files(path: Path) -> list[Path]:
+    """SQLite's files of the database that are there."""
+    return [file for part in PARTS if (file := path.with_name(path.name + part)).exists()]
+
+
+def _name_also(source: Path, target: Path) -> None:
+    try:
+        os.link(source, target)
+    except OSError:  # a file system without hard links; a copy that is broken off is made anew under another name
+        shutil.copy2(source, target)
+        with target.open("rb") as copy:
+            os.fsync(copy.fileno())
+
+
+def _broken_off(path: Path) -> Path | None:
+    """The name of a journal that was being moved aside when the service was killed, after clearing up behind it."""
+    left, aside = _files(path), set_aside(path)
+    if path.exists() or not left or not aside:
+        return None
+    kept = aside[-1]
+    if any(not _is_in(file, kept.with_name(kept.name + file.name.removeprefix(path.name))) for file in left):
+        return None  # they belong to another journal, which was lost
+    for file in left:
+        file.unlink()
+    return kept
+
+
+def _is_in(file: Path, copy: Path) -> bool:
+    return copy.exists() and (copy.samefile(file) or copy.read_bytes() == file.read_bytes())
 
 
 def _restore(kept: Path, journal: Journal) -> str:

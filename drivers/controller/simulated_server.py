@@ -93,17 +93,14 @@ class RegisterServer:
         self._clients.add(task)
         task.add_done_callback(self._clients.discard)
         self._device.connection(True)
+        # The task ends here whether it is cancelled or not; asyncio's streams would log a cancelled one as an error.
         try:
-            await self._carry(reader, writer)
-        except (OSError, BadFrame):
-            return
-        except asyncio.CancelledError:
-            if self._server is not None:
-                raise
+            with suppress(OSError, BadFrame, asyncio.CancelledError):
+                await self._carry(reader, writer)
         finally:
             self._device.connection(False)
             writer.transport.abort()
-            with suppress(OSError):
+            with suppress(OSError, asyncio.CancelledError):
                 await writer.wait_closed()
 
     async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import os
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,7 @@ from hypothesis import strategies as st
 
 from drivers.controller.mailbox import Page
 from service.journal import Journal, JournalDamaged, JournalError, TriggerStamp
-from service.journal_recovery import highest_archived, highest_job, open_journal, set_aside
+from service.journal_recovery import _move_aside, highest_archived, highest_job, open_journal, set_aside
 from service.reasons import Outcome
 
 PAGE = Page((1, 0, 7, 1, 1, 1, 4, *[0] * 24), (1, 2, 3, 4))
@@ -121,6 +123,46 @@ def test_a_damaged_journal_is_moved_aside_whole_and_numbers_go_on_above_it(
     assert job.job_id == 62 if damage != "cut off" else job.job_id > 30
     journal.close()
     assert [record.levelno for record in caplog.records if record.levelno > logging.INFO] == [logging.CRITICAL]
+
+
+class Killed(BaseException):
+    """The end of the process."""
+
+
+@pytest.mark.parametrize("steps", range(4))
+def test_killed_while_it_is_moved_aside_nothing_is_lost_and_no_number_comes_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, steps: int
+) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 60)
+    content, wal = bytes(100) + path.read_bytes()[100:], b"\xa5" * 100
+    path.write_bytes(content)
+    path.with_name("journal.sqlite-wal").write_bytes(wal)
+    left = steps
+
+    def step(act: Callable[..., None]) -> Callable[..., None]:
+        def counted(*args: object, **more: object) -> None:
+            nonlocal left
+            if left == 0:
+                raise Killed
+            left -= 1
+            act(*args, **more)
+
+        return counted
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "link", step(os.link))
+        patched.setattr(Path, "unlink", step(Path.unlink))
+        with pytest.raises(Killed):
+            _move_aside(path, UNIX_S)
+    journal = reopened(path)
+    assert journal.take(TriggerStamp("serial")).job_id == 62
+    journal.close()
+    kept = set_aside(path)[-1]
+    assert kept.read_bytes() == content
+    assert "damaged" in caplog.text
+    if steps >= 2:  # before that SQLite itself puts a log away that is none
+        assert kept.with_name(kept.name + "-wal").read_bytes() == wal
 
 
 def test_what_had_not_ended_is_brought_over_where_it_can_be_read(tmp_path: Path) -> None:

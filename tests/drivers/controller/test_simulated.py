@@ -198,3 +198,19 @@ async def test_what_the_protocol_does_not_use_is_answered_with_an_exception_and_
 async def test_another_device_id_is_answered_as_a_gateway_does() -> None:
     async with simulated() as controller, Client(controller.port) as client:
         assert await client.ask(struct.pack(">BHH", 3, 0, 16), unit=2) == bytes([0x83, 11])
+
+
+async def test_stopping_while_a_connection_is_being_closed_is_no_error_in_the_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async with SimulatedController() as controller:
+        _, writer = await asyncio.open_connection("127.0.0.1", controller.port)
+        await asyncio.sleep(0.02)
+        (serving,) = controller._server._clients
+        serving.cancel()
+        await asyncio.sleep(0)  # now it waits for its connection to be closed
+        serving.cancel()
+        await asyncio.wait([serving])
+        await asyncio.sleep(0.01)
+        writer.close()
+    assert caplog.text == ""

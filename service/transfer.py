@@ -17,7 +17,7 @@ from typing import NoReturn
 
 from drivers.controller import ControllerError, ControllerUnavailable
 from drivers.controller.mailbox import Answer, LinkBlock, Page
-from service.link import Link
+from service.link import Link, LinkUnsteady
 from service.reasons import Outcome, Reason
 
 log = logging.getLogger("combtrace.transfer")
@@ -244,8 +244,11 @@ class Transfer:
         """Step 1: None when the controller is ready, else why the job is to be withdrawn."""
         give_up_at = self._now() + self._settings.ready_timeout_s
         while True:
-            await self._look()
-            why_not = self._link.controller_not_ready()
+            try:
+                await self._look()
+                why_not = self._link.controller_not_ready()
+            except LinkUnsteady as error:  # it said nothing: no attempt in vain
+                why_not = str(error)
             now = self._now()
             if now >= self._expires_at_s:
                 return Reason.EXPIRED, why_not or "the contour became too old on its way"
@@ -325,6 +328,9 @@ class Transfer:
                 if self._now() >= give_up_at or not await self._reconnected():
                     return None
                 continue
+            except LinkUnsteady as error:
+                self._told(str(error))
+                view = LinkBlock()  # it said nothing
             if view.session == self._session and view.ack_transfer == transfer:
                 answer = _as_answer(view.ack_result)
                 if answer in CAN_BE_REPEATED or answer in (Answer.PAGE_MISSING, Answer.NOT_READY):

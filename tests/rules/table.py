@@ -334,7 +334,8 @@ RULES = (
         f"{IN_CYCLE}::test_captured_at_was_read_before_the_exposure",
         "stamp = await self._stamp(job)\n        stamped_at = self._now()\n"
         "        frame = course.frame = await self._frame(course.report)",
-        "frame = course.frame = await self._frame(course.report)\n        await asyncio.sleep(0.05)\n        stamp = await self._stamp(job)\n"
+        "frame = course.frame = await self._frame(course.report)\n        await asyncio.sleep(0.05)\n"
+        "        stamp = await self._stamp(job)\n"
         "        stamped_at = self._now()",
     ),
     # --- one service ---

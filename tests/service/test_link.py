@@ -32,23 +32,23 @@ async def linked(controller: ScriptedController, settings: LinkSettings = QUICK)
 
 
 class Reading:
-    """A controller whose link block is read from a list, one a read."""
+    """A controller whose link block is read from a list, one a read, each at its time."""
 
     connected = True
 
-    def __init__(self, *blocks: LinkBlock) -> None:
+    def __init__(self, *blocks: LinkBlock, times: list[float] | None = None) -> None:
         self.blocks = list(blocks)
+        self._times = iter(times or ())
+        self.now = 0.0
 
     async def read_link(self) -> LinkBlock:
-        return self.blocks.pop(0)
-
-    def glance(self) -> LinkBlock | None:
+        self.now = next(self._times, self.now)
         return self.blocks.pop(0)
 
 
 def link_over(*blocks: LinkBlock, times: list[float] | None = None) -> Link:
-    ticks = iter(times) if times else None
-    return Link(Reading(*blocks), QUICK, now=lambda: next(ticks) if ticks else 0.0)  # type: ignore[arg-type]
+    reading = Reading(*blocks, times=times)
+    return Link(reading, QUICK, now=lambda: reading.now)  # type: ignore[arg-type]
 
 
 async def test_a_block_counts_only_when_two_reads_in_a_row_show_it() -> None:
@@ -358,3 +358,9 @@ async def test_a_loss_seen_in_place_is_told_and_the_link_comes_back() -> None:
         await until(lambda: link.fault() is not None)
         controller.reachable = True
         await at_rest(controller, link)
+
+
+async def test_an_observer_has_nothing_to_wait_for_that_would_be_written() -> None:
+    async with linked(ScriptedController(), replace(QUICK, observe=True)) as link:
+        link.publish(job_id=9)
+        assert await link.flush(3600)

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.controller.mailbox import Answer, ServiceBlock, withdrawal
+from drivers.controller.mailbox import Answer, LinkBlock, ServiceBlock, withdrawal
+from service.link import READS_FOR_TWO_ALIKE
 from service.reasons import Outcome, Reason
 from service.transfer import Settlement, TransferCounter, TransferSettings
 from tests.service.scripted_controller import ScriptedController
@@ -154,6 +155,25 @@ async def test_not_ready_answers_are_waited_out_and_not_counted() -> None:
     controller = ScriptedController([Answer.NOT_READY] * 6 + [Answer.ACCEPTED])
     async with transferring(controller) as run:
         assert (await run.end()).outcome is Outcome.ACCEPTED
+
+
+class Restless(ScriptedController):
+    """Its block changes at each of the next `changes` reads."""
+
+    changes = 0
+
+    def shown(self) -> LinkBlock:
+        self.changes -= 1
+        return replace(super().shown(), recipe=self.changes if self.changes > 0 else 0)
+
+
+async def test_a_block_that_is_never_twice_the_same_is_waited_out_and_is_no_attempt_in_vain() -> None:
+    controller = Restless()
+    async with transferring(controller) as run:
+        controller.changes = 5 * READS_FOR_TWO_ALIKE
+        controller.before_commit = lambda: setattr(controller, "changes", 5 * READS_FOR_TWO_ALIKE)
+        assert (await run.end()).outcome is Outcome.ACCEPTED
+    assert controller.count("commit") == 1
 
 
 async def test_nothing_is_written_to_the_contour_block_while_the_controller_is_busy() -> None:

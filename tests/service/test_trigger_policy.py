@@ -111,7 +111,7 @@ async def test_those_that_wait_are_told_at_once_where_the_service_is_not_ready_a
         made.runner.go.set()
         await running.settled
         for queued in waiting:
-            with pytest.raises(TriggerRefused, match="Halted" if halted else "camera silent") as refused:
+            with pytest.raises(TriggerRefused, match="by a person" if halted else "camera silent") as refused:
                 await queued.ticket
             assert refused.value.reason is (Reason.ABORTED if halted else Reason.NOT_READY)
         assert made.executor.missed == 2

@@ -43,7 +43,7 @@ class Bench:
         """The job, settled, of one more picture."""
         self._handed += 1
         number = self._handed
-        until(lambda: f"job {number} taken" in self.service.text, what=f"job {number}")
+        until(lambda: f"SingleExecution job={number}\n" in self.service.text, what=f"job {number}")
         shutil.copy(PICTURE, self.pictures / f"{number}.tmp")
         (self.pictures / f"{number}.tmp").rename(self.pictures / f"{number}.jpg")
         until(lambda: jobs(self.folder / "journal.sqlite")[number - 1]["outcome"], what=f"the end of job {number}")
@@ -62,7 +62,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
 def test_a_running_job_keeps_its_recipe_and_the_next_has_the_new_one_or_the_old_where_the_new_is_bad(
     bench: Bench,
 ) -> None:
-    until(lambda: "job 1 taken" in bench.service.text, what="job 1")
+    until(lambda: "SingleExecution job=1\n" in bench.service.text, what="job 1")
     bench.write("recipes: [{number: 1, name: large, thickness_mm: 20, min_area_mm2: 3.0e+6}]")
     bench.reload("configuration reloaded, from the job after 1 on: recipes (1)")
     assert bench.hand_over()["outcome"] == "written", "it began with the old recipe"
@@ -88,7 +88,7 @@ def test_a_running_job_keeps_its_recipe_and_the_next_has_the_new_one_or_the_old_
     assert bench.hand_over()["reason"] == 112
 
     bench.write(f"recipes: [{PLAIN}]")
-    until(lambda: "job 6 taken" in bench.service.text, what="job 6")
+    until(lambda: "SingleExecution job=6\n" in bench.service.text, what="job 6")
     bench.reload("from the job after 6 on: recipes (1)")
     assert bench.hand_over()["reason"] == 112, "it was waiting for its picture"
     assert bench.hand_over()["outcome"] == "written"

@@ -218,7 +218,7 @@ RULES = (
         "Transfer 8: withdraws again and again until last_job ≥ job_id",
         f"{TRANSFER}::Transfer.withdraw",
         f"{IN_TRANSFER}::test_a_sent_job_stays_in_flight_while_the_controller_is_away_and_is_settled_when_it_is_back",
-        "except ControllerUnavailable:\n                    await self._link.wait_connected()",
+        "except ControllerUnavailable:\n                    await self._connected()",
         "except ControllerUnavailable:\n"
         "                    return Settlement(Outcome.FAILED, Reason.CONTROLLER_LOST, detail)",
     ),

@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -209,7 +209,8 @@ class FaultedCell:
         """A daemon as wired for the shop floor, but for its camera and its measurer."""
         parts = wiring.build(self.config(), observe=self.note_seen)
         cycle: Any = parts.executor._runner
-        cycle._measurer = RandomContours(self.chance, 12 if self.terms.payload_capacity < 64 else 40)
+        measurer = RandomContours(self.chance, 12 if self.terms.payload_capacity < 64 else 40)
+        cycle._plan = replace(cycle._plan, measurer=measurer)
         cycle._camera = parts.camera = SimulatedCamera(self.picture)
         cycle._abort = lambda _job: None  # it is killed, not stopped: nobody tidies up
         self.parts = parts

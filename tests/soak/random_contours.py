@@ -7,13 +7,14 @@ import random
 import numpy as np
 
 from contour.geometry import Contour, area
-from service.measure import Measurement
+from service.measure import Measurement, Measurer
 
 
-class RandomContours:
-    """Stands in for the measurer: another contour each time, with or without a hole."""
+class RandomContours(Measurer):
+    """A measurer that looks at no picture: another contour each time, with or without a hole."""
 
     def __init__(self, chance: random.Random, most_vertices: int) -> None:
+        super().__init__(None)
         self._chance = chance
         self._most = most_vertices
 

@@ -37,7 +37,7 @@ def text(tmp_path_factory: pytest.TempPathFactory) -> str:
         cell.goes_on(2)
         until(lambda: value(served(port), 'combtrace_evidence_total{result="stored"}') >= 2, what="evidence")
         cell.controller.stop()
-        until(lambda: value(served(port), "combtrace_controller_up") == 0, what="the loss, in the metrics")
+        until(lambda: value(served(port), 'combtrace_part_up{part="controller"}') == 0, what="the loss, in the metrics")
         addresses = {entry[4][0] for entry in socket.getaddrinfo(socket.gethostname(), port)} - {"127.0.0.1", "::1"}
         for address in addresses:
             with pytest.raises(OSError), socket.create_connection((address, port), timeout=1):

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.export_options import Exports, add_export_arguments
+from service.cli.file_names import distinct_stems
+from service.cli.json_output import json_output
 from service.cli.measuring import find_recipe, guard_of, load_config_or_default, thickness_of
 
 if TYPE_CHECKING:
@@ -65,16 +67,12 @@ def run(args: argparse.Namespace) -> int:
     setup = _Setup.of(args)
     texts = sys.stderr if args.json == "-" else sys.stdout
     worst = EXIT_OK
-    records = []
-    for image in args.images:
-        record, line, status = _trace_one(image, setup)
-        records.append(record)
-        print(line, file=texts if status != EXIT_UNUSABLE else sys.stderr, flush=True)
-        worst = max(worst, status, key=(EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE).index)
-        if args.json == "-":
-            print(json.dumps(record, ensure_ascii=False), flush=True)
-    if args.json not in (None, "-"):
-        _write_records(Path(args.json), records)
+    with json_output(args.json) as write:
+        for image in args.images:
+            record, line, status = _trace_one(image, setup)
+            print(line, file=texts if status != EXIT_UNUSABLE else sys.stderr, flush=True)
+            worst = max(worst, status, key=(EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE).index)
+            write(json.dumps(record, ensure_ascii=False) + "\n")
     return worst
 
 
@@ -85,8 +83,7 @@ class _Setup:
     measurer: Measurer
     recipe: Recipe
     thickness_mm: float
-    overlay: Path | None
-    overlay_is_folder: bool
+    overlays: dict[Path, Path]
     language: str
     exports: Exports
 
@@ -100,31 +97,43 @@ class _Setup:
         recipe = _recipe(config, args)
         guard = guard_of(config, args)
         thickness_mm = thickness_of(args, recipe)
+        if guard is None and args.thickness_mm is not None:
+            print(
+                f"combtrace trace: --thickness-mm {thickness_mm:g} has no effect: without a calibration contours stay "
+                "in pixels. Name one by --calibration or --config",
+                file=sys.stderr,
+            )
         work_area = np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
-        overlay = args.overlay
-        for image in args.images:
-            if overlay is not None and overlay.exists() and image.exists() and overlay.samefile(image):
-                raise UserError(f"--overlay {overlay}: is the picture being traced. Name another file")
-        folder = overlay is not None and (len(args.images) > 1 or overlay.is_dir())
-        if folder:
-            _make_folder(overlay)
         return cls(
             Measurer(
                 guard.record.calibration if guard else None, guard=guard, work_area_mm=work_area, table=_table(config)
             ),
             recipe,
             thickness_mm,
-            overlay,
-            folder,
+            {} if args.overlay is None else _overlays(args.overlay, args.images),
             args.language,
             Exports.of(args, recipe, calibrated=guard is not None),
         )
 
-    def overlay_for(self, image: Path) -> Path | None:
-        """The overlay file of one picture."""
-        if self.overlay is None:
-            return None
-        return self.overlay / f"{image.stem}-contour.png" if self.overlay_is_folder else self.overlay
+
+def _overlays(overlay: Path, images: list[Path]) -> dict[Path, Path]:
+    """The overlay file of each picture; the folder for several is made. Raise UserError."""
+    if len(images) == 1 and not overlay.is_dir():
+        files = {images[0]: overlay}
+    else:
+        _make_folder(overlay)
+        files = {image: overlay / f"{stem}-contour.png" for image, stem in distinct_stems(images).items()}
+    pictures = {_identity(image) for image in images if image.exists()}
+    for file in files.values():
+        if file.exists() and _identity(file) in pictures:
+            raise UserError(f"--overlay {file}: is the picture being traced. Name another file")
+    return files
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """The same for all names of one file."""
+    status = path.stat()
+    return status.st_dev, status.st_ino
 
 
 def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
@@ -177,7 +186,7 @@ def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
     times = {"read": read_ms, **measurement.timings_ms}
     times["total"] = sum(value for name, value in times.items() if name != "total")
     measurement = replace(measurement, timings_ms=times)
-    overlay = setup.overlay_for(image)
+    overlay = setup.overlays.get(image)
     note = ""
     if overlay is not None:
         _write_overlay(overlay, picture, measurement)
@@ -266,13 +275,6 @@ def _make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"--overlay {path}: cannot make the folder: {error.strerror}. Name another") from error
-
-
-def _write_records(path: Path, records: list[dict[str, Any]]) -> None:
-    try:
-        path.write_text("".join(json.dumps(record, ensure_ascii=False) + "\n" for record in records), encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"--json {path}: cannot be written: {error.strerror}. Name another file") from error
 
 
 def _table(config: Config) -> TableRecord | None:

@@ -121,6 +121,34 @@ def test_an_overlay_never_replaces_the_picture_it_is_of(tmp_path: Path) -> None:
     assert picture.read_bytes() == RECTANGLE.read_bytes()
 
 
+def test_pictures_of_one_name_from_several_folders_get_an_overlay_each(tmp_path: Path) -> None:
+    pictures = [tmp_path / side / name for side, name in (("left", "a.jpg"), ("right", "a.jpg"), ("right", "b.jpg"))]
+    for picture, source in zip(pictures, (RECTANGLE, L_SHAPE, RECTANGLE), strict=True):
+        picture.parent.mkdir(exist_ok=True)
+        picture.write_bytes(source.read_bytes())
+    done = combtrace("trace", *pictures, "--overlay", tmp_path / "seen", "--thickness-mm", "20")
+    assert done.returncode == 0, done.stderr
+    names = sorted(path.name for path in (tmp_path / "seen").iterdir())
+    assert names == ["b-contour.png", "left-a-contour.png", "right-a-contour.png"]
+    assert "--thickness-mm 20 has no effect: without a calibration" in done.stderr
+    # An overlay's name may be that of another picture of the same run.
+    (tmp_path / "left" / "b-contour.png").write_bytes(RECTANGLE.read_bytes())
+    done = combtrace("trace", pictures[2], tmp_path / "left" / "b-contour.png", "--overlay", tmp_path / "left")
+    assert done.returncode == 2
+    assert "is the picture being traced" in done.stderr
+
+
+def test_a_json_file_stays_as_it_was_where_the_command_cannot_go_on(tmp_path: Path) -> None:
+    out = tmp_path / "out.jsonl"
+    out.write_text("old\n")
+    (tmp_path / "seen").mkdir()
+    (tmp_path / "seen" / f"{L_SHAPE.stem}-contour.png").mkdir()
+    done = combtrace("trace", RECTANGLE, L_SHAPE, "--overlay", tmp_path / "seen", "--json", out)
+    assert done.returncode == 2
+    assert out.read_text() == "old\n"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.jsonl", "seen"]
+
+
 def test_json_to_a_file_leaves_the_text_on_standard_output(tmp_path: Path) -> None:
     done = combtrace("trace", RECTANGLE, "--json", tmp_path / "out.jsonl")
     assert "wall-tips" in done.stdout

@@ -161,6 +161,7 @@ class Measurer:
         try:
             result = self._traced(picture, recipe, thickness_mm, result, watch, camera)
         except NoBlockFound as error:
+            watch.lap("trace")
             result = replace(result, findings=_told(judge_without_block(picture, str(error))))
         except CalibrationError as error:
             result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))

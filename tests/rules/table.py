@@ -342,7 +342,14 @@ RULES = (
     Rule(
         "One service: owner is read before each write of the service block",
         f"{LINK}::Link._keep_service",
-        f"{IN_OWNERSHIP}::test_beside_a_living_service_nothing_at_all_is_written",
+        f"{IN_OWNERSHIP}::test_owner_is_read_before_each_write_of_the_service_block",
+        "found = await self.controller.read_service()",
+        "found = self._block",
+    ),
+    Rule(
+        "One service: and the block is written only where what was read allows it",
+        f"{LINK}::Link._keep_service",
+        f"{IN_OWNERSHIP}::test_what_stands_still_is_not_overwritten_before_it_was_watched",
         "if not self.ownership.saw(found):",
         "if self.ownership.saw(found) is None:",
     ),

@@ -179,6 +179,16 @@ async def test_beside_a_living_service_nothing_at_all_is_written(short_watch: No
     assert written(controller) == set()
 
 
+async def test_what_stands_still_is_not_overwritten_before_it_was_watched() -> None:
+    controller = ScriptedController()
+    Another(controller, alive=False)
+    async with linked(controller) as link:
+        link.publish(owner=OURS)
+        await until(lambda: link.view is not None and "watching whether the other" in (link.fault() or ""))
+        await asyncio.sleep(0.2)
+    assert written(controller) == set()
+
+
 async def test_after_a_service_that_ended_ours_takes_over_and_says_what_it_found(short_watch: None) -> None:
     controller = ScriptedController()
     Another(controller, alive=False)

@@ -13,7 +13,7 @@ COMMANDS = (
     *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
     *("board", "calibrate", "align", "verify", "repeat", "teach-table"),
     *("probe", "jobs", "replay"),
-    *("status", "halt", "resume", "reset"),
+    *("status", "halt", "resume", "reset", "install-service"),
     *("schema", "reasons", "register-map"),
 )
 

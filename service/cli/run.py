@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import faulthandler
 import logging
 import os
 import signal
@@ -47,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     except ConfigError as error:
         raise UserError(str(error)) from error
     start_logging(logging.DEBUG if args.verbose else getattr(logging, config.log.level.upper()), config.log.format)
+    faulthandler.enable()  # systemd ends a process that hangs by SIGABRT: its log then says where
     return asyncio.run(_run(config, args.config, once=args.once))
 
 

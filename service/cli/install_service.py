@@ -1,0 +1,88 @@
+"""`combtrace install-service`: the files that make a systemd service of the daemon."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from service.cli.errors import EXIT_FAILED, EXIT_OK, UserError
+
+if TYPE_CHECKING:
+    from service.config import Config
+
+UNIT_PATH = Path("etc/systemd/system/combtrace.service")
+RULES_PATH = Path("etc/udev/rules.d/70-combtrace.rules")
+
+HELP = "write, or print, a systemd unit and udev rules for the daemon"
+DESCRIPTION = """\
+Write the unit and the rules for this machine, and say what to do next; with
+--print show them only. Nothing is enabled or started.
+Exit status: 0 done, 1 cannot be written, 2 bad configuration."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What, where, for whom."""
+    parser.add_argument(
+        "--print", nargs="?", const="unit", choices=("unit", "udev"), help="print instead: the unit, or the udev rules"
+    )
+    parser.add_argument(
+        "--config",
+        type=Path,
+        default=Path("/etc/combtrace/config.yaml"),
+        metavar="FILE",
+        help="the daemon's; default /etc/combtrace/config.yaml",
+    )
+    parser.add_argument("--user", default="combtrace", help="who runs it; default combtrace")
+    parser.add_argument(
+        "--root", type=Path, default=Path("/"), metavar="FOLDER", help="write below this folder; default /"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print, or write."""
+    from service.install_files import UDEV_RULES, unit
+
+    if args.print == "udev":
+        print(UDEV_RULES, end="")
+        return EXIT_OK
+    text = unit(_executable(), args.config.absolute(), args.user, _config(args.config))
+    if args.print == "unit":
+        print(text, end="")
+        return EXIT_OK
+    for path, content in ((args.root / UNIT_PATH, text), (args.root / RULES_PATH, UDEV_RULES)):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(content, encoding="utf-8")
+        except OSError as error:
+            raise UserError(f"{path}: {error.strerror}. Run it with sudo, or with --print", EXIT_FAILED) from error
+        print(f"written: {path}")
+    print(
+        "next, as root:\n"
+        f"  useradd --system --home-dir /var/lib/combtrace --shell /usr/sbin/nologin {args.user}  # if missing\n"
+        "  systemctl daemon-reload && udevadm control --reload && udevadm trigger\n"
+        "  systemctl enable --now combtrace"
+    )
+    return EXIT_OK
+
+
+def _config(path: Path) -> Config | None:
+    """The configuration, None where there is none yet."""
+    from service.config_file import ConfigError, load_config
+
+    if not path.exists():
+        print(f"{path} is not there yet: the unit lets the daemon write to /var/lib/combtrace only", file=sys.stderr)
+        return None
+    try:
+        return load_config(path)
+    except ConfigError as error:
+        raise UserError(str(error)) from error
+
+
+def _executable() -> Path:
+    """The command that runs now, as the unit is to name it."""
+    beside = Path(sys.executable).parent / "combtrace"
+    found = shutil.which("combtrace")
+    return beside if beside.exists() or found is None else Path(found)

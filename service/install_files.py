@@ -1,14 +1,23 @@
-"""The files that make a service of the daemon: a systemd unit and udev rules, as text."""
+"""The files that make a service of the daemon: a systemd unit and udev rules, as text.
+
+`python -m service.install_files packaging` writes those for the usual places, for who makes packages.
+"""
 
 from __future__ import annotations
 
+import re
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 from service.config import Config, FilesCamera
 
+USER = re.compile(r"[a-z_][a-z0-9_-]{0,30}")
+PLAIN = re.compile(r"[A-Za-z0-9/._:@+,=-]+")
+
 STATE_DIRECTORY = Path("/var/lib/combtrace")
 HOMES = (Path("/home"), Path("/root"), Path("/run/user"))
+LEAST_WATCHDOG_S = 60.0  # three waits for a camera, and no less: a part beats once a second at rest
 
 UNIT = """\
 # Made by `combtrace install-service`.
@@ -38,7 +47,8 @@ StateDirectory=combtrace
 StateDirectoryMode=0750
 UMask=0027
 
-# It may write its state, and nothing else of the machine.
+# It may write its state, and nothing else of the machine. ProtectClock is left out: it closes all devices, cameras and
+# serial ports too, before systemd 253. Without capabilities and with these system calls no clock can be set anyway.
 ProtectSystem=strict
 ProtectHome={protect_home}
 {read_write}PrivateTmp=yes
@@ -49,7 +59,6 @@ ProtectKernelTunables=yes
 ProtectKernelModules=yes
 ProtectKernelLogs=yes
 ProtectControlGroups=yes
-ProtectClock=yes
 ProtectHostname=yes
 ProtectProc=invisible
 RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6
@@ -61,6 +70,7 @@ RemoveIPC=yes
 SystemCallArchitectures=native
 SystemCallFilter=@system-service
 SystemCallErrorNumber=EPERM
+KeyringMode=private
 # The machine's own network is enough for it; name the controller's address here to close all others.
 #IPAddressDeny=any
 #IPAddressAllow=localhost 192.168.0.10
@@ -91,35 +101,61 @@ ACTION=="add", SUBSYSTEM=="usb", ENV{DEVTYPE}=="usb_device", ENV{ID_USB_INTERFAC
 """
 
 
+class InstallError(ValueError):
+    """No unit can be made: seen, expected, next step."""
+
+
 def unit(executable: Path, config_path: Path, user: str, config: Config | None) -> str:
-    """The unit's text. config: for the paths that the daemon writes to, and for its camera's time-out."""
-    written = [] if config is None else list(_outside(_written(config)))
-    in_homes = any(home in path.parents for path in (executable, config_path, *written) for home in HOMES)
+    """The unit, as text; raise InstallError. config: for the paths that the daemon uses, and its camera's time-out."""
+    if not USER.fullmatch(user):
+        raise InstallError(f"user {user!r}: expected a name such as combtrace, of lower-case letters and digits")
+    written = [] if config is None else written_folders(config)
+    used = [executable, config_path, *written, *(() if config is None else _read(config))]
     timeout_s = 0.0 if config is None else config.camera.timeout_s * config.camera.average
     return UNIT.format(
-        executable=executable,
-        config=config_path,
+        executable=_quoted(executable),
+        config=_quoted(config_path).replace("$", "$$"),
         user=user,
-        watchdog_s=max(60.0, 3 * timeout_s),
-        protect_home="no" if in_homes else "yes",
-        read_write="".join(f"ReadWritePaths={path}\n" for path in written),
+        watchdog_s=max(LEAST_WATCHDOG_S, 3 * timeout_s),
+        protect_home="read-only" if any(home in path.parents for path in used for home in HOMES) else "yes",
+        read_write="".join(f"ReadWritePaths={_quoted(path)}\n" for path in written),
     )
 
 
-def _written(config: Config) -> Iterable[Path]:
-    """Folders to which the daemon writes."""
-    yield config.service.state_dir
-    yield config.journal.path.parent
-    yield config.archive.path
+def written_folders(config: Config) -> list[Path]:
+    """Folders to which the daemon writes, each once, but for those that systemd makes and opens by itself."""
+    found = [config.service.state_dir, config.journal.path.parent, config.archive.path]
     if isinstance(config.camera, FilesCamera) and config.camera.move_to is not None:
-        yield config.camera.move_to
+        found += [config.camera.move_to, config.camera.path]
+    return [path for path in dict.fromkeys(found) if STATE_DIRECTORY not in (path, *path.parents)]
+
+
+def _read(config: Config) -> Iterable[Path]:
+    """What else it reads."""
+    if config.calibration is not None:
+        yield config.calibration.file
+    if config.table is not None:
+        yield config.table.file
+    if isinstance(config.camera, FilesCamera):
         yield config.camera.path
 
 
-def _outside(folders: Iterable[Path]) -> Iterable[Path]:
-    """Each once, but for those that systemd makes writable anyway."""
-    seen: set[Path] = set()
-    for folder in folders:
-        if folder != STATE_DIRECTORY and STATE_DIRECTORY not in folder.parents and folder not in seen:
-            seen.add(folder)
-            yield folder
+def _quoted(path: Path) -> str:
+    """A path as a unit names it: systemd.syntax(7), and % by systemd.unit(5)."""
+    text = str(path)
+    if PLAIN.fullmatch(text):
+        return text
+    if not text.isprintable():
+        raise InstallError(f"{text!r}: has characters that no unit can name. Move it to another path")
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%") + '"'
+
+
+def packaged() -> dict[str, str]:
+    """The files for the usual places, by name."""
+    usual = unit(Path("/opt/combtrace/bin/combtrace"), Path("/etc/combtrace/config.yaml"), "combtrace", None)
+    return {"systemd/combtrace.service": usual, "udev/70-combtrace.rules": UDEV_RULES}
+
+
+if __name__ == "__main__":
+    for name, content in packaged().items():
+        (Path(sys.argv[1]) / name).write_text(content, encoding="utf-8")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import shutil
 import sys
 from pathlib import Path
@@ -43,12 +44,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print, or write."""
-    from service.install_files import UDEV_RULES, unit
+    from service.install_files import UDEV_RULES, InstallError, unit, written_folders
 
     if args.print == "udev":
         print(UDEV_RULES, end="")
         return EXIT_OK
-    text = unit(_executable(), args.config.absolute(), args.user, _config(args.config))
+    config = _config(args.config)
+    try:
+        text = unit(_executable(), args.config.absolute(), args.user, config)
+    except InstallError as error:
+        raise UserError(str(error)) from error
     if args.print == "unit":
         print(text, end="")
         return EXIT_OK
@@ -59,13 +64,21 @@ def run(args: argparse.Namespace) -> int:
         except OSError as error:
             raise UserError(f"{path}: {error.strerror}. Run it with sudo, or with --print", EXIT_FAILED) from error
         print(f"written: {path}")
-    print(
-        "next, as root:\n"
-        f"  useradd --system --home-dir /var/lib/combtrace --shell /usr/sbin/nologin {args.user}  # if missing\n"
-        "  systemctl daemon-reload && udevadm control --reload && udevadm trigger\n"
-        "  systemctl enable --now combtrace"
-    )
+    folders = [] if config is None else written_folders(config)
+    print(_next_steps(_executable(), args.user, args.config.absolute(), folders))
     return EXIT_OK
+
+
+def _next_steps(executable: Path, user: str, config: Path, folders: list[Path]) -> str:
+    """What is left to do for a person with root's rights."""
+    steps = [f"id {user} || useradd --system --home-dir /var/lib/combtrace --shell /usr/sbin/nologin {user}"]
+    steps += [f"install -d -o {user} -g {user} -m 0750 {shlex.quote(str(folder))}" for folder in folders]
+    steps += ["systemctl daemon-reload && udevadm control --reload && udevadm trigger"]
+    steps += [
+        f"runuser -u {user} -- {shlex.quote(str(executable))} check --config {shlex.quote(str(config))}",
+        "systemctl enable --now combtrace",
+    ]
+    return "\n".join(("next, as root:", *(f"  {step}" for step in steps)))
 
 
 def _config(path: Path) -> Config | None:

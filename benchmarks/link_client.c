@@ -1,8 +1,11 @@
 /* What a C client takes for the same writes: link_client PORT ROUNDS < writes
  *
- * Standard input has a line a write: "6 ADDRESS VALUE" or "16 ADDRESS COUNT VALUE...". Prints microseconds, a line a round.
+ * Standard input has a line a write: "6 ADDRESS VALUE" or "16 ADDRESS COUNT VALUE...". Prints microseconds, a line a round,
+ * and last the number of the processor that it ran on.
  */
+#define _GNU_SOURCE
 #include <modbus.h>
+#include <sched.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -53,5 +56,6 @@ int main(int count, char **words) {
         clock_gettime(CLOCK_MONOTONIC, &ended);
         printf("%.1f\n", (ended.tv_sec - begun.tv_sec) * 1e6 + (ended.tv_nsec - begun.tv_nsec) / 1e3);
     }
+    printf("%d\n", sched_getcpu());
     return 0;
 }

@@ -103,7 +103,7 @@ def judge(
         _goes_on(traced),
         _area(polygon.area_mm2, limits),
         _disagreement(traced, limits.max_disagreement_pitches),
-        _uncertainty(polygon, budget, limits.max_uncertainty_mm),
+        _uncertainty(polygon.millimetres, budget, limits.max_uncertainty_mm),
         _work_area(polygon.millimetres, limits.work_area_mm),
         _several(traced, limits),
         _points(polygon.pixels, limits.max_vertices),
@@ -112,6 +112,24 @@ def judge(
     found = sorted((finding for finding in findings if finding), key=lambda finding: finding.refusal)
     # Each reason once, in the words of the first that saw it.
     return tuple(finding for n, finding in enumerate(found) if finding.refusal not in {f.refusal for f in found[:n]})
+
+
+def judge_millimetres(contour: Contour, limits: Limits, bound_mm: float | None) -> tuple[Finding, ...]:
+    """As `judge`, for a contour that was given and not traced: what millimetres alone can speak against.
+
+    `bound_mm` is the 95 % bound on its position, None = not known.
+    """
+    budget = None if bound_mm is None else ErrorBudget(bound_mm, 0.0, None)
+    defect = contour_defect(contour)
+    shape = None if defect is None else Finding(Refusal.SELF_INTERSECTING, f"The contour cannot be cut: {defect}.")
+    findings = [
+        _area(area(contour), limits),
+        _uncertainty(contour, budget, limits.max_uncertainty_mm),
+        _work_area(contour, limits.work_area_mm),
+        _points(contour, limits.max_vertices),
+        shape,
+    ]
+    return tuple(finding for finding in findings if finding)
 
 
 def judge_without_block(picture: NDArray[np.uint8], text: str) -> tuple[Finding, ...]:
@@ -280,8 +298,8 @@ def _disagreement(traced: Trace | None, limit: float | None) -> Finding | None:
     return None
 
 
-def _uncertainty(polygon: Polygon, budget: ErrorBudget | None, limit: float | None) -> Finding | None:
-    if limit is None or polygon.millimetres is None:
+def _uncertainty(millimetres: Contour | None, budget: ErrorBudget | None, limit: float | None) -> Finding | None:
+    if limit is None or millimetres is None:
         return None
     if budget is None:
         return Finding(
@@ -318,12 +336,12 @@ def _work_area(millimetres: Contour | None, work_area: Ring | None) -> Finding |
     )
 
 
-def _points(pixels: Contour, max_vertices: int) -> Finding | None:
-    if pixels.point_count <= max_vertices:
+def _points(contour: Contour, max_vertices: int) -> Finding | None:
+    if contour.point_count <= max_vertices:
         return None
     return Finding(
         Refusal.TOO_MANY_POINTS,
-        f"The contour has {pixels.point_count} vertices, the recipe allows {max_vertices}. "
+        f"The contour has {contour.point_count} vertices, the recipe allows {max_vertices}. "
         "Raise tolerance_mm or max_vertices, or let it give up more material by budget_mm.",
     )
 

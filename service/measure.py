@@ -76,11 +76,12 @@ class Measurement:
 
     def summary(self) -> dict[str, Any]:
         """What the journal keeps of it."""
+        contour = self.pixels or self.millimetres
         return {
             "method": self.method,
             "polarity": self.polarity,
             "pitch_px": _rounded(self.pitch_px),
-            "vertices": 0 if self.pixels is None else self.pixels.point_count,
+            "vertices": 0 if contour is None else contour.point_count,
             "area_mm2": _rounded(self.area_mm2),
             "uncertainty_mm": _rounded(self.uncertainty_mm),
             "thickness_mm": self.thickness_mm,
@@ -162,7 +163,7 @@ class Measurer:
             result = self._traced(picture, recipe, thickness_mm, result, watch, camera)
         except NoBlockFound as error:
             watch.lap("trace")
-            result = replace(result, findings=_told(judge_without_block(picture, str(error))))
+            result = replace(result, findings=told(judge_without_block(picture, str(error))))
         except CalibrationError as error:
             result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))
         if self._guard is not None:
@@ -196,7 +197,7 @@ class Measurer:
             watch.lap("table")
             changes = judge_table(look, TableLimits())
             if changes:
-                return replace(result, findings=_told(changes))
+                return replace(result, findings=told(changes))
             picture = look.picture
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
@@ -228,7 +229,7 @@ class Measurer:
             area_mm2=polygon.area_mm2,
             uncertainty_px=sure_px,
             uncertainty=budget,
-            findings=_told(findings),
+            findings=told(findings),
         )
 
     def _region(self, recipe: Recipe, thickness_mm: float) -> Region | None:
@@ -270,7 +271,8 @@ class Measurer:
         )
 
 
-def _told(findings: tuple[Finding, ...]) -> tuple[tuple[Reason, str], ...]:
+def told(findings: tuple[Finding, ...]) -> tuple[tuple[Reason, str], ...]:
+    """The findings by the names that journal and registers carry."""
     return tuple((Reason(int(finding.refusal)), finding.text) for finding in findings)
 
 

@@ -6,6 +6,7 @@ import importlib.metadata
 import secrets
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from drivers.camera import Camera
 from drivers.camera.averaging import AveragingCamera
 from drivers.camera.files import FileCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
-from drivers.controller import modbus
+from drivers.controller import Controller, modbus
 from drivers.controller.mailbox import MailboxLayout
 from drivers.trigger import LineTrigger, PulseTrigger
 from drivers.trigger.pulses import SerialBytes, SerialSignal
@@ -66,20 +67,33 @@ class WiringError(Exception):
     """The configuration names what cannot be had: seen, expected, next step."""
 
 
+@dataclass(frozen=True)
+class Instead:
+    """What stands in the place of camera and tracing, and who is told of all that the controller is told."""
+
+    camera: Camera
+    measurer: Measurer
+    listen: Callable[[Controller], Controller] = lambda controller: controller
+
+
 def build(
     config: Config,
     *,
     path: Path | None = None,
     observe: Callable[[Observation], None] = lambda _observation: None,
+    instead: Instead | None = None,
 ) -> Parts:
     """The daemon's parts; raise WiringError. Must be called in the event loop's thread.
 
     path: the configuration's file, to be read again when asked; None = never.
     """
-    plan, calibration_fault = _make_plan(config)
-    camera = make_camera(config)
+    if instead is None:
+        (plan, calibration_fault), camera = _make_plan(config), make_camera(config)
+    else:
+        plan, calibration_fault = _plan_of(instead.measurer, config), None
+        camera = instead.camera
     lock, journal = _make_journal(config)
-    link = _make_link(config)
+    link = _make_link(config, instead.listen if instead else lambda controller: controller)
     health = Health(StateMachine(_publisher(link)))
     health.report("calibration", calibration_fault)
     pool = ThreadPoolExecutor(1, "camera")
@@ -140,10 +154,14 @@ def _make_plan(config: Config) -> tuple[Plan, Fault | None]:
     measurer = Measurer(
         guard.record.calibration if guard else None,
         guard=guard,
-        work_area_mm=_work_area(config),
+        work_area_mm=work_area(config),
         table=find_table(config),
     )
-    return Plan(measurer, {recipe.number: recipe for recipe in config.recipes}, config.default_recipe), fault
+    return _plan_of(measurer, config), fault
+
+
+def _plan_of(measurer: Measurer, config: Config) -> Plan:
+    return Plan(measurer, {recipe.number: recipe for recipe in config.recipes}, config.default_recipe)
 
 
 def sound_plan(config: Config) -> Plan:
@@ -347,13 +365,13 @@ def find_table(config: Config) -> TableRecord | None:
         raise WiringError(str(error)) from error
 
 
-def _make_link(config: Config) -> Link | None:
+def _make_link(config: Config, listen: Callable[[Controller], Controller]) -> Link | None:
     controller = make_controller(config)
     if controller is None or isinstance(config.controller, NoController):
         return None
     settings = config.controller
     return Link(
-        controller,
+        listen(controller),
         LinkSettings(
             settings.handshake == "full",
             settings.poll_period_s,
@@ -371,7 +389,8 @@ def _publisher(link: Link | None) -> Callable[[State, str | None], None]:
     return publish
 
 
-def _work_area(config: Config) -> NDArray[np.float64] | None:
+def work_area(config: Config) -> NDArray[np.float64] | None:
+    """The machine's work area, None where it is not checked."""
     return np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.controller.errors import ContourTooLarge, MailboxError
-from drivers.controller.words import WordOrder, fields, pack, words32
+from drivers.controller.words import Unpacking, WordOrder, fields, pack, words32
 
 HEADER_REGISTERS = 31  # offsets 1…31: the page without its commit register, offset 0
 UNKNOWN_UNCERTAINTY = 0xFFFFFFFF
@@ -73,6 +73,7 @@ HEADER_FIELDS = fields(
     (31, "trigger", "u16"),
 )
 HEADER_NAMES = tuple(field.name for field in HEADER_FIELDS)
+_UNPACK_HEADER = Unpacking(HEADER_FIELDS)
 
 
 def micrometres(ring_mm: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -132,6 +133,11 @@ def crc32_of(header: Sequence[int], payload: Sequence[int]) -> int:
     registers = np.asarray([*header, *payload], dtype=">u2")
     registers[7:9] = 0
     return zlib.crc32(registers.tobytes())
+
+
+def decode_header(page: Page, word_order: WordOrder) -> dict[str, int]:
+    """The values of a page's header by name."""
+    return _UNPACK_HEADER((0, *page.header), word_order)
 
 
 def _check_ring(ring: NDArray[np.integer], number: int) -> None:

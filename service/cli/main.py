@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from service.cli.errors import EXIT_UNUSABLE, UserError
 
 COMMANDS = (
-    *("run", "trace", "demo", "check", "trigger", "simulate-controller", "cameras", "grab", "focus"),
+    *("run", "trace", "demo", "check", "trigger", "simulate-controller", "simulate-service"),
+    *("cameras", "grab", "focus"),
     *("board", "calibrate", "align", "verify", "repeat", "teach-table"),
     *("probe", "jobs", "replay"),
     *("status", "halt", "resume", "reset", "install-service"),

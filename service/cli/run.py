@@ -16,7 +16,7 @@ from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_REFUSED, UserError
 
 if TYPE_CHECKING:
     from service.config import Config
-    from service.daemon import Daemon
+    from service.daemon import Daemon, Parts
     from service.journal import Job
 
 log = logging.getLogger("combtrace.daemon")
@@ -68,9 +68,6 @@ def summary(config: Config) -> str:
 
 
 async def _run(config: Config, config_path: Path, *, once: bool) -> int:
-    from service.daemon import Daemon
-    from service.reasons import Outcome
-    from service.trigger_queue import TriggerRefused
     from service.wiring import WiringError, build
 
     try:
@@ -78,13 +75,22 @@ async def _run(config: Config, config_path: Path, *, once: bool) -> int:
     except WiringError as error:
         raise UserError(str(error)) from error
     log.info("%s, process %d, %s: %s", version(), os.getpid(), config_path, summary(config))
+    return await serve(parts, config.controller.ready_timeout_s, once=once)
+
+
+async def serve(parts: Parts, ready_timeout_s: float, *, once: bool) -> int:
+    """Run the parts until a signal, or for one manual trigger; the exit status."""
+    from service.daemon import Daemon
+    from service.reasons import Outcome
+    from service.trigger_queue import TriggerRefused
+
     daemon = Daemon(parts, on_stop=_end_within_bound)
     signals = (signal.SIGTERM, signal.SIGINT)
     if not once:
         await daemon.run(on_signals=signals)
         return _left(daemon, EXIT_OK)
     try:
-        job = await daemon.run_once(config.controller.ready_timeout_s, on_signals=signals)
+        job = await daemon.run_once(ready_timeout_s, on_signals=signals)
     except TriggerRefused as refused:
         refusal = refused.reason.outcome is Outcome.REFUSED and not refused.not_ready
         status = EXIT_REFUSED if refusal else EXIT_FAILED

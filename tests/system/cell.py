@@ -25,11 +25,13 @@ class Cell:
         journal: str = "{path: journal.sqlite}",
         more: str = "",
         recipe: int = 0,
+        scenario: str = "",
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
         self._trigger_every += ("--recipe", str(recipe))
         camera = camera or f"{{kind: files, path: {SAMPLES}, loop: true}}"
         self.folder = folder
+        self.scenario = scenario  # the controller's, from its next start on
         self.port = free_port()
         self.journal = folder / "journal.sqlite"
         self.accepted = folder / "accepted.jsonl"
@@ -49,9 +51,11 @@ class Cell:
         return Process(self.folder / "service.log", "run", "--config", self.folder / "config.yaml")
 
     def start_controller(self) -> Process:
+        (self.folder / "scenario.yaml").write_text(self.scenario or "{}")
         return Process(
             self.folder / "controller.log",
             *("simulate-controller", "--tcp", f"127.0.0.1:{self.port}", *self._trigger_every),
+            *("--scenario", self.folder / "scenario.yaml"),
             *(
                 "--log",
                 self.accepted,

@@ -50,7 +50,15 @@ class Process:
 
     def stop(self, bound_s: float = 20) -> int:
         """SIGTERM, and its exit status."""
-        self._process.send_signal(signal.SIGTERM)
+        self.send(signal.SIGTERM)
+        return self.ended(bound_s)
+
+    def send(self, number: signal.Signals) -> None:
+        """A signal."""
+        self._process.send_signal(number)
+
+    def ended(self, bound_s: float = 20) -> int:
+        """Its exit status, once it has ended by itself."""
         try:
             return self._process.wait(bound_s)
         finally:
@@ -61,7 +69,7 @@ class Process:
 
     def reload(self) -> None:
         """SIGHUP."""
-        self._process.send_signal(signal.SIGHUP)
+        self.send(signal.SIGHUP)
 
     @property
     def running(self) -> bool:

@@ -8,7 +8,7 @@ import pytest
 
 from tests.real_parts import missing
 from tests.system import processes
-from tests.system.cell import Cell
+from tests.system.cell import SAMPLES, Cell
 from tests.system.processes import combtrace, jobs, until
 
 
@@ -34,22 +34,22 @@ def clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_jobs_go_on_whichever_way_the_clock_jumps(tmp_path: Path, clock: Path) -> None:
     cell = Cell(
         tmp_path,
+        camera=f"{{kind: files, path: {SAMPLES / '1-rectangle.jpg'}}}",
         trigger_every_s=0.2,
         link=", heartbeat_timeout_s: 30",
         more="archive: {path: archive, min_free_bytes: 0}\n",
     )
     try:
-        cell.goes_on(2)
+        cell.goes_on(1)
         for jump in ("+400d", "-9000d", "+0"):
             clock.write_text(f"{jump}\n")
-            cell.goes_on(3)
-        assert "-> Error" not in cell.service.text.partition("-> Ready")[2], cell.service.text
+            cell.goes_on(1)
         listed = combtrace("jobs", "--config", tmp_path / "config.yaml", "--limit", "100")
         assert listed.returncode == 0, listed.stderr
         cell.service.kill()
         clock.write_text("-9000d\n")  # started in the past: numbers still go up
         cell.service = cell.start_service()
-        cell.goes_on(2)
+        cell.goes_on(1)
         until(lambda: list(tmp_path.glob("archive/*/*.json")), what="evidence")
         assert cell.service.stop() == 0
     finally:
@@ -58,6 +58,5 @@ def test_jobs_go_on_whichever_way_the_clock_jumps(tmp_path: Path, clock: Path) -
     found = jobs(cell.journal)
     years = {str(job["taken_at"])[:4] for job in found}
     assert len(years) >= 3, f"the clock did not jump: {years}"
-    assert {job["outcome"] for job in found if job["outcome"]} <= {"accepted", "failed"}
-    failed = [job for job in found if job["outcome"] == "failed"]
-    assert all(job["reason"] == 154 for job in failed), "only what the kill cut short"
+    others = {(job["outcome"], job["reason"]) for job in found if job["outcome"] not in ("accepted", None)}
+    assert others <= {("failed", 154)}, "no frame is stale, no contour old, and only the kill cut a job short"

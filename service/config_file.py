@@ -8,7 +8,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from service.config import Config, Recipe
+from service.config import Config, Recipe, Service
 from service.config_mistakes import Location, describe
 
 LARGEST_FILE = 1_000_000
@@ -134,6 +134,21 @@ def default_config() -> Config:
 def config_schema() -> dict[str, Any]:
     """The JSON schema of config.yaml."""
     return {"$schema": SCHEMA_DIALECT, **Config.model_json_schema(), "title": "combtrace configuration"}
+
+
+def state_dir_of(path: Path) -> Path:
+    """The state folder that a file names, also where the rest of it is bad; raise ConfigError where it is no YAML.
+
+    A daemon that runs must stay within reach of a halt while somebody is still writing its next configuration.
+    """
+    try:
+        return load_config(path).service.state_dir
+    except ConfigError:
+        data = read_yaml(path)
+        service = data.get("service") if isinstance(data, dict) else None
+        named = service.get("state_dir") if isinstance(service, dict) else None
+        default = Service().state_dir
+        return path.resolve().parent / (Path(named) if isinstance(named, str) else default)
 
 
 def _resolved(config: Config, folder: Path) -> Config:

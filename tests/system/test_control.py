@@ -75,6 +75,19 @@ def test_a_reset_opens_everything_anew(cell: Cell, terminal: Terminal) -> None:
     assert terminal.line().startswith("DONE 1 ")
 
 
+@pytest.mark.parametrize("content", ["triggers: [", "service: {state_dir: state}\ntriggers: 7\ncolour: red\n"])
+def test_a_daemon_can_be_halted_while_its_configuration_is_being_written(cell: Cell, content: str) -> None:
+    config = cell.folder / "config.yaml"
+    config.write_text(content)
+    if content.endswith("["):  # not even YAML: nothing says where it keeps its state
+        lost = combtrace("halt", "--config", config)
+        assert (lost.returncode, "--state-dir" in lost.stderr) == (2, True)
+        halted = combtrace("halt", "--state-dir", cell.folder / "state")
+    else:
+        halted = combtrace("halt", "--config", config)
+    assert (halted.returncode, halted.stdout) == (0, "state Halted\n"), halted.stderr
+
+
 def test_the_socket_is_the_owners_and_groups_and_serves_several_and_odd_clients(cell: Cell) -> None:
     path = cell.folder / "state" / "control.sock"
     assert stat.S_IMODE(path.stat().st_mode) == 0o660

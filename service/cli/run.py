@@ -40,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run."""
+    from service.allocator import keep_few_arenas
     from service.config_file import ConfigError, load_config
     from service.logs import start_logging
 
@@ -48,6 +49,7 @@ def run(args: argparse.Namespace) -> int:
     except ConfigError as error:
         raise UserError(str(error)) from error
     start_logging(logging.DEBUG if args.verbose else getattr(logging, config.log.level.upper()), config.log.format)
+    keep_few_arenas()
     faulthandler.enable()  # systemd ends a process that hangs by SIGABRT: its log then says where
     return asyncio.run(_run(config, args.config, once=args.once))
 

@@ -313,7 +313,10 @@ class Link:
     def _service_due(self) -> bool:
         if self.settings.observe or self.ownership.conflict:
             return False
-        return self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S or not self.ownership.decided
+        # On a slow line as much earlier as requests take there, else a change would come later than it must.
+        ahead_s = min(self.round_trip_s or 0.0, HEARTBEAT_PERIOD_S / 2)
+        due = self._now() - self._written_at >= HEARTBEAT_PERIOD_S - ahead_s
+        return self._dirty or due or not self.ownership.decided
 
     async def _keep_service(self) -> None:
         """Write the service block where a change, the heartbeat or the ownership asks for it, and where it is ours."""

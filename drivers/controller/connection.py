@@ -38,6 +38,7 @@ NEXT_STEPS = {
     11: "Check the gateway, the line behind it, and device_id",
 }
 TIMER_STEP_S = 0.001  # epoll waits whole milliseconds, rounded up; t3.5 is 1.75 ms
+MOST_SINGLE_IN_A_ROW = 4  # while a page waits: a heartbeat takes three requests, and none may hold a page up for ever
 MAY_BE_DONE_LATER = (5, 11)  # these say that the request went on its way, not that it was refused
 
 
@@ -58,8 +59,9 @@ class _Exchange:
 class Connection:
     """An open wire, from here to its first fault.
 
-    Callers take turns, one request each, so that a heartbeat never waits for a whole page. A caller's next request goes
-    out from within the arrival of the reply to the one before: a page costs one wake-up of its task, not 17.
+    Callers take turns, one request each, and who has a single one goes before who has a row of them: a heartbeat waits
+    for one request of a page, never for a whole page. A row's next request goes out from within the arrival of the
+    reply to the one before: a page costs one wake-up of its task, not 17.
     """
 
     def __init__(self, wire: Wire, descriptor: Descriptor, device_id: int, timeout_s: float) -> None:
@@ -70,7 +72,9 @@ class Connection:
         self._frames = wire.frames(device_id)
         self._timeout_s = timeout_s
         self._loop = asyncio.get_running_loop()
-        self._turns: deque[_Exchange] = deque()
+        self._singles: deque[_Exchange] = deque()
+        self._rows: deque[_Exchange] = deque()
+        self._singles_in_a_row = 0
         self._under_way: _Exchange | None = None
         self._received = b""
         self._echo = b""
@@ -93,11 +97,12 @@ class Connection:
         for timer in (self._alarm, self._rest):
             if timer is not None:
                 timer.cancel()
-        for exchange in (self._under_way, *self._turns):
+        for exchange in (self._under_way, *self._singles, *self._rows):
             if exchange is not None and not exchange.done.done():
                 exchange.done.set_exception(_again(fault))
         self._under_way = None
-        self._turns.clear()
+        self._singles.clear()
+        self._rows.clear()
 
     async def run(self, requests: Sequence[Request]) -> list[bytes]:
         """The PDUs of the replies, known to match; the first refusal ends the row.
@@ -109,7 +114,7 @@ class Connection:
         if not requests:
             return []
         exchange = _Exchange(requests, self._loop.create_future())
-        self._turns.append(exchange)
+        (self._singles if len(requests) == 1 else self._rows).append(exchange)
         self._send_next()
         if len(requests) == 1:
             self._wait_in_place()
@@ -126,7 +131,8 @@ class Connection:
     def at_once(self, request: Request) -> bytes | None:
         """The reply's PDU where it comes promptly and is no refusal; None where `run` must ask for it."""
         if (
-            self._turns
+            self._singles
+            or self._rows
             or self._under_way
             or self.fault
             or self._in_place
@@ -134,7 +140,7 @@ class Connection:
         ):
             return None
         exchange = _Exchange((request,), self._loop.create_future())
-        self._turns.append(exchange)
+        self._singles.append(exchange)
         self._send_next()
         self._wait_in_place()
         if exchange.done.done() and exchange.done.exception() is None:
@@ -164,9 +170,8 @@ class Connection:
 
     def _send_next(self) -> None:
         """Send the request whose turn it is, once the line has been silent; nothing while one is under way."""
-        while self._turns and self._turns[0].done.done():  # cancelled in the queue
-            self._turns.popleft()
-        if self._under_way is not None or not self._turns or self.fault is not None:
+        turns = self._next_turn()
+        if self._under_way is not None or turns is None or self.fault is not None:
             return
         now = self._loop.time()
         left = self._silent_from + self._pace.silence_s - now
@@ -174,7 +179,8 @@ class Connection:
             if self._rest is None:
                 self._rest = self._rest_for(left)
             return
-        exchange = self._under_way = self._turns.popleft()
+        exchange = self._under_way = turns.popleft()
+        self._singles_in_a_row = self._singles_in_a_row + 1 if turns is self._singles else 0
         request = exchange.request
         data = self._frames.request(request)
         self._sent_at = now
@@ -184,6 +190,15 @@ class Connection:
         if self._pace.echo:
             self._echo = data
         self._channel.write(data)
+
+    def _next_turn(self) -> deque[_Exchange] | None:
+        """The queue whose first request goes next; None where nobody waits."""
+        for queue in (self._singles, self._rows):
+            while queue and queue[0].done.done():  # cancelled in the queue
+                queue.popleft()
+        if self._singles and not (self._rows and self._singles_in_a_row >= MOST_SINGLE_IN_A_ROW):
+            return self._singles
+        return self._rows or None
 
     def _wait_in_place(self) -> None:
         """Hold the event loop while replies come promptly, as long as `Promptness` allows."""
@@ -255,7 +270,7 @@ class Connection:
         else:
             exchange.replies.append(reply)
             if len(exchange.replies) < len(exchange.requests) and not exchange.done.done():
-                self._turns.append(exchange)
+                self._rows.append(exchange)
             elif not exchange.done.done():
                 exchange.done.set_result(exchange.replies)
         self._send_next()

@@ -46,6 +46,8 @@ __all__ = [
     "SerialLine",
 ]
 
+# Of the line, for one request of a page and its reply: our heartbeat waits for it, and is to change once a second.
+LONGEST_EXCHANGE_S = 0.2
 LATE_REPLIES = 4  # that one `connect` gets out of the way
 
 
@@ -69,6 +71,8 @@ class ModbusController:
         self._read_service = (read_registers(self._layout.service_address, BLOCK_REGISTERS),)
         self._timeout_s = timeout_s
         self._limits = limits or RequestLimits()
+        if wire.pace.byte_s:
+            self._limits = self._limits.within(LONGEST_EXCHANGE_S / wire.pace.byte_s)
         self._connecting = asyncio.Lock()
         self._connection: Connection | None = None
         self._opening: Connection | None = None
@@ -105,7 +109,7 @@ class ModbusController:
 
     @property
     def limits(self) -> RequestLimits:
-        """How long one request may be."""
+        """How long one request may be; on a slow line shorter than the controller would take."""
         return self._limits
 
     async def run(self, requests: Sequence[Request]) -> list[bytes]:

@@ -19,6 +19,8 @@ LONGEST_WRITE = 123  # registers in one FC16
 LONGEST_READ = 125  # registers in one FC3
 EXCEPTION_LENGTH = 2  # bytes of an exception's PDU
 SHORTEST_LIMIT = 32  # the page's header is read by one request, which `line_check.py` relies on
+WRITE_OVERHEAD = 17  # bytes of an FC16 and its reply on RTU beside the registers: 9 and 8
+READ_OVERHEAD = 13  # of an FC3 and its reply: 8 and 5
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,17 @@ class RequestLimits:
         for name, seen, largest in (("write", self.write, LONGEST_WRITE), ("read", self.read, LONGEST_READ)):
             if not SHORTEST_LIMIT <= seen <= largest:
                 raise MailboxError(f"longest_{name} is {seen}, expected {SHORTEST_LIMIT} to {largest} registers")
+
+    def within(self, line_bytes: float) -> RequestLimits:
+        """These, or shorter ones, so that an RTU request and its reply together have at most `line_bytes`.
+
+        None is shorter than `SHORTEST_LIMIT`, on however slow a line.
+        """
+        write, read = (int(line_bytes - overhead) // 2 for overhead in (WRITE_OVERHEAD, READ_OVERHEAD))
+        return RequestLimits(
+            min(self.write, max(write, SHORTEST_LIMIT)),
+            min(self.read, max(read, SHORTEST_LIMIT)),
+        )
 
 
 @dataclass(frozen=True, slots=True)

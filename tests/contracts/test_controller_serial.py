@@ -319,7 +319,7 @@ async def test_a_request_goes_out_after_three_and_a_half_characters_of_silence(
     await controller.write_transfer(0)
     await controller.write_page(Page((1, 0, 1, 1, 1, 1, 0, *(0,) * 24), (5,) * 402))
     await controller.close()
-    assert len(gaps) == 5
+    assert len(gaps) > 5
     assert settings.silence_s == pytest.approx(3.5 * 11 / 1200)
     assert min(gaps) >= settings.silence_s
 

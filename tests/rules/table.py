@@ -89,7 +89,7 @@ RULES = (
         "Service block: service_heartbeat changes at least once a second",
         f"{LINK}::Link._service_due",
         f"{IN_LINK}::test_our_heartbeat_changes_at_least_once_a_second_and_the_block_is_written_whole",
-        "return self._dirty or self._now() - self._written_at >= HEARTBEAT_PERIOD_S or not self.ownership.decided",
+        "return self._dirty or due or not self.ownership.decided",
         "return self._dirty or not self.ownership.decided",
     ),
     Rule(

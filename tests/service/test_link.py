@@ -8,6 +8,7 @@ import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -147,6 +148,25 @@ async def test_a_change_is_written_at_once_and_flush_waits_for_it() -> None:
         link.publish(job_id=42)
         assert await link.flush(2.0)
         assert controller.service.job_id == 42
+
+
+async def test_on_a_line_that_takes_its_time_our_heartbeat_still_changes_once_a_second() -> None:
+    request_s, now_s, written_at_s = 0.2, 0.0, []
+
+    class Slow(ScriptedController):
+        def _meet(self, *request: Any) -> bool:
+            nonlocal now_s
+            now_s += request_s
+            if request[0] == "write_service":
+                written_at_s.append(now_s)
+            return super()._meet(*request)
+
+    link = Link(Slow(), QUICK, now=lambda: now_s)
+    task = asyncio.ensure_future(link.run())
+    await until(lambda: len(written_at_s) > 5)
+    task.cancel()
+    await asyncio.wait([task])
+    assert max(after - before for before, after in itertools.pairwise(written_at_s)) < 1.0 - 1e-9
 
 
 async def test_flush_gives_up_when_the_controller_is_away() -> None:

@@ -497,6 +497,30 @@ class Metrics(Model):
     port: Port = Field(9771, description="TCP port.")
 
 
+class Page(Model):
+    """The operator's page and its REST interface over HTTP; needs the extra combtrace[page]."""
+
+    host: str = Field(
+        "127.0.0.1", min_length=1, description="Address to listen on; anything but loopback is open to the network."
+    )
+    port: Port = Field(9770, description="TCP port.")
+    names: tuple[str, ...] = Field(
+        (), description="Host names by which browsers may call it, besides its own address and localhost."
+    )
+    token_file: FilePath | None = Field(
+        None, description="File of mode 0600, a line 'name token' a person; none = the page can only be looked at."
+    )
+    language: Literal["en", "ru"] = Field("en", description="What the page speaks until a person chooses.")
+    certificate: FilePath | None = Field(None, description="TLS certificate chain, PEM; none = plain HTTP.")
+    key: FilePath | None = Field(None, description="Private key of the certificate, PEM.")
+
+    @model_validator(mode="after")
+    def _certificate_with_key(self) -> Self:
+        if (self.certificate is None) != (self.key is None):
+            raise ValueError("certificate and key: only one of them is given, expected both or none")
+        return self
+
+
 class Log(Model):
     """The log on standard error."""
 
@@ -524,6 +548,7 @@ class Config(Model):
     journal: JournalSettings = Field(default_factory=JournalSettings, description="The durable list of jobs.")
     archive: ArchiveSettings = Field(default_factory=ArchiveSettings, description="Where evidence is kept.")
     metrics: Metrics | None = Field(None, description="Figures for Prometheus; none = not served.")
+    page: Page | None = Field(None, description="The operator's page; none = not served.")
     log: Log = Field(default_factory=Log, description="The log.")
 
     @model_validator(mode="after")

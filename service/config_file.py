@@ -21,6 +21,9 @@ PATH_KEYS = (
     ("service", "state_dir"),
     ("journal", "path"),
     ("archive", "path"),
+    ("page", "token_file"),
+    ("page", "certificate"),
+    ("page", "key"),
 )
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

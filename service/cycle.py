@@ -150,6 +150,11 @@ class Cycle:
         """What traces and converts now."""
         return self._plan.measurer
 
+    @property
+    def recipes(self) -> Mapping[int, Recipe]:
+        """The recipes that jobs may name now."""
+        return self._plan.recipes
+
     async def run(self, job: Job) -> Job:
         """The job, settled."""
         course = _Course(job, self._plan)

@@ -48,6 +48,13 @@ class Closeable(Protocol):
         """Let it go."""
 
 
+class Page(Protocol):
+    """The operator's page; `service.web.server.PageServer`."""
+
+    async def run(self, operations: Operations) -> None:
+        """Serve it for ever."""
+
+
 @dataclass
 class Parts:
     """What wiring built from a configuration."""
@@ -69,6 +76,7 @@ class Parts:
     storage: StorageWatch | None = None
     reloader: Reloader | None = None
     metrics: Closeable | None = None
+    page: Page | None = None
     state_dir: Path | None = None
 
 
@@ -137,6 +145,8 @@ class Daemon:
             parts.health, parts.executor, self.supervisor, Halt(parts.state_dir), self._before_reset
         )
         self.supervisor.add(CONTROL_PART, ControlServer(parts.state_dir, operations.commands()).run)
+        if parts.page is not None:
+            self.supervisor.add("page", partial(parts.page.run, operations))
 
     def _before_reset(self) -> None:
         self._ports_are_being_opened()

@@ -33,6 +33,7 @@ RESTORED = (
 )
 UNSETTLED = "outcome IS NULL"
 PRUNED_AT_ONCE = 500  # rows: some milliseconds, for a job may wait behind it
+MOST_NOTES = 10_000  # of the audit: who asked for what
 LARGEST_LOG_BYTES = 8_000_000  # of the write-ahead log, once it was taken over into the file
 
 
@@ -297,6 +298,23 @@ class Journal:
             ),
             terms,
         )
+
+    def note(self, who: str | None, address: str, action: str, detail: str | None = None) -> int:
+        """Make durable that somebody asks for `action`, before it is done; the number of the note.
+
+        who: None where nobody proved to be anybody. Of more than MOST_NOTES the oldest are let go.
+        """
+        with self._transaction() as db:
+            values = self._stamp(), who, address, action, detail
+            query = "INSERT INTO audit (at, who, address, action, detail) VALUES (?, ?, ?, ?, ?)"
+            number = int(db.execute(query, values).lastrowid or 0)
+            db.execute("DELETE FROM audit WHERE id <= ?", (number - MOST_NOTES,))
+        return number
+
+    def note_result(self, number: int, result: str) -> None:
+        """Make durable what became of it."""
+        with self._transaction() as db:
+            db.execute("UPDATE audit SET result = ? WHERE id = ?", (result, number))
 
     def prune(self, keep: int) -> int:
         """Delete the oldest of more than `keep` jobs, some at a time; how many that were.

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from service.journal_schema import SCHEMA_VERSION, columns
 from service.reasons import Outcome, Reason
 
 BUSY_S = 5.0
+NOTES_SINCE = 3  # version of the journal
 
 
 class JournalUnreadable(Exception):
@@ -22,23 +24,44 @@ class JournalUnreadable(Exception):
 
 
 @dataclass(frozen=True)
+class Note:
+    """Who asked for what, when and from where. who None = nobody proved to be anybody; result None = cut short."""
+
+    at: str
+    who: str | None
+    address: str
+    action: str
+    detail: str | None
+    result: str | None
+
+
+@dataclass(frozen=True)
 class JobFilter:
-    """Which jobs: taken at `since` or later, ended so, for this reason; None = whatever it is."""
+    """Which jobs: taken at `since` or later, ended so, for this reason, numbered below; None = whatever it is.
+
+    faulty: only those that were refused or have failed.
+    """
 
     since: datetime | None = None
     outcome: Outcome | None = None
     reason: Reason | None = None
+    below: int | None = None
+    faulty: bool = False
 
     def condition(self) -> tuple[str, tuple[Any, ...]]:
         """As SQL, with its values."""
-        wanted: list[tuple[str, Any]] = []
+        wanted: list[tuple[str, tuple[Any, ...]]] = []
         if self.since is not None:  # the journal's times are UTC in one form, so they sort as text
-            wanted.append(("taken_at >= ?", self.since.astimezone(UTC).isoformat(timespec="milliseconds")))
+            wanted.append(("taken_at >= ?", (self.since.astimezone(UTC).isoformat(timespec="milliseconds"),)))
         if self.outcome is not None:
-            wanted.append(("outcome = ?", str(self.outcome)))
+            wanted.append(("outcome = ?", (str(self.outcome),)))
         if self.reason is not None:
-            wanted.append(("reason = ?", int(self.reason)))
-        return " AND ".join(text for text, _ in wanted) or "1", tuple(value for _, value in wanted)
+            wanted.append(("reason = ?", (int(self.reason),)))
+        if self.below is not None:
+            wanted.append(("job_id < ?", (self.below,)))
+        if self.faulty:
+            wanted.append(("outcome IN (?, ?)", (str(Outcome.REFUSED), str(Outcome.FAILED))))
+        return " AND ".join(text for text, _ in wanted) or "1", tuple(chain.from_iterable(one for _, one in wanted))
 
 
 class JournalReader:
@@ -53,6 +76,7 @@ class JournalReader:
                 f"{path}: journal of schema version {version}, this combtrace reads 1 to {SCHEMA_VERSION}. "
                 "Use the version that wrote it, or name another journal.path"
             )
+        self._version = version
         self._columns = columns(version)
 
     def jobs(self, wanted: JobFilter, limit: int | None = None) -> list[Job]:
@@ -65,6 +89,13 @@ class JournalReader:
         """The job, or None."""
         rows = self._read(f"SELECT {self._columns} FROM jobs WHERE job_id = ?", (job_id,))
         return job_of(rows[0]) if rows else None
+
+    def notes(self, limit: int) -> list[Note]:
+        """The newest `limit` notes of who asked for what, newest first; none in journals of before version 3."""
+        if self._version < NOTES_SINCE:
+            return []
+        query = "SELECT at, who, address, action, detail, result FROM audit ORDER BY id DESC LIMIT ?"
+        return [Note(*row) for row in self._read(query, (limit,))]
 
     def _read(self, query: str, values: tuple[Any, ...] = ()) -> list[Any]:
         try:

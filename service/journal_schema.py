@@ -1,13 +1,26 @@
 """The journal's tables, and the steps by which a journal of an earlier version becomes one of this.
 
 Version 2 added what a job was carried out with (its recipe's whole settings, the calibration's hash) and its transfer.
+Version 3 added who asked for what from the operator's page.
 """
 
 from __future__ import annotations
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
-TABLES = """
+AUDIT = """
+CREATE TABLE audit (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    at TEXT NOT NULL,
+    who TEXT,
+    address TEXT NOT NULL,
+    action TEXT NOT NULL,
+    detail TEXT,
+    result TEXT
+) STRICT;
+"""
+
+TABLES = f"""
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 CREATE TABLE recipe_settings (digest TEXT PRIMARY KEY, settings TEXT NOT NULL) STRICT;
 CREATE TABLE jobs (
@@ -32,7 +45,7 @@ CREATE TABLE jobs (
 ) STRICT;
 CREATE INDEX jobs_unsettled ON jobs (job_id) WHERE outcome IS NULL;
 CREATE INDEX jobs_by_controller ON jobs (job_id) WHERE trigger_counter IS NOT NULL;
-"""
+{AUDIT}"""
 
 # Each from the version that is its key to the next.
 MIGRATIONS = {
@@ -42,6 +55,7 @@ ALTER TABLE jobs ADD COLUMN recipe_digest TEXT;
 ALTER TABLE jobs ADD COLUMN calibration TEXT;
 ALTER TABLE jobs ADD COLUMN transfer TEXT;
 """,
+    2: AUDIT,
 }
 
 COLUMNS_OF_1 = (

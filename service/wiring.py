@@ -38,6 +38,7 @@ from service.config import (
     NoController,
 )
 from service.config import Metrics as MetricsSettings
+from service.config import Page as PageSettings
 from service.config import SerialTrigger as SerialTriggerSettings
 from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation, Plan
 from service.daemon import Parts
@@ -145,6 +146,8 @@ def build(
     _add_triggers(config, parts)
     if config.metrics is not None:
         _add_metrics(config.metrics, parts, cycle)
+    if config.page is not None:
+        _add_page(config, config.page, parts, cycle)
     return parts
 
 
@@ -200,6 +203,49 @@ def _add_metrics(settings: MetricsSettings, parts: Parts, cycle: Cycle) -> None:
         parts.lock.release()
         raise WiringError(str(error)) from error
     parts.executor.on_settled.append(metrics.job_ended)
+
+
+def _add_page(config: Config, settings: PageSettings, parts: Parts, cycle: Cycle) -> None:
+    """Serve the operator's page, which only then has to be installed."""
+    try:
+        from service.web.server import PageError, make_page
+        from service.web.window import Sources
+    except ModuleNotFoundError as error:
+        parts.journal.close()
+        parts.lock.release()
+        raise WiringError(f"page: {error.name} is not installed. Install combtrace[page], or remove page") from error
+    sources = Sources(
+        parts.health,
+        parts.executor,
+        parts.journal,
+        config.journal.path,
+        config.archive.path,
+        config.archive.max_bytes,
+        lambda: tuple((number, recipe.name) for number, recipe in sorted(cycle.recipes.items())),
+        lambda: cycle.measurer.guard,
+        camera=config.camera.kind,
+        controller=controller_words(config),
+        link=parts.link,
+        archive=parts.archive,
+        storage=parts.storage,
+    )
+    try:
+        parts.page = make_page(settings, sources)
+    except PageError as error:
+        if parts.metrics is not None:
+            parts.metrics.close()
+        parts.journal.close()
+        parts.lock.release()
+        raise WiringError(str(error)) from error
+
+
+def controller_words(config: Config) -> str:
+    """What the controller is, for a person: its kind, and where."""
+    controller = config.controller
+    if isinstance(controller, NoController):
+        return controller.kind
+    where = f"{controller.host}:{controller.port}" if not isinstance(controller, ModbusRtu) else controller.port
+    return f"{controller.kind} {where}"
 
 
 def _make_archive(config: Config) -> ArchiveWriter | None:

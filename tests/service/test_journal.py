@@ -12,6 +12,7 @@ import pytest
 
 from drivers.controller.mailbox import Page
 from service.journal import Journal, JournalConflict, JournalError, JournalFull, Terms, TriggerStamp
+from service.journal_reader import reading
 from service.reasons import Outcome, Reason
 
 PAGE = Page(tuple(range(31)), (1, 2, 3, 4, 0xFFFF, 0))
@@ -126,7 +127,7 @@ def test_a_journal_of_another_version_is_refused_by_its_number(tmp_path: Path) -
     database = sqlite3.connect(path)
     database.execute("PRAGMA user_version = 99")
     database.close()
-    with pytest.raises(JournalError, match="schema version 99, expected 1 to 2"):
+    with pytest.raises(JournalError, match="schema version 99, expected 1 to 3"):
         Journal(path)
 
 
@@ -252,6 +253,25 @@ def test_a_journal_of_version_1_opens_with_all_it_held_and_goes_on(tmp_path: Pat
     again = Journal(tmp_path / "journal.sqlite")
     assert again.last_taken() is not None
     again.close()
+
+
+def test_notes_of_who_asked_for_what_last_and_only_the_newest_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.journal.MOST_NOTES", 3)
+    path = version_1(tmp_path / "journal.sqlite")
+    with reading(path) as reader:
+        assert reader.notes(10) == []
+    journal = Journal(path)
+    for k in range(5):
+        number = journal.note("anna" if k else None, "192.0.2.7", "halt", f"blade {k}")
+    journal.note_result(number, "Halted")
+    journal.close()
+    with reading(path) as reader:
+        notes = reader.notes(10)
+    assert [note.detail for note in notes] == ["blade 4", "blade 3", "blade 2"]
+    assert (notes[0].who, notes[0].address, notes[0].action, notes[0].result) == ("anna", "192.0.2.7", "halt", "Halted")
+    assert notes[1].result is None
 
 
 def test_a_migration_that_fails_leaves_the_old_journal_as_it_was(tmp_path: Path) -> None:

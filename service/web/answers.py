@@ -1,0 +1,240 @@
+"""What the REST interface is asked and answers, as models: each answer is made through one, and OpenAPI tells them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Milliseconds = dict[str, float]
+
+
+class Answer(BaseModel):
+    """Exactly these fields."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Problem(Answer):
+    """What went wrong, as a sentence; where a reason of the table applies, its code and name."""
+
+    error: str
+    code: int | None = None
+    name: str | None = None
+
+
+class Fault(Answer):
+    """Why a part does not work; texts for people by `code` in /api/v1/reasons."""
+
+    code: int
+    name: str
+    text: str
+    starting: bool = Field(description="It has not been tried yet.")
+
+
+class LastJob(Answer):
+    """How the last job ended."""
+
+    job: int
+    outcome: str | None
+    code: int
+    name: str | None
+    detail: str | None
+    settled_at: str | None
+
+
+class TriggerCount(Answer):
+    """Triggers by what became of them since the start."""
+
+    kind: str
+    what: str
+    count: int
+
+
+class OutcomeCount(Answer):
+    """Ended jobs since the start."""
+
+    outcome: str
+    reason: str | None
+    count: int
+
+
+class Part(Answer):
+    """A part of the service: how often it was started again."""
+
+    name: str
+    restarts: int
+    last_error: str | None
+    failed_at: str | None
+
+
+class RecipeName(Answer):
+    """A recipe that a job may name."""
+
+    number: int
+    name: str
+
+
+class CameraState(Answer):
+    """The camera."""
+
+    what: str
+    up: bool
+
+
+class LinkState(Answer):
+    """The controller's connection."""
+
+    what: str
+    up: bool
+    not_ready: str | None = Field(description="Why the controller would not take a contour now.")
+    round_trip_ms: float | None
+    connections: int
+
+
+class CalibrationState(Answer):
+    """The calibration in use. max_age_days 0 = no limit."""
+
+    digest: str
+    age_days: float | None
+    max_age_days: float
+
+
+class DiskState(Answer):
+    """Room for journal and evidence."""
+
+    journal_free_bytes: int | None
+    archive_bytes: int
+    archive_max_bytes: int
+    archive_jobs: int
+
+
+class ServiceState(Answer):
+    """The service now. States are OPC 40100-1's."""
+
+    version: str
+    process: int
+    uptime_s: float
+    state: str
+    service_state: int
+    reason: str | None
+    code: int = Field(description="Of the fault to repair first; 0 = none.")
+    since_s: float
+    job: int | None = Field(description="Being executed.")
+    waiting: int
+    settled_job: int
+    last_job: LastJob | None
+    missed_triggers: int
+    triggers: list[TriggerCount]
+    faults: dict[str, Fault]
+    warnings: dict[str, str]
+    parts: list[Part]
+    outcomes: list[OutcomeCount]
+    recipes: list[RecipeName]
+    camera: CameraState
+    link: LinkState | None
+    calibration: CalibrationState | None
+    disk: DiskState
+
+
+class TriggerOrigin(Answer):
+    """Where a job came from."""
+
+    kind: str
+    recipe: int
+    thickness_um: int
+    session: int | None
+    counter: int | None
+
+
+class Job(Answer):
+    """A job as the journal holds it, and which of its files the archive keeps."""
+
+    job_id: int
+    taken_at: str
+    settled_at: str | None
+    trigger: TriggerOrigin
+    outcome: Literal["accepted", "written", "refused", "failed"] | None
+    reason: int | None
+    reason_name: str | None
+    detail: str | None
+    report: dict[str, Any]
+    recipe: dict[str, Any] | None
+    calibration: str | None
+    transfer: dict[str, Any]
+    files: list[str] = Field(description="Names for /api/v1/jobs/{job}/files/{name}; empty where nothing is kept.")
+
+
+class Jobs(Answer):
+    """Jobs, newest first."""
+
+    jobs: list[Job]
+
+
+class ReasonText(Answer):
+    """A reason in one language."""
+
+    sentence: str
+    next_action: str
+
+
+class ReasonEntry(Answer):
+    """A reason by which jobs are not accepted."""
+
+    code: int
+    name: str
+    outcome: str
+    en: ReasonText
+    ru: ReasonText
+
+
+class Reasons(Answer):
+    """The table of reasons."""
+
+    reasons: list[ReasonEntry]
+
+
+class NoteEntry(Answer):
+    """Who asked for what. who null = nobody proved to be anybody; result null = it was cut short."""
+
+    at: str
+    who: str | None
+    address: str
+    action: str
+    detail: str | None
+    result: str | None
+
+
+class Notes(Answer):
+    """The audit, newest first."""
+
+    notes: list[NoteEntry]
+
+
+class Triggered(Answer):
+    """The job that was taken; null where it waits for its turn."""
+
+    job: int | None
+
+
+class StateAfter(Answer):
+    """The state that followed."""
+
+    state: str
+
+
+class TriggerRequest(Answer):
+    """recipe 0 = the configured default, thickness_mm 0 = the recipe's."""
+
+    recipe: Annotated[int, Field(ge=0, le=65_535)] = 0
+    thickness_mm: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)] = 0.0
+
+
+class HaltRequest(Answer):
+    """Why, for those who find it halted."""
+
+    reason: Annotated[str, Field(max_length=200)] = ""
+
+
+class Nothing(Answer):
+    """An empty object."""

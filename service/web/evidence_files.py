@@ -1,0 +1,104 @@
+"""A job's evidence as the page hands it out: files by fixed names, and small pictures made from the frame.
+
+No part of a path comes from a request: a job is a number, and a file one of FILES.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from service.archive import folder_of
+from service.evidence import FRAME, OVERLAY
+from service.export.forms import ENDINGS
+from service.journal import Job
+
+DOCUMENT = "document.json"
+FILES = {
+    FRAME: "image/png",
+    OVERLAY: "image/jpeg",
+    DOCUMENT: "application/json",
+    **{f"contour.{ending}": "application/octet-stream" for ending in ENDINGS.values()},
+}
+WIDTHS_PX = (320, 1600)
+JPEG_QUALITY = 82
+NICENESS = 10  # a job goes before a look at one
+MOST_KEPT_BYTES = 16_000_000
+
+
+class NoPicture(Exception):
+    """There is no frame to show: what was found."""
+
+
+def file_of(archive: Path, job: Job, name: str) -> Path | None:
+    """Where one of FILES of a job is; None where nothing is kept. Raise KeyError for other names."""
+    if name not in FILES:
+        raise KeyError(name)
+    suffix = f"{job.outcome}.json" if name == DOCUMENT else name
+    path = folder_of(archive, job.job_id) / f"{job.job_id}-{suffix}"
+    return path if path.is_file() and not path.is_symlink() else None
+
+
+def files_kept(archive: Path, job: Job) -> list[str]:
+    """The names of what is kept of a job. Without the document, which is written last, the rest does not count."""
+    if job.outcome is None or file_of(archive, job, DOCUMENT) is None:
+        return []
+    return [name for name in FILES if file_of(archive, job, name) is not None]
+
+
+class Pictures:
+    """Frames made small, one at a time in a thread of low priority; the last ones are kept."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, "page pictures", initializer=_go_last)
+        self._kept: OrderedDict[tuple[str, int], bytes] = OrderedDict()
+        self._bytes = 0
+
+    def close(self) -> None:
+        """Let the thread end; what it is making is not waited for."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    async def small(self, frame: Path, tag: str, width_px: int) -> bytes:
+        """The frame at most `width_px` wide, as JPEG; raise NoPicture. tag: changes when the file does."""
+        key = f"{frame} {tag}", width_px
+        if key not in self._kept:
+            made = await asyncio.get_running_loop().run_in_executor(self._pool, _made_small, frame, width_px)
+            self._keep(key, made)
+        self._kept.move_to_end(key)
+        return self._kept[key]
+
+    def _keep(self, key: tuple[str, int], picture: bytes) -> None:
+        if key in self._kept:  # two asked at once
+            return
+        self._kept[key] = picture
+        self._bytes += len(picture)
+        while self._bytes > MOST_KEPT_BYTES and len(self._kept) > 1:
+            _, old = self._kept.popitem(last=False)
+            self._bytes -= len(old)
+
+
+def _go_last() -> None:
+    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+
+
+def _made_small(frame: Path, width_px: int) -> bytes:
+    try:
+        data = np.frombuffer(frame.read_bytes(), np.uint8)
+    except OSError as error:
+        raise NoPicture(f"the frame cannot be read: {error.strerror}") from error
+    pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    if pixels is None:
+        raise NoPicture("the frame's file is no picture")
+    height, width = pixels.shape[:2]
+    if width > width_px:
+        size = width_px, max(round(height * width_px / width), 1)
+        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
+    _, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return jpeg.tobytes()

@@ -1,0 +1,85 @@
+"""The operations of the REST interface, as the OpenAPI document tells them."""
+
+from __future__ import annotations
+
+from service.web import answers
+from service.web.evidence_files import FILES, WIDTHS_PX
+from service.web.openapi import Operation, Parameter
+
+MOST_JOBS = 200
+MOST_NOTES = 1000
+
+_SILENT = {503: "The service does not answer, or its journal cannot be read."}
+_NO_JOB = {404: "There is no such job, or nothing is kept of it.", **_SILENT}
+_ORDER = {
+    401: "No token, or a wrong one.",
+    403: "No token file is configured, or another site's page asks.",
+    409: "Not at this moment: `error`, and where the table has it, `code` and `name` say why.",
+    422: "The body is not as expected.",
+    429: "Too many wrong tokens, or too many commands: see Retry-After.",
+    503: "The service does not answer, or the journal cannot keep who asked.",
+}
+_JOB = Parameter("job", {"type": "integer", "minimum": 1}, "Its number.", required=True)
+
+OPERATIONS = (
+    Operation("GET", "/state", "The service now", answers.ServiceState, _SILENT),
+    Operation(
+        "GET",
+        "/jobs",
+        "The newest jobs, newest first",
+        answers.Jobs,
+        {400: "A parameter is not as expected.", **_SILENT},
+        (
+            Parameter("limit", {"type": "integer", "minimum": 1, "maximum": MOST_JOBS, "default": 24}, "Most of them."),
+            Parameter("before", {"type": "integer", "minimum": 1}, "Only jobs with numbers below."),
+            Parameter("only_refused", {"type": "boolean", "default": False}, "Only those refused or failed."),
+        ),
+    ),
+    Operation("GET", "/jobs/{job}", "One job", answers.Job, _NO_JOB, (_JOB,)),
+    Operation(
+        "GET",
+        "/jobs/{job}/files/{name}",
+        "A file of a job's evidence",
+        "application/octet-stream",
+        _NO_JOB,
+        (_JOB, Parameter("name", {"type": "string", "enum": list(FILES)}, "Which.", required=True)),
+    ),
+    Operation(
+        "GET",
+        "/frames/{job}",
+        "A job's frame, made small",
+        "image/jpeg",
+        {400: "A parameter is not as expected.", **_NO_JOB},
+        (_JOB, Parameter("width", {"type": "integer", "enum": list(WIDTHS_PX)}, "At most so wide, px.")),
+    ),
+    Operation("GET", "/reasons", "Why jobs are not accepted, in words", answers.Reasons, {}),
+    Operation(
+        "GET",
+        "/audit",
+        "Who asked for what, newest first",
+        answers.Notes,
+        {code: text for code, text in _ORDER.items() if code not in (409, 422)},
+        (Parameter("limit", {"type": "integer", "minimum": 1, "maximum": MOST_NOTES, "default": 100}, "Most."),),
+        token=True,
+    ),
+    Operation(
+        "POST",
+        "/trigger",
+        "One job: taken, or, with job null, waiting for its turn",
+        answers.Triggered,
+        _ORDER,
+        request=answers.TriggerRequest,
+        status=202,
+        token=True,
+    ),
+    Operation(
+        "POST",
+        "/halt",
+        "No trigger is taken until the halt is ended, over restarts too",
+        answers.StateAfter,
+        _ORDER,
+        request=answers.HaltRequest,
+        token=True,
+    ),
+    Operation("POST", "/resume", "End a halt", answers.StateAfter, _ORDER, request=answers.Nothing, token=True),
+)

@@ -1,0 +1,183 @@
+"""The page's server: HTTP in a thread and a loop of its own, so that no browser can hold up a job or a heartbeat."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib.metadata
+import logging
+import socket
+import ssl
+from asyncio import Transport
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import Response
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from service.config import Page as PageSettings
+from service.operations import Operations
+from service.web.api import Api, problem
+from service.web.guard import Guard
+from service.web.orders import Orders
+from service.web.tokens import TokenFile, TokenFileError
+from service.web.window import Sources, Window
+
+log = logging.getLogger("combtrace.page")
+
+MOST_CONNECTIONS = 64  # beyond, a new one is closed: a flood must not use up the descriptors that jobs need
+FIRST_REQUEST_S = 10.0
+KEEP_ALIVE_S = 10
+LARGEST_HEAD = 16_384
+STOP_S = 1
+THREAD_ENDS_S = 5.0
+
+
+class PageError(Exception):
+    """The page cannot be served: where, why, what to do."""
+
+
+class _BoundedHttp(H11Protocol):
+    """HTTP/1.1 for a bounded number of connections, each of which has to ask for something soon."""
+
+    _soon: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
+        """A connection, closed at once where there are too many."""
+        if len(self.connections) >= MOST_CONNECTIONS:
+            transport.abort()
+            return
+        super().connection_made(transport)
+        self._soon = self.loop.call_later(FIRST_REQUEST_S, self._close_unless_asked)
+
+    def _close_unless_asked(self) -> None:
+        if not self.cycle:  # of a request; there has been none
+            self.transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Its end."""
+        if self._soon is not None:
+            self._soon.cancel()
+            super().connection_lost(exc)
+
+
+class PageServer:
+    """Serves page and REST interface; listens from the start, answers while `run` runs."""
+
+    def __init__(self, settings: PageSettings, sources: Sources, version: str) -> None:
+        """Raise PageError where the token file, the certificate or the address cannot be used."""
+        self._settings = settings
+        tokens = None if settings.token_file is None else TokenFile(settings.token_file)
+        try:
+            if tokens is not None:
+                tokens.read()
+        except TokenFileError as error:
+            raise PageError(f"page: {error}") from error
+        _check_certificate(settings)
+        self.window = Window(sources)
+        orders = Orders(self.window, sources.journal, tokens)
+        self._make_api: Callable[[], Api] = lambda: Api(self.window, orders, version)
+        self._socket: socket.socket | None = _bound(settings.host, settings.port)
+
+    async def run(self, operations: Operations) -> None:
+        """Serve for ever; in the daemon's loop."""
+        self.window.open(operations)
+        if self._socket is None:
+            self._socket = _bound(self._settings.host, self._settings.port)
+        listener, self._socket = self._socket, None
+        api = self._make_api()
+        server = uvicorn.Server(self._server_settings(api))
+        thread = ThreadPoolExecutor(1, "page")
+        serving = asyncio.get_running_loop().run_in_executor(thread, _serve, server, listener)
+        log.info("page: %s", self.address)
+        try:
+            await asyncio.shield(serving)
+        finally:
+            server.should_exit = True
+            api.close()
+            await asyncio.wait([serving], timeout=THREAD_ENDS_S)
+            thread.shutdown(wait=False)
+        raise PageError("the page's server ended, expected it to run for ever")
+
+    @property
+    def address(self) -> str:
+        """Where it is, for people."""
+        host = f"[{self._settings.host}]" if ":" in self._settings.host else self._settings.host
+        return f"http{'s' if self._settings.certificate else ''}://{host}:{self._settings.port}/"
+
+    def _server_settings(self, api: Api) -> uvicorn.Config:
+        settings = self._settings
+        return uvicorn.Config(
+            Guard(application(api), settings.names),
+            loop="asyncio",
+            http=_BoundedHttp,
+            ws="none",
+            lifespan="off",
+            log_config=None,
+            log_level="warning",
+            access_log=False,
+            proxy_headers=False,  # else a header could say from where a command comes
+            server_header=False,
+            timeout_keep_alive=KEEP_ALIVE_S,
+            timeout_graceful_shutdown=STOP_S,
+            h11_max_incomplete_event_size=LARGEST_HEAD,
+            ssl_certfile=settings.certificate,
+            ssl_keyfile=settings.key,
+        )
+
+
+def application(api: Api) -> Starlette:
+    """All that is served; what is not there is told as every error is."""
+
+    async def unknown(_request: Request, _error: Exception) -> Response:
+        return problem(404, "there is nothing here. See /api/v1/openapi.json")
+
+    async def wrong_method(_request: Request, _error: Exception) -> Response:
+        return problem(405, "not by this method. See /api/v1/openapi.json")
+
+    return Starlette(routes=api.routes(), exception_handlers={404: unknown, 405: wrong_method})
+
+
+def _serve(server: uvicorn.Server, listener: socket.socket) -> None:
+    try:
+        server.run([listener])
+    except SystemExit as error:  # in the daemon's loop it would end the daemon
+        raise PageError(f"the page's server gave up (status {error.code})") from error
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    """A listening socket; raise PageError."""
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listener = socket.socket(family, kind, protocol)
+        try:
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            listener.bind(address)
+            listener.listen(MOST_CONNECTIONS)
+        except OSError:
+            listener.close()
+            raise
+    except OSError as error:
+        raise PageError(
+            f"page: {host}:{port} cannot be listened on: {error.strerror or error}. Set another page.host or page.port"
+        ) from error
+    return listener
+
+
+def _check_certificate(settings: PageSettings) -> None:
+    if settings.certificate is None or settings.key is None:
+        return
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(settings.certificate, settings.key)
+    except (OSError, ssl.SSLError) as error:
+        raise PageError(
+            f"page: certificate {settings.certificate} and key {settings.key} cannot be used: "
+            f"{error.strerror or error}. Expected PEM files that belong together"
+        ) from error
+
+
+def make_page(settings: PageSettings, sources: Sources) -> PageServer:
+    """The page as the configuration has it; raise PageError."""
+    return PageServer(settings, sources, importlib.metadata.version("combtrace"))

@@ -85,19 +85,22 @@ def judge(
     traced: Trace | None = None,
     region: Region | None = None,
     budget: ErrorBudget | None = None,
+    picture: NDArray[np.uint8] | None = None,
 ) -> tuple[Finding, ...]:
     """Every reason to refuse the polygon, lowest code first; empty = accepted.
 
     `frame_size` is (width, height) in pixels, `region` what was looked at of it. `traced`, what the polygon was made
     of, adds what was seen besides. Where there is a limit to the uncertainty in millimetres, a `budget` of None (nobody
-    knows it) is refused as one too large.
+    knows it) is refused as one too large. Where cells turn out to be none, the `picture` is judged as a whole, too: by
+    a pitch that is none nothing looks blurred.
     """
     # With a margin the polygon may well leave the picture; what was seen may not.
     outlines = [traced.contour.exterior] if traced else [polygon.pixels.exterior]
+    nothing = [finding for finding in (_no_walls(traced, limits.quality), _no_comb(traced)) if finding]
     findings = [
         *_quality(traced, limits.quality),
-        _no_walls(traced, limits.quality),
-        _no_comb(traced),
+        *_picture(picture if nothing else None),
+        *nothing,
         _touches_region(outlines, region, limits.border_px),
         _touches_border(outlines, frame_size, limits.border_px),
         _goes_on(traced),
@@ -136,8 +139,7 @@ def judge_without_block(picture: NDArray[np.uint8], text: str) -> tuple[Finding,
     """Why there is no contour, lowest code first: what is wrong with the picture as a whole, and `text`, which says
     what was looked for in vain.
     """
-    faults = picture_faults(picture)
-    return (*(_bad_picture(fault) for fault in faults), Finding(Refusal.NO_BLOCK_FOUND, text))
+    return (*_picture(picture), Finding(Refusal.NO_BLOCK_FOUND, text))
 
 
 def judge_table(look: TableLook, limits: TableLimits) -> tuple[Finding, ...]:
@@ -177,6 +179,10 @@ def _quality(traced: Trace | None, limits: QualityLimits) -> list[Finding]:
         return []
     faults = quality_faults(traced.quality, limits)
     return [_bad_picture(". Besides, ".join(faults))] if faults else []
+
+
+def _picture(picture: NDArray[np.uint8] | None) -> list[Finding]:
+    return [] if picture is None else [_bad_picture(fault) for fault in picture_faults(picture)]
 
 
 def _bad_picture(fault: str) -> Finding:

@@ -14,12 +14,23 @@ _WIDEST_WALL = 0.31
 _REGULAR = 0.5
 _FEW_CELLS = 18
 _POOR_SCORE = 0.23
+# Cells of combs are convex: of 250 scenes none has less than 0.93. Foam has 0.82, letters, codes, weaves and noise 0.54
+# to 0.88.
+_CONVEX = 0.9
+# Foam has order, too: 0.38 at least. Letters between walls as narrow as a comb's, codes and noise have 0.2 at most.
+_LEAST_ORDER = 0.3
+# Of combs of which broken walls leave few whole cells the least is 0.22; of a few large cells nearly all lie at the
+# border. Scratches, nuts, and the squares of a board that lie apart have 0.16 at most.
+_ORDER_OF_SCATTERED = 0.18
 
 
 @dataclass(frozen=True)
 class Comb:
     """Cells as they were seen: pitch and wall width in pixels, whether walls are bright, the cells counted in the part
     that was looked at, how good a comb they make (0 to 1), and the share that is regular and fills its place (0 to 1).
+
+    order: share of the cells with neighbours all around, a pitch away. solid: share of its convex hull that a cell
+    fills, the median.
     """
 
     pitch_px: float
@@ -28,18 +39,39 @@ class Comb:
     count: int
     score: float
     regular: float
+    order: float = 1.0
+    solid: float = 1.0
+
+
+def surely_comb(comb: Comb) -> bool:
+    """Whether cells are so many, convex and orderly that they make a comb, in however many pieces it lies."""
+    many = comb.count >= _FEW_CELLS and comb.wall_px < _WIDEST_WALL * comb.pitch_px
+    return many and comb.solid >= _CONVEX and comb.order >= _ORDER_OF_SCATTERED
 
 
 def unlike_comb(comb: Comb) -> str | None:
     """Why this is no cut honeycomb, as a sentence with what was measured and what to do; None where it may be one."""
     share = (comb.wall_px - _BLUR_PX) / comb.pitch_px
     # Foam has wide bright walls, and cells of all sizes between them.
-    solid = not comb.bright or comb.regular > _REGULAR
-    if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and solid:
+    even = not comb.bright or comb.regular > _REGULAR
+    if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and even:
         return (
             f"what lies between patches {comb.pitch_px:.0f} px apart is {100 * share:.0f} % as wide as that, cell "
             f"walls are {100 * _WIDEST_WALL:g} % at most: a board, a print, or a perforated plate. Check that a block "
             "lies in view, and set edge: cells for a perforated plate"
+        )
+    if comb.solid < _CONVEX and comb.order < _LEAST_ORDER:
+        return (
+            f"patches {comb.pitch_px:.0f} px apart fill {100 * comb.solid:.0f} % of their convex hulls, and "
+            f"{100 * comb.order:.0f} % of them have neighbours all around; at least {100 * _CONVEX:.0f} % or "
+            f"{100 * _LEAST_ORDER:.0f} % are expected of cells: a print. Check that a block lies in view, and remove "
+            "prints and codes"
+        )
+    if comb.count >= _FEW_CELLS and comb.order < _ORDER_OF_SCATTERED:
+        return (
+            f"{100 * comb.order:.0f} % of {comb.count} patches have neighbours all around {comb.pitch_px:.0f} px away, "
+            f"at least {100 * _ORDER_OF_SCATTERED:.0f} % are expected of cells. Check that a block lies in view, and "
+            "clear the table"
         )
     if comb.count < _FEW_CELLS and comb.score < _POOR_SCORE:
         return (

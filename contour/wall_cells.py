@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.comb_likeness import Comb
+from contour.cell_order import lattice_order, solidity
+from contour.comb_likeness import Comb, surely_comb
 from contour.errors import NoBlockFound
 from contour.wall_mask import wall_mask
 
@@ -34,7 +35,8 @@ _WIDE_WALL = 0.2
 class Cells:
     """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
     the part of the tile they fill, the wall contrast in grey levels, the share of the
-    walls that hang together, and the grey levels of walls and of cells' floors."""
+    walls that hang together, the grey levels of walls and of cells' floors, the share of the cells with neighbours all
+    around, and the share of its convex hull that a cell fills."""
 
     pitch: float
     wall: float
@@ -46,6 +48,8 @@ class Cells:
     connected: float
     level: float
     floor: float
+    order: float
+    solid: float
 
     @property
     def score(self) -> float:
@@ -57,7 +61,10 @@ class Cells:
     @property
     def comb(self) -> Comb:
         """What tells a comb from other things that have patches side by side."""
-        return Comb(self.pitch, self.wall, self.bright, self.count, self.score, self.regularity * self.filled)
+        regular = self.regularity * self.filled
+        return Comb(
+            self.pitch, self.wall, self.bright, self.count, self.score, regular, order=self.order, solid=self.solid
+        )
 
 
 def probe(light: Gray, polarity: str) -> Cells:
@@ -77,7 +84,8 @@ def probe(light: Gray, polarity: str) -> Cells:
             best = found
         if best.score > _GOOD_SCORE:
             break
-    if best is None or best.score < _LEAST_SCORE:
+    # Several small blocks in view fill little of a tile, and do not hang together.
+    if best is None or (best.score < _LEAST_SCORE and not surely_comb(best.comb)):
         seen = "no enclosed cells" if best is None else f"{best.count} enclosed cells, of mixed size or far apart"
         raise NoBlockFound(
             f"no block found: the most textured part of the picture shows {seen}, "
@@ -144,8 +152,10 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     seen = wall_mask(light, pitch, bright=bright)
     mask = seen.mask
     floor = cv2.bitwise_not(mask)
-    _, _, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
-    areas, places = _enclosed(np.asarray(stats[1:], np.int32), np.asarray(centroids[1:], np.float64), mask.shape)
+    _, labels, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
+    areas, places, numbers = _enclosed(
+        np.asarray(stats[1:], np.int32), np.asarray(centroids[1:], np.float64), mask.shape
+    )
     if len(areas) < _LEAST_CELLS:
         return None
     # Half of the enclosed *area* lies in cells smaller than this, so that specks do not count; then merged cells are
@@ -185,17 +195,20 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
         float(np.median(light[walls > 0][::7])),
         # The darker part of what is free, for a lighter table may lie in it too (of the lighter part for dark walls).
         float(np.quantile(light[mask == 0][::7], 0.3 if bright else 0.7)),
+        lattice_order(places[regular], size),
+        solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
     )
 
 
 def _enclosed(
     stats: NDArray[np.int32], centroids: NDArray[np.float64], shape: tuple[int, ...]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Areas (N,) and centroids (N, 2) of the pieces that lie within the part and are no slivers."""
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+    """Areas (N,), centroids (N, 2) and labels (N,) of the pieces that lie within the part and are no slivers."""
     left, top, wide, high, area = (stats[:, column] for column in range(5))
     within = (left > 0) & (top > 0) & (left + wide < shape[1]) & (top + high < shape[0])
     compact = (area > 0.3 * wide * high) & (np.maximum(wide, high) < 4 * np.minimum(wide, high)) & (area >= 9)
-    return area[within & compact].astype(np.float64), centroids[within & compact]
+    chosen = np.flatnonzero(within & compact)
+    return area[chosen].astype(np.float64), centroids[chosen], chosen + 1
 
 
 def wall_width(mask: Gray) -> float:

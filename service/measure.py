@@ -219,7 +219,15 @@ class Measurer:
         if sure_px is not None:
             sure_px = float(np.hypot(sure_px, polygon.shift_px)) + polygon.given_up_px
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
-        findings = judge(polygon, (width, height), self._limits(recipe), traced=traced, region=region, budget=budget)
+        findings = judge(
+            polygon,
+            (width, height),
+            self._limits(recipe),
+            traced=traced,
+            region=region,
+            budget=budget,
+            picture=picture,
+        )
         watch.lap("judge")
         return replace(
             result,

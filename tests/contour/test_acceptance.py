@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -200,6 +201,17 @@ def test_of_two_nearly_equal_blocks_none_is_the_largest() -> None:
     (finding,) = judge(GOOD, FRAME, replace(LIMITS, pieces="largest"), traced=traced(others=twins))
     assert finding.refusal == Refusal.SEVERAL_BLOCKS
     assert "80 %" in finding.text
+
+
+def test_where_cells_are_none_the_picture_is_judged_as_a_whole() -> None:
+    # By a pitch read wrong, 67 px, a blur of 7 px would pass.
+    blurred = np.zeros((300, 400), np.uint8)
+    blurred[:, 200:] = 120
+    blurred = np.asarray(cv2.GaussianBlur(blurred, (0, 0), 7.0), np.uint8)
+    scattered = traced(comb=Comb(67.0, 18.0, True, 9, 0.15, 0.2))
+    reasons = [finding.refusal for finding in judge(GOOD, FRAME, LIMITS, traced=scattered, picture=blurred)]
+    assert reasons == [Refusal.IMAGE_QUALITY, Refusal.NO_BLOCK_FOUND]
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(), picture=blurred) == ()
 
 
 def test_what_is_no_comb_is_no_block() -> None:

@@ -223,6 +223,11 @@ def _qemu(shared: Path, memory_mb: int) -> list[str]:
         *("-kernel", str(CACHE / "vmlinux"), "-initrd", str(CACHE / "initial.cpio")),
         *("-append", "console=ttyS0 quiet panic=-1 mitigations=off tsc=unstable"),
         *("-serial", f"file:{shared / 'console'}", "-serial", "stdio"),
+        # ttyS2 and a USB adapter (FTDI's, ttyUSB0) are the two ends of a cable; ttyS3 has nothing behind its plug.
+        *("-chardev", f"socket,id=near,path={shared / 'cable'},server=on,wait=off"),
+        *("-chardev", f"socket,id=far,path={shared / 'cable'}"),
+        *("-serial", "chardev:near", "-serial", "null"),
+        *("-device", "qemu-xhci", "-device", "usb-serial,chardev=far"),
         *("-fsdev", "local,id=root,path=/,security_model=none,readonly=on,multidevs=remap"),
         *("-device", "virtio-9p-pci,fsdev=root,mount_tag=machine"),
         *("-fsdev", f"local,id=out,path={shared},security_model=none"),

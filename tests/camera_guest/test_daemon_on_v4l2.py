@@ -24,8 +24,8 @@ triggers: [{{kind: interval, period_s: 0.5}}]
 class Daemon:
     """A running `combtrace run`, and what it has said so far."""
 
-    def __init__(self, folder: Path) -> None:
-        (folder / "config.yaml").write_text(CONFIG)
+    def __init__(self, folder: Path, config: str = CONFIG) -> None:
+        (folder / "config.yaml").write_text(config)
         self._log = folder / "log"
         command = [sys.executable, "-m", "service.cli.main", "run", "--config", str(folder / "config.yaml")]
         with open(self._log, "wb") as log:

@@ -24,6 +24,8 @@ from drivers.controller.modbus import ModbusTcpController
 from drivers.controller.simulated import SimulatedController
 from tests.contracts.controller_cells import PATIENT_S, SERVERS, WAYS, Cell, cell
 
+pytestmark = pytest.mark.usefixtures("no_task_is_left")
+
 LAYOUTS = {
     "default": MailboxLayout(),
     "little": MailboxLayout(word_order="little"),
@@ -37,14 +39,6 @@ PAIRS = [
 ]
 
 Pair = tuple[Controller, SimulatedController]
-
-
-@pytest.fixture(autouse=True)
-async def no_task_is_left() -> AsyncIterator[None]:
-    before = asyncio.all_tasks()
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - before - {asyncio.current_task()} == set()
 
 
 @pytest.fixture(params=PAIRS, ids="-".join)

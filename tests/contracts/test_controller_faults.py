@@ -26,16 +26,10 @@ from drivers.controller.library_log import LIBRARY_LOGGER
 from drivers.controller.modbus import ModbusTcpController, RequestLimits
 from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 
+pytestmark = pytest.mark.usefixtures("no_task_is_left")
+
 PATIENT_S = 60.0  # longer than any test: what fails then did not fail by its time-out
 IMPATIENT_S = 0.3  # waited out by the tests of time-outs; long enough for a busy machine to connect
-
-
-@pytest.fixture(autouse=True)
-async def no_task_is_left() -> AsyncIterator[None]:
-    before = asyncio.all_tasks()
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - before - {asyncio.current_task()} == set()
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import random
-from collections.abc import AsyncIterator
 
 import numpy as np
 import pytest
@@ -16,17 +15,11 @@ from drivers.controller.modbus import ModbusTcpController
 from drivers.controller.simulated import AcceptedContour, SimulatedController
 from tests.drivers.controller.fault_proxy import Fate, FaultProxy
 
+pytestmark = pytest.mark.usefixtures("no_task_is_left")
+
 TIMEOUT_S = 0.03
 SESSION = 9
 FAULTS = [fate for fate in Fate if fate is not Fate.PASS]
-
-
-@pytest.fixture(autouse=True)
-async def no_task_is_left() -> AsyncIterator[None]:
-    before = asyncio.all_tasks()
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - before - {asyncio.current_task()} == set()
 
 
 def square_mm(job_id: int) -> list[tuple[float, float]]:

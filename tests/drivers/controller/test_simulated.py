@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
@@ -15,13 +14,7 @@ from drivers.controller.mailbox import ServiceBlock, encode_service
 from drivers.controller.simulated import AcceptedContour, SimulatedController
 from tests.drivers.controller.raw_client import SESSION, Client, page, simulated
 
-
-@pytest.fixture(autouse=True)
-async def no_task_is_left() -> AsyncIterator[None]:
-    before = asyncio.all_tasks()
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - before - {asyncio.current_task()} == set()
+pytestmark = pytest.mark.usefixtures("no_task_is_left")
 
 
 # --- its life ---------------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import asyncio
 import os
 import struct
 import tty
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
@@ -19,18 +19,12 @@ from drivers.controller.simulated_faults import FAULT_KINDS, Fault, targets_of
 from drivers.controller.simulated_frames import QUIET_S, BadFrame, RtuFraming, TcpFraming, crc16
 from tests.drivers.controller.raw_client import Client, page, simulated
 
+pytestmark = pytest.mark.usefixtures("no_task_is_left")
+
 READ_LINK = struct.pack(">BHH", 3, 0, 16)
 CLEAR = struct.pack(">BHH", 6, 32, 0)
 COMMIT = struct.pack(">BHH", 6, 32, 5)
 SILENCE_S = 0.15
-
-
-@pytest.fixture(autouse=True)
-async def no_task_is_left() -> AsyncIterator[None]:
-    before = asyncio.all_tasks()
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - before - {asyncio.current_task()} == set()
 
 
 async def silent(client: Client) -> bool:

@@ -13,13 +13,7 @@ from drivers.controller.simulated import SimulatedController
 from drivers.controller.simulated_scenario import Event, MachineSettings, Play, Scenario, machine_options
 from tests.drivers.controller.raw_client import SESSION, Client, page
 
-
-@pytest.fixture(autouse=True)
-async def no_task_is_left() -> AsyncIterator[None]:
-    before = asyncio.all_tasks()
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - before - {asyncio.current_task()} == set()
+pytestmark = pytest.mark.usefixtures("no_task_is_left")
 
 
 @asynccontextmanager

@@ -15,13 +15,7 @@ from drivers.controller.mailbox import ServiceBlock, encode_service
 from drivers.controller.simulated import SimulatedController
 from tests.drivers.controller.rtu_frames import crc16
 
-
-@pytest.fixture(autouse=True)
-async def no_task_is_left() -> AsyncIterator[None]:
-    before = asyncio.all_tasks()
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - before - {asyncio.current_task()} == set()
+pytestmark = pytest.mark.usefixtures("no_task_is_left")
 
 
 # --- Modbus RTU -------------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 
 import pytest
 
@@ -13,13 +13,7 @@ from drivers.controller.simulated_verdict import KINDS, Verdict
 from tests.drivers.controller.raw_client import SESSION, Client, page, simulated
 from tests.drivers.controller.simulated_bench import sealed
 
-
-@pytest.fixture(autouse=True)
-async def no_task_is_left() -> AsyncIterator[None]:
-    before = asyncio.all_tasks()
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - before - {asyncio.current_task()} == set()
+pytestmark = pytest.mark.usefixtures("no_task_is_left")
 
 
 # --- the verdict ------------------------------------------------------------------------------------------------------

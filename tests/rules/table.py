@@ -9,10 +9,11 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 TRANSFER, LINK, EXECUTOR, CYCLE = "service/transfer.py", "service/link.py", "service/executor.py", "service/cycle.py"
 JOURNAL, OWNERSHIP = "service/journal.py", "service/ownership.py"
-IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (
+IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_RESUMING, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (
     f"tests/service/test_{name}.py"
     for name in (
-        *("transfer", "transfer_pages", "link", "executor", "cycle", "ownership", "journal", "journal_recovery"),
+        *("transfer", "transfer_pages", "link", "executor", "cycle", "cycle_after_restart"),
+        *("ownership", "journal", "journal_recovery"),
     )
 )
 
@@ -261,21 +262,21 @@ RULES = (
     Rule(
         "Own start: sent again bit-identical where the journal holds the pages",
         f"{JOURNAL}::pages_from_text",
-        f"{IN_CYCLE}::test_a_sent_job_is_sent_again_bit_identical",
+        f"{IN_RESUMING}::test_a_sent_job_is_sent_again_bit_identical",
         "end = body + registers[start + PAYLOAD_LENGTH]",
         "end = body + registers[start + PAYLOAD_LENGTH] - 1",
     ),
     Rule(
         "Own start: a withdrawal that was cut short is finished, with its first reason",
         f"{CYCLE}::Cycle.resume",
-        f"{IN_CYCLE}::test_a_withdrawal_that_was_cut_short_is_finished_with_its_first_reason",
+        f"{IN_RESUMING}::test_a_withdrawal_that_was_cut_short_is_finished_with_its_first_reason",
         "if job.withdraw_reason is not None:",
         "if job.withdraw_reason is None and not job.pages:",
     ),
     Rule(
         "Own start: without a limit of its own a sent job is withdrawn (154)",
         f"{CYCLE}::Cycle.resume",
-        f"{IN_CYCLE}::test_a_sent_job_without_a_limit_of_its_own_is_taken_back_after_a_restart",
+        f"{IN_RESUMING}::test_a_sent_job_without_a_limit_of_its_own_is_taken_back_after_a_restart",
         "elif job.pages[0].header[VALID_FOR] == NO_LIMIT:",
         "elif job.pages[0].header[VALID_FOR] == 0:",
     ),
@@ -406,7 +407,7 @@ RULES = (
     Rule(
         "handshake none: a job found in flight after a restart fails (154)",
         f"{CYCLE}::Cycle.resume",
-        f"{IN_CYCLE}::test_without_handshake_a_sent_job_found_in_flight_ends_with_154",
+        f"{IN_RESUMING}::test_without_handshake_a_sent_job_found_in_flight_ends_with_154",
         "if not job.sent or self._link is None or not handshake:",
         "if not job.sent or self._link is None:",
     ),

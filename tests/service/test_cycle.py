@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
@@ -18,105 +15,14 @@ from contour.error_budget import ErrorBudget
 from contour.errors import ParameterError, PictureError
 from contour.geometry import Contour, area
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable, SceneMoved
-from drivers.camera.simulated import SimulatedCamera
-from drivers.controller.mailbox import Answer, Page
-from service.config import Recipe
-from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation
-from service.health import Health
-from service.journal import Job, Journal, TriggerStamp
-from service.link import Link, LinkSettings
-from service.measure import Measurement
+from drivers.controller.mailbox import Answer
+from service.cycle import MailboxFormat
+from service.journal import TriggerStamp
 from service.reasons import Outcome, Reason
-from service.state import State, StateMachine
-from service.transfer import TransferCounter, TransferSettings
-from tests.protocol_decoder import Contour as Decoded
+from service.state import State
 from tests.protocol_decoder import decode_contour
+from tests.service.cycle_rig import QUICK, RECTANGLE, SETTINGS, decoded, measured, rig
 from tests.service.scripted_controller import ScriptedController
-
-RECTANGLE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0], [0.0, 50.0]])
-QUICK = TransferSettings(ready_timeout_s=0.3, ack_timeout_s=0.2, max_repeats=2, poll_period_s=0.01)
-SETTINGS = CycleSettings(transfer=QUICK, camera_timeout_s=0.3)
-
-
-def decoded(page: Page) -> Decoded:
-    """A page as the protocol's text reads it."""
-    return decode_contour([((1, *page.header), page.payload)])
-
-
-def measured(**changes: object) -> Measurement:
-    contour = Contour(RECTANGLE)
-    good = Measurement("sliding-matrix", "bright", 20.0, contour, contour, 5000.0, 5000.0, thickness_mm=20.0)
-    return replace(good, **changes)  # type: ignore[arg-type]
-
-
-class Plan:
-    """Stands in for the measurer: the tracing has its own tests."""
-
-    def __init__(self) -> None:
-        self.result: Measurement | Exception = measured()
-        self.calls: list[tuple[int, float]] = []
-        self.calibration_digest = None
-
-    def measure(self, picture: object, recipe: Recipe, thickness_mm: float, camera: str = "") -> Measurement:
-        self.calls.append((recipe.number, thickness_mm))
-        if isinstance(self.result, Exception):
-            raise self.result
-        return self.result
-
-
-class Rig:
-    """A cycle with a real journal, a camera of the simulated kind and a scripted controller."""
-
-    def __init__(self, folder: Path, settings: CycleSettings, *, controller: ScriptedController | None) -> None:
-        self.journal = Journal(folder / "journal.sqlite")
-        self.controller = controller
-        self.camera = SimulatedCamera(lambda _n: np.zeros((60, 80), np.uint8))
-        self.plan = Plan()
-        self.machine = StateMachine()
-        self.health = Health(self.machine)
-        self.link = None
-        if controller is not None:
-            handshake = settings.transfer.handshake
-            self.link = Link(controller, LinkSettings(handshake, poll_period_s=0.01, heartbeat_timeout_s=0.5))
-        self.pool = ThreadPoolExecutor(1)
-        self.seen: list[Observation] = []
-        recipes = {1: Recipe(number=1, name="one"), 2: Recipe(number=2, name="two", thickness_mm=35)}
-        self.cycle = Cycle(
-            self.camera,
-            self.plan,  # type: ignore[arg-type]
-            recipes,
-            self.journal,
-            self.health,
-            self.link,
-            TransferCounter(50),
-            settings,
-            self.pool,
-            observe=self.seen.append,
-        )
-
-    async def job(self, trigger: TriggerStamp | None = None) -> Job:
-        taken = self.journal.take(trigger or TriggerStamp("serial"))
-        return await asyncio.wait_for(self.cycle.run(taken), 15)
-
-
-@asynccontextmanager
-async def rig(
-    folder: Path, settings: CycleSettings = SETTINGS, *, controller: ScriptedController | str | None = "default"
-) -> AsyncIterator[Rig]:
-    built = Rig(folder, settings, controller=ScriptedController() if controller == "default" else controller)  # type: ignore[arg-type]
-    built.health.start()
-    task = asyncio.ensure_future(built.link.run()) if built.link else None
-    try:
-        if built.link is not None:
-            await asyncio.wait_for(built.link.wait_connected(), 5)
-        yield built
-    finally:
-        if task is not None:
-            task.cancel()
-            with suppress(asyncio.CancelledError):
-                await task
-        built.pool.shutdown()
-        built.journal.close()
 
 
 async def test_a_good_job_is_accepted_and_its_page_says_what_the_protocol_says(tmp_path: Path) -> None:
@@ -353,75 +259,6 @@ async def test_without_handshake_the_page_carries_neither_session_nor_clock_nor_
         assert (header.session, header.captured_at, header.trigger) == (0, 0, 0)
 
 
-# --- after a restart --------------------------------------------------------------------------------------------
-
-
-async def resumed(built: Rig, prepare: Callable[[int], None]) -> Job:
-    """A job that an earlier process left in flight, brought to its end."""
-    taken = built.journal.take(TriggerStamp("controller", session=9, counter=5))
-    prepare(taken.job_id)
-    (job,) = built.journal.unsettled()
-    return await asyncio.wait_for(built.cycle.resume(job), 15)
-
-
-def sent_page(job_id: int):
-    from tests.service.transferring import page
-
-    return page(job_id)
-
-
-async def test_a_job_of_which_nothing_was_sent_ends_with_154(tmp_path: Path) -> None:
-    async with rig(tmp_path) as built:
-        job = await resumed(built, lambda _job: None)
-        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
-        assert built.controller.count("write_page") == 0
-
-
-async def test_a_sent_job_is_sent_again_bit_identical(tmp_path: Path) -> None:
-    async with rig(tmp_path) as built:
-        job = await resumed(built, lambda job_id: built.journal.store_pages(job_id, 9, (sent_page(job_id),)))
-        assert job.outcome is Outcome.ACCEPTED
-        assert built.controller.accepted == [sent_page(job.job_id)]
-
-
-async def test_a_job_that_was_accepted_before_the_crash_is_accepted_without_being_sent(tmp_path: Path) -> None:
-    async with rig(tmp_path) as built:
-
-        def prepare(job_id: int) -> None:
-            built.journal.store_pages(job_id, 9, (sent_page(job_id),))
-            built.controller.link = replace(built.controller.link, last_job=job_id, last_result=1)
-
-        job = await resumed(built, prepare)
-        assert job.outcome is Outcome.ACCEPTED
-        assert built.controller.count("write_page") == 0
-
-
-async def test_a_job_of_an_earlier_session_ends_with_153_and_is_not_sent(tmp_path: Path) -> None:
-    async with rig(tmp_path) as built:
-        job = await resumed(built, lambda job_id: built.journal.store_pages(job_id, 8, (sent_page(job_id),)))
-        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.CONTROLLER_RESTARTED)
-        assert built.controller.count("write_page") == 0
-
-
-async def test_a_withdrawal_that_was_cut_short_is_finished_with_its_first_reason(tmp_path: Path) -> None:
-    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
-
-        def prepare(job_id: int) -> None:
-            built.journal.store_pages(job_id, 9, (sent_page(job_id),))
-            built.journal.store_withdrawal(job_id, Reason.EXPIRED)
-
-        job = await resumed(built, prepare)
-        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.EXPIRED)
-        assert built.controller.accepted == []
-
-
-async def test_without_handshake_a_sent_job_found_in_flight_ends_with_154(tmp_path: Path) -> None:
-    settings = replace(SETTINGS, transfer=replace(QUICK, handshake=False))
-    async with rig(tmp_path, settings) as built:
-        job = await resumed(built, lambda job_id: built.journal.store_pages(job_id, 0, (sent_page(job_id),)))
-        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
-
-
 async def test_a_stop_before_sending_ends_the_job_with_161(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
         built.camera._make_picture = lambda _n: time.sleep(0.3) or np.zeros((6, 8), np.uint8)
@@ -462,20 +299,6 @@ async def test_an_unusable_picture_or_recipe_is_told_as_such_and_is_no_defect(
     assert (job.outcome, job.reason) == (Outcome.FAILED, reason)
     assert str(error) in (job.detail or "")
     assert [record for record in caplog.records if record.exc_info] == []
-
-
-async def test_a_sent_job_without_a_limit_of_its_own_is_taken_back_after_a_restart(tmp_path: Path) -> None:
-    """How long the service was away cannot be known, and a controller without a clock would take it at any age."""
-    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
-
-        def prepare(job_id: int) -> None:
-            page = sent_page(job_id)
-            endless = Page((*page.header[:27], 0, 0, *page.header[29:]), page.payload)
-            built.journal.store_pages(job_id, 9, (endless,))
-
-        job = await resumed(built, prepare)
-        assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
-        assert built.controller.link.last_result == Answer.WITHDRAWN
 
 
 async def test_a_defect_without_handshake_ends_the_job_at_once(tmp_path: Path) -> None:
@@ -529,25 +352,6 @@ async def test_an_observed_job_is_made_and_not_sent(tmp_path: Path) -> None:
         assert built.journal.unsettled() == ()
 
 
-async def test_a_job_that_was_found_without_its_pages_is_withdrawn_with_154(tmp_path: Path) -> None:
-    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
-        built.journal.adopt(70, (9, 6), 9)
-        (job,) = built.journal.unsettled()
-        settled = await asyncio.wait_for(built.cycle.resume(job), 15)
-        assert (settled.outcome, settled.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
-        assert built.controller.link.last_job == 70
-
-
-async def test_a_job_that_was_found_and_had_been_accepted_is_accepted(tmp_path: Path) -> None:
-    async with rig(tmp_path) as built:
-        built.controller.link = replace(built.controller.link, last_job=70, last_result=1)
-        built.journal.adopt(70, (9, 6), 9)
-        (job,) = built.journal.unsettled()
-        settled = await asyncio.wait_for(built.cycle.resume(job), 15)
-        assert settled.outcome is Outcome.ACCEPTED
-        assert built.controller.count("write_page") == 0
-
-
 async def test_a_withdrawal_after_a_defect_that_dragged_on_leaves_no_fault_behind(tmp_path: Path) -> None:
     settings = replace(SETTINGS, transfer=replace(QUICK, max_repeats=1))
     async with rig(tmp_path, settings, controller=ScriptedController([None])) as built:
@@ -565,14 +369,3 @@ async def test_a_withdrawal_after_a_defect_that_dragged_on_leaves_no_fault_behin
         built.controller.answers = [Answer.WITHDRAWN]
         assert (await asyncio.wait_for(task, 10)).reason is Reason.INTERNAL_ERROR
         assert built.machine.state is State.READY
-
-
-async def test_a_sent_job_whose_pages_cannot_be_read_any_more_is_withdrawn_with_154(tmp_path: Path) -> None:
-    async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
-        taken = built.journal.take(TriggerStamp("serial"))
-        built.journal.store_pages(taken.job_id, 9, (Page((0,) * 31, ()),))
-        built.journal._db.execute("UPDATE jobs SET pages = 'rotten' || substr(pages, 7)")
-        (job,) = built.journal.unsettled()
-        settled = await asyncio.wait_for(built.cycle.resume(job), 15)
-        assert (settled.outcome, settled.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
-        assert built.controller.link.last_result == Answer.WITHDRAWN

@@ -31,8 +31,8 @@ from service.state import State, StateMachine
 from service.systemd import Notifier, Watchdog
 from service.transfer import TransferCounter, TransferSettings
 from service.trigger_queue import TriggerRefused
+from tests.service.cycle_rig import Plan
 from tests.service.scripted_controller import ScriptedController
-from tests.service.test_cycle import Plan
 
 QUICK = TransferSettings(ready_timeout_s=0.3, ack_timeout_s=0.2, max_repeats=2, poll_period_s=0.01)
 

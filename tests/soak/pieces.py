@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.soak.faulted_cell import FaultedCell, Terms, Transport
-from tests.soak.killed_cell import KilledCell, Killing
+from tests.soak.faulted_cell import FaultedCell, Outcome, Terms, Transport
+from tests.soak.killed_cell import KilledCell, Killing, Toll
 
 JOBS_A_PIECE = 125
 KILLS_A_PIECE = 25
@@ -135,42 +135,34 @@ def killing_terms(campaign: str, number: int, kills: int) -> Killing:
 
 def _faulted(folder: Path, transport: Transport, number: int, jobs: int) -> Result:
     terms = faulted_terms(transport, number, jobs)
-    came_to = asyncio.run(FaultedCell(folder, terms).run(60 + SECONDS_A_JOB * jobs))
-    return Result(
-        campaign=transport,
-        terms=str(terms),
-        done=sum(came_to.outcomes.values()),
-        jobs=sum(came_to.outcomes.values()),
-        accepted=came_to.accepted,
-        acknowledged=came_to.acknowledged,
-        restarts=sum(came_to.restarts.values()),
-        seconds=came_to.seconds,
-        outcomes=dict(came_to.outcomes),
-        faults=dict(came_to.faults),
-        instants=dict(came_to.restarts),
-        findings=dict(came_to.findings.counts),
-        texts=came_to.findings.texts,
-    )
+    outcome = asyncio.run(FaultedCell(folder, terms).run(60 + SECONDS_A_JOB * jobs))
+    return _result(transport, terms, outcome, sum(outcome.outcomes.values()), outcome.restarts)
 
 
 def _killed(folder: Path, campaign: str, number: int, kills: int) -> Result:
     terms = killing_terms(campaign, number, kills)
     cell = KilledCell(folder, terms)
     toll = asyncio.run(cell.kill_service() if terms.victim == "service" else cell.kill_controller())
+    return _result(campaign, terms, toll, sum(toll.kills.values()), toll.kills)
+
+
+def _result(
+    campaign: str, terms: Terms | Killing, came_to: Outcome | Toll, done: int, instants: Counter[str]
+) -> Result:
     return Result(
         campaign=campaign,
         terms=str(terms),
-        done=sum(toll.kills.values()),
-        jobs=sum(toll.outcomes.values()),
-        accepted=toll.accepted,
-        acknowledged=toll.acknowledged,
-        restarts=sum(toll.kills.values()),
-        seconds=toll.seconds,
-        outcomes=dict(toll.outcomes),
-        faults=dict(toll.faults),
-        instants=dict(toll.kills),
-        findings=dict(toll.findings.counts),
-        texts=toll.findings.texts,
+        done=done,
+        jobs=sum(came_to.outcomes.values()),
+        accepted=came_to.accepted,
+        acknowledged=came_to.acknowledged,
+        restarts=sum(instants.values()),
+        seconds=came_to.seconds,
+        outcomes=dict(came_to.outcomes),
+        faults=dict(came_to.faults),
+        instants=dict(instants),
+        findings=dict(came_to.findings.counts),
+        texts=came_to.findings.texts,
     )
 
 

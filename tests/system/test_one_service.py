@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.controller.requests import READ_REGISTERS
 from drivers.controller.simulated import SimulatedController
 from service.journal import Journal
 from service.reasons import Outcome, Reason
@@ -22,9 +23,18 @@ def tcp(port: int, **more: object) -> dict[str, object]:
     return {"kind": "modbus-tcp", "port": port, **more}
 
 
-def other_door(controller: SimulatedController) -> FaultProxy:
-    """Another address of the same controller: the lock on this machine does not see that it is the same."""
-    return FaultProxy(controller.port, lambda _request: Fate.PASS)
+def other_door(controller: SimulatedController, writes: list[bytes] | None = None) -> FaultProxy:
+    """Another address of the same controller: the lock on this machine does not see that it is the same.
+
+    writes: gets the requests that change a register.
+    """
+
+    def let_through(request: bytes) -> Fate:
+        if writes is not None and request[7] != READ_REGISTERS:
+            writes.append(request)
+        return Fate.PASS
+
+    return FaultProxy(controller.port, let_through)
 
 
 @pytest.fixture
@@ -56,12 +66,7 @@ async def test_beside_a_living_service_a_second_one_stays_in_error_with_155_and_
     tmp_path: Path, short_watch: None
 ) -> None:
     writes: list[bytes] = []
-
-    def note(request: bytes) -> Fate:
-        writes.extend([request] if request[7] != 3 else [])
-        return Fate.PASS
-
-    async with SimulatedController() as controller, FaultProxy(controller.port, note) as door:
+    async with SimulatedController() as controller, other_door(controller, writes) as door:
         async with wired(tmp_path / "one", tcp(controller.port)) as one:
             await one.ready()
             async with wired(tmp_path / "two", tcp(door.port)) as two:
@@ -156,12 +161,7 @@ async def test_an_observer_beside_a_service_makes_every_contour_and_writes_no_re
     tmp_path: Path, short_watch: None
 ) -> None:
     writes: list[bytes] = []
-
-    def note(request: bytes) -> Fate:
-        writes.extend([request] if request[7] != 3 else [])
-        return Fate.PASS
-
-    async with SimulatedController() as controller, FaultProxy(controller.port, note) as door:
+    async with SimulatedController() as controller, other_door(controller, writes) as door:
         observing = tcp(door.port, mode="observe")
         async with wired(tmp_path / "one", tcp(controller.port)) as one, wired(tmp_path / "two", observing) as two:
             await one.ready()

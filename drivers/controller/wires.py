@@ -12,6 +12,7 @@ from typing import Protocol
 
 from drivers.controller.errors import ControllerUnavailable
 from drivers.controller.frames import Frames, RtuFrames, TcpFrames
+from drivers.controller.name_lookup import addresses_of
 from drivers.controller.serial_line import SerialLine, open_serial
 
 Descriptor = tuple[int, Callable[[], None]]
@@ -187,7 +188,7 @@ async def _connect(host: str, port: int) -> socket.socket:
     """A connected socket to the first of the host's addresses that answers; raise the last one's OSError."""
     loop = asyncio.get_running_loop()
     fault: OSError = OSError(f"{host} has no address")
-    for family, kind, protocol, _, address in await loop.getaddrinfo(host, port, type=socket.SOCK_STREAM):
+    for family, kind, protocol, _, address in await addresses_of(host, port):
         with contextlib.ExitStack() as unless_connected:
             connecting = unless_connected.enter_context(socket.socket(family, kind, protocol))
             connecting.setblocking(False)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from service.config import Recipe
+import numpy as np
+
+from contour.geometry import Contour
+from service.config import Gcode, Recipe
 from service.export.document import ExportDocument, ExportError
 from service.export.files import exported, read_template
 from service.export.forms import ENDINGS
@@ -23,6 +26,26 @@ def gcode_settings(recipe: Recipe) -> GcodeSettings:
         lead_in_mm=asked.lead_in_mm,
         template=TEMPLATE if asked.template is None else read_template(asked.template),
     )
+
+
+def trial(recipe: Recipe) -> list[str]:
+    """What keeps the recipe's exports from being made of a plain square, at its thickness; empty where nothing does.
+
+    G-code is tried where `gcode` says anything, also without `exports`: `combtrace trace --gcode` takes it from there.
+    """
+    side_mm = 10 * max(recipe.gcode.lead_in_mm, 10.0)
+    square = np.array([[0.0, 0.0], [side_mm, 0.0], [side_mm, side_mm], [0.0, side_mm]])
+    document = ExportDocument(Contour(square), "trial", recipe.thickness_mm)
+    forms = dict.fromkeys((*recipe.exports, *(["gcode"] if recipe.gcode != Gcode() else [])))
+    return [error for form in forms if (error := _tried(form, document, recipe)) is not None]
+
+
+def _tried(form: str, document: ExportDocument, recipe: Recipe) -> str | None:
+    try:
+        exported(form, document, lambda: gcode_settings(recipe))
+    except ExportError as error:
+        return f"{form}: {error}"
+    return None
 
 
 def exports_of(recipe: Recipe, measurement: Measurement, title: str) -> tuple[dict[str, bytes], list[str]]:

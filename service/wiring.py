@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import logging
 import secrets
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -50,6 +51,7 @@ from service.link import Link, LinkSettings
 from service.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
 from service.measure import Measurer
 from service.reasons import Reason
+from service.recipe_exports import trial
 from service.reload import BadPlan, Reloader
 from service.state import State, StateMachine
 from service.status import status_line
@@ -59,6 +61,8 @@ from service.table_file import TableFileError, TableRecord, load_table
 from service.transfer import TransferCounter, TransferSettings
 from service.trigger_queue import TriggerQueue
 from service.triggers import SerialPulses, SerialTrigger, interval_trigger
+
+log = logging.getLogger("combtrace.daemon")
 
 BURST_SILENCE_S = 0.2
 LEVEL_HOLDS_S = 0.05
@@ -99,6 +103,7 @@ def build(
     health.report("calibration", calibration_fault)
     pool = ThreadPoolExecutor(1, "camera")
     archive = _make_archive(config)
+    _tell_exports(config)
     notifier = Notifier()
     watchdog = Watchdog(notifier)
     cycle = Cycle(
@@ -246,6 +251,14 @@ def controller_words(config: Config) -> str:
         return controller.kind
     where = f"{controller.host}:{controller.port}" if not isinstance(controller, ModbusRtu) else controller.port
     return f"{controller.kind} {where}"
+
+
+def _tell_exports(config: Config) -> None:
+    """Warn at the start of exports that every job would miss; that keeps no job from being done."""
+    for recipe in config.recipes:
+        if recipe.exports:
+            for text in trial(recipe):
+                log.warning("recipe %d will not be exported: %s", recipe.number, text)
 
 
 def _make_archive(config: Config) -> ArchiveWriter | None:

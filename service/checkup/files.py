@@ -1,4 +1,4 @@
-"""The files of a configuration: recipes, calibration, table."""
+"""The files of a configuration: calibration, templates of exports, table."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from service.calibration_guard import CalibrationGuard
 from service.checkup.finding import Finding, fault, ok, warning
-from service.config import Config
+from service.config import Config, Gcode
+from service.recipe_exports import trial
 from service.wiring import WiringError, find_guard, find_table
 
 _SOON = 0.9
@@ -21,8 +22,9 @@ def summary(config: Config) -> str:
 
 
 def check_files(config: Config) -> Iterator[Finding]:
-    """Calibration and table."""
+    """Calibration, exports and table."""
     yield from check_calibration(config)
+    yield from _exports(config)
     if config.table is not None:
         yield _table(config)
 
@@ -64,6 +66,15 @@ def _told(config: Config, guard: CalibrationGuard) -> str:
     )
     marks = guard.record.sentinels
     return text if marks is None else f"{text}; {len(marks.marks)} fixed marks"
+
+
+def _exports(config: Config) -> Iterator[Finding]:
+    asked = [recipe for recipe in config.recipes if recipe.exports or recipe.gcode != Gcode()]
+    found = [fault("exports", f"recipe {recipe.number}: {text}") for recipe in asked for text in trial(recipe)]
+    yield from found
+    if asked and not found:
+        forms = ", ".join(sorted({form for recipe in asked for form in recipe.exports})) or "gcode on demand"
+        yield ok("exports", f"of a plain square: {forms}")
 
 
 def _table(config: Config) -> Finding:

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from service.checkup.devices import check_devices
+from service.checkup.files import check_files
 from service.checkup.finding import Finding, Level
 from service.checkup.running import holder
 from service.checkup.storage import check_storage
@@ -182,3 +183,26 @@ def test_a_result_file_is_whole_or_as_it_was(tmp_path: Path, capsys: pytest.Capt
     main(["check", "--config", str(path), "--no-devices", "--json", str(result)])
     assert json.loads(result.read_text())["config"] == str(path)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["config.yaml", "in", "result.json"]
+
+
+@pytest.mark.parametrize(
+    ("gcode", "text"),
+    [
+        ("{template: none.txt}", "none.txt: No such file"),
+        ("{template: own.txt}", "no $rings in it"),
+        ("{safe_z_mm: 10}", "safe_z_mm 10 is not above the block of 20 mm"),
+        ("{lead_in_mm: 900}", None),
+    ],
+)
+def test_exports_that_no_job_could_make_are_told_by_the_check(tmp_path: Path, gcode: str, text: str | None) -> None:
+    (tmp_path / "own.txt").write_text("G21\n")
+    recipes = f"default_recipe: 3\nrecipes: [{{number: 3, name: a, exports: [gcode, svg], gcode: {gcode}}}]"
+    found = [one for one in check_files(config(tmp_path, more=recipes)) if one.part == "exports"]
+    assert len(found) == 1
+    assert (found[0].level is Level.FAULT) == (text is not None)
+    assert text is None or "recipe 3: gcode: " in found[0].text
+    assert text is None or text in found[0].text
+
+
+def test_without_exports_there_is_nothing_to_say_of_them(tmp_path: Path) -> None:
+    assert not [one for one in check_files(config(tmp_path)) if one.part == "exports"]

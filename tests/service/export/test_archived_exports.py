@@ -47,5 +47,6 @@ def test_what_cannot_be_exported_is_told_and_the_evidence_is_kept(gcode, text, t
     assert status == 0
     assert "frame.png" in names
     assert [name for name in names if name.startswith("contour")] == ["contour.dxf", "contour.geojson", "contour.svg"]
+    assert "recipe 1 will not be exported: gcode" in caplog.text
     assert "not exported" in caplog.text
     assert text in caplog.text

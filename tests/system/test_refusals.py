@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 from pymodbus.client import ModbusTcpClient
 
+from service.reasons import Reason
 from tests.system.cell import SAMPLES, Cell
 from tests.system.processes import combtrace, until
 from tests.system.terminal import Terminal
 
-SERVICE_BLOCK, REJECT_REASON, SETTLED_JOB = 16, 5, 12
+SERVICE_BLOCK, SERVICE_STATE, REJECT_REASON, SETTLED_JOB = 16, 1, 5, 12
+ERROR = 3
 SAMPLE = cv2.imread(str(SAMPLES / "1-rectangle.jpg"), cv2.IMREAD_GRAYSCALE)
 
 
@@ -76,6 +78,8 @@ CASES = (
         "meets itself",
     ),
     Provoked(SAMPLE[:, :1500], "", 141, "calibration_mismatch", "1500 x 1200 px"),
+    # No reason of the picture's: nothing that a recipe asks for may end a job without one.
+    Provoked(SAMPLE, "roi_px: [1590, 1190, 1599, 1199]", 190, "internal_error", "Correct the recipe"),
 )
 WORK_AREA = "work_area_mm: [[100, 60], [500, 60], [500, 390], [100, 390]]"
 
@@ -112,10 +116,15 @@ def cell(tmp_path_factory: pytest.TempPathFactory, terminal: Terminal) -> Iterat
         started.stop()
 
 
+def service_block(cell: Cell) -> list[int]:
+    """The service block as the controller holds it."""
+    with ModbusTcpClient("127.0.0.1", port=cell.port) as client:
+        return client.read_holding_registers(SERVICE_BLOCK, count=16, device_id=1).registers
+
+
 def registers(cell: Cell) -> tuple[int, int]:
     """reject_reason and settled_job as the controller holds them."""
-    with ModbusTcpClient("127.0.0.1", port=cell.port) as client:
-        words = client.read_holding_registers(SERVICE_BLOCK, count=16, device_id=1).registers
+    words = service_block(cell)
     return words[REJECT_REASON], words[SETTLED_JOB] << 16 | words[SETTLED_JOB + 1]
 
 
@@ -130,11 +139,32 @@ def test_a_reason_is_seen_in_the_fail_line_the_register_and_the_log(
     assert job == number, "the cases before this one must run too: each takes one picture"
     assert terminal.line(60) == f"FAIL {job} {case.code} {case.name}"
     until(lambda: registers(cell) == (case.code, job), what=f"reject_reason {case.code} of job {job}")
-    said = f"job {job} refused: {case.code} {case.name}: "
+    outcome = Reason(case.code).outcome
+    said = f"job {job} {outcome}: {case.code} {case.name}: "
     line = next(line for line in cell.service.text.splitlines() if said in line)
     assert case.words in line
     settled = cell.settled()[-1]
-    assert (settled["job_id"], settled["outcome"], settled["reason"]) == (job, "refused", case.code)
+    assert (settled["job_id"], settled["outcome"], settled["reason"]) == (job, outcome, case.code)
+
+
+def test_without_its_calibration_the_daemon_takes_no_job_and_says_why(tmp_path: Path) -> None:
+    terminal = Terminal()  # a line of its own: the other daemon listens on the other one
+    started = Cell(
+        tmp_path,
+        triggers=f"[{{kind: serial, port: {terminal.name}}}]",
+        trigger_every_s=None,
+        calibration=tmp_path / "nowhere.yaml",
+    )
+    try:
+        until(lambda: started.controller.text, what="the controller")
+        until(lambda: service_block(started)[SERVICE_STATE] == ERROR, what="service_state Error")
+        assert "nowhere.yaml: cannot be read" in started.service.text
+        terminal.type(b"TRIG\n")
+        assert terminal.line(30) == "NAK 121 not_ready"
+        assert started.settled() == []
+    finally:
+        started.stop()
+        terminal.close()
 
 
 def test_a_table_that_was_taught_tells_a_moved_camera_and_other_light(tmp_path: Path) -> None:

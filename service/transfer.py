@@ -222,6 +222,9 @@ class Transfer:
                 if not await self._reconnected():
                     return Reason.CONTROLLER_LOST, f"not back before the job expired: {error}"
                 continue
+            except LinkUnsteady as error:  # it said nothing: no attempt in vain; step 1 waits until it holds still
+                self._told(str(error))
+                continue
             except ControllerError as error:  # an exception response: a reply, so nothing was done
                 self._told(str(error))
                 answer = None

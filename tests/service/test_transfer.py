@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from dataclasses import replace
 
 import pytest
 
-from drivers.controller.mailbox import Answer, LinkBlock, ServiceBlock, withdrawal
+from drivers.controller.mailbox import Answer, LinkBlock, Page, ServiceBlock, withdrawal
 from service.link import READS_FOR_TWO_ALIKE
 from service.reasons import Outcome, Reason
 from service.transfer import Settlement, TransferCounter, TransferSettings
@@ -458,3 +459,27 @@ async def test_a_connection_that_was_opened_anew_begins_again_with_transfer_0(ha
     assert settlement.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
     steps = [name for name, _ in controller.requests if name in ("clear", "write_page", "commit")]
     assert steps == ["clear", "clear", "write_page", "commit"]
+
+
+async def test_a_block_that_does_not_hold_still_between_page_and_commit_is_no_attempt_in_vain() -> None:
+    controller = ScriptedController([Answer.ACCEPTED])
+    numbers = itertools.count(1)
+    moving = 0
+    async with transferring(controller) as run:
+        write_page, read_link = controller.write_page, controller.read_link
+
+        async def then_it_moves(page: Page) -> None:
+            nonlocal moving
+            await write_page(page)
+            if controller.count("write_page") <= 2 * QUICK.max_repeats:
+                run.link.view, moving = None, 3 * READS_FOR_TWO_ALIKE  # as after a look of the link's own that failed
+
+        async def moved() -> LinkBlock:
+            nonlocal moving
+            block, moving = await read_link(), max(0, moving - 1)
+            return replace(block, recipe=next(numbers) & 0xFFFF) if moving else block
+
+        controller.write_page, controller.read_link = then_it_moves, moved  # type: ignore[method-assign]
+        settlement = await run.end()
+    assert settlement.outcome is Outcome.ACCEPTED
+    assert controller.count("write_page") == 2 * QUICK.max_repeats + 1

@@ -25,6 +25,8 @@ _RISE = 0.44
 # no faint wall may be lost, and blur takes most from thin ones.
 _FINE_RISE = (0.08, -0.05)
 _REGION_RISE = 0.25
+# Of the rise that makes a wall, what makes a faint one, which only may lead from the block to other walls.
+_FAINT = 0.5
 # Of the contrast in the block's busiest part; far from the block only this stands against a structured table.
 _PICTURE_RISE = 0.2
 # Squares wider than any wall and narrower than most cells.
@@ -41,11 +43,15 @@ _FIFTH_OF_NORMAL = 0.2533
 
 @dataclass(frozen=True)
 class WallMask:
-    """Mask (H, W), uint8, 255 on walls; noise and median wall contrast in grey levels of the picture it came from."""
+    """Mask (H, W), uint8, 255 on walls; noise and median wall contrast in grey levels of the picture it came from.
+
+    faint: the mask at a lower threshold.
+    """
 
     mask: Gray
     noise: float
     contrast: float
+    faint: Gray
 
     @property
     def may_be_noise(self) -> bool:
@@ -70,14 +76,25 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     noise = _noise_level(smooth, pitch, unit)
     walls, region, typical = _heights(height, beside, pitch / step)
     share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch) / 8, 0, 1))
-    floor = max(NOISE_FLOOR * noise, _PICTURE_RISE * contrast * unit)
-    rise = np.maximum(np.maximum(share * walls, _REGION_RISE * region), floor)
-    threshold = np.clip(sign * (beside + rise), 0, 255 * unit).astype(smooth.dtype)
-    if step > 1:
-        threshold = cv2.resize(threshold, (smooth.shape[1], smooth.shape[0]), interpolation=cv2.INTER_LINEAR)
-    mask = cv2.compare(smooth, threshold, cv2.CMP_GT if bright else cv2.CMP_LT)
-    mask = np.asarray(mask, np.uint8)[: light.shape[0], : light.shape[1]]
-    return WallMask(np.ascontiguousarray(mask), noise / unit, _typical(typical) / unit)
+    rise = np.maximum(np.maximum(share * walls, _REGION_RISE * region), _PICTURE_RISE * contrast * unit)
+    least = NOISE_FLOOR * noise
+    mask, faint = (
+        _standing_out(smooth, sign * (beside + np.maximum(part * rise, least)), unit, bright=bright)
+        for part in (1.0, _FAINT)
+    )
+    height, width = light.shape
+    mask, faint = (np.ascontiguousarray(part[:height, :width]) for part in (mask, faint))
+    return WallMask(mask, noise / unit, _typical(typical) / unit, faint)
+
+
+def _standing_out(smooth: Levels, threshold: Float, unit: int, *, bright: bool) -> Gray:
+    """Where the picture is brighter (or darker) than the threshold, a coarser map, in `unit`s a grey level."""
+    level = np.clip(threshold, 0, 255 * unit)
+    levels: Levels = level.astype(np.uint8) if unit == 1 else level.astype(np.uint16)
+    size = (smooth.shape[1], smooth.shape[0])
+    full = levels if levels.shape == smooth.shape else cv2.resize(levels, size, interpolation=cv2.INTER_LINEAR)
+    mask = cv2.compare(smooth, full, cv2.CMP_GT if bright else cv2.CMP_LT)
+    return np.asarray(mask, np.uint8)
 
 
 def without_specks(seen: WallMask, pitch: float, wall: float) -> WallMask:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from contour.coarse_block import CoarseBlock, coarse_block
 from contour.dark_material import dark_beyond, midway_to_table
 from contour.errors import NoBlockFound
+from contour.faint_links import with_faint_links
 from contour.pieces import pieces_beside, reaches_frame
 from contour.wall_cells import Cells, probe
 from contour.wall_ends import edge_chains, find_ends, outermost
@@ -81,7 +82,10 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
     seen = without_specks(seen, cells.pitch / scale, cells.wall / scale)
     midway = None if cells.bright else midway_to_table(small, cells.level, seen.contrast)
     if midway is not None:
+        # Such a block is told from the table by its darkness: fainter walls would be more of its cells' own shades.
         seen = _darker_than_table(seen, small, midway)
+    else:
+        seen = replace(seen, mask=with_faint_links(seen.mask, seen.faint, cells.pitch / scale))
     on_mask()
     coarse = coarse_block(seen.mask, small, cells.pitch / scale)
     others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)

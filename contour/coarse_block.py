@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.coarse_threads import without_threads
 from contour.errors import NoBlockFound
 from contour.geometry import Ring
 from contour.pixel_sampling import sample_at
@@ -127,7 +128,8 @@ def coarse_block(mask: Gray, light: Gray, pitch: float) -> CoarseBlock:
     samples = pitch / step
     kept = _main_piece(walls, samples)
     filled, kept = _linked(walls, kept, _close(kept, _CLOSING_PITCHES * samples), samples)
-    filled = _largest(filled | kept)
+    filled = without_threads(_largest(filled | kept), samples)
+    kept &= filled
     shade = _padded(_averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
     filled = _fill_missing_cells(filled, kept, shade, _HOLE_RADIUS_PITCHES * samples)
     if len(_sides(filled, samples)) == 4:

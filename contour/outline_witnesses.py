@@ -15,6 +15,10 @@ _SHARE_INSIDE = 0.20
 _SHARE_OUTSIDE = 0.02
 _LEAST_SIGMA_PX = 0.04
 _DEEPEST = 1.3
+# Noise and the wall behind a zigzag edge take a witness about a quarter of a pitch out; a pitch farther costs so many
+# nats more.
+_DUST = 0.4
+_FAR_OUTSIDE = 8.0
 # Corners and outliers are most of a ring of so few witnesses, and pass for noise.
 _FEW = 48
 _NOISIEST, _NOISIEST_OF_FEW = 3.0, 1.5
@@ -98,14 +102,18 @@ def cost(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None))
 
     They bend early, as Geman's and McClure's function does: about one wall end in five lies two to five standard
     deviations off, and three of those in a row are no edge of their own. Beyond a cell's depth the cap rises again:
-    one missing cell or broken wall reaches no deeper.
+    one missing cell or broken wall reaches no deeper. Outside of an exterior it rises sooner: nothing but debris that
+    hangs on the block takes a witness there.
     """
     outside = signed > 0.0
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
     cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
     beyond = np.clip(np.abs(signed) / witnesses.pitch - _DEEPEST, 0.0, 3.0)
     square = 0.5 * (signed / sigma) ** 2
-    return cap * square / (cap + square) + 4.0 * beyond**2
+    bent: Real = cap * square / (cap + square) + 4.0 * beyond**2
+    if witnesses.rare > 0.0:
+        return bent
+    return bent + _FAR_OUTSIDE * np.clip(signed / witnesses.pitch - _DUST, 0.0, 1.0)
 
 
 def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:

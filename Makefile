@@ -42,7 +42,7 @@ bench-daemon: install
 	$(BIN)/python -m benchmarks.daemon
 
 accuracy: install
-	$(BIN)/python -m benchmarks.bench --random 300 --first 980000 --write
+	$(BIN)/python -m benchmarks.bench --random 300 --first 990000 --write
 
 # Each rule of the protocol taken out of a copy of the code: its test must fail then. Some minutes.
 rules: install

@@ -21,7 +21,7 @@ test: install
 
 # A real kernel's camera: the tests run in a virtual machine that this boots (QEMU and kernel from Debian's packages).
 test-camera: install
-	$(BIN)/python tests/camera_guest/guest.py --timeout 900 -- env COMBTRACE_CAMERA_GUEST=1 \
+	$(BIN)/python tests/camera_guest/guest.py --timeout 1800 -- env COMBTRACE_CAMERA_GUEST=1 \
 		$(BIN)/python -m pytest tests/camera_guest tests/contracts/test_camera_contract.py -p no:cacheprovider
 
 # FRAMES=100000: how memory fares over that many, half an hour.
@@ -39,7 +39,7 @@ bench-link: install
 	$(BIN)/python -m benchmarks.link --write
 
 bench-daemon: install
-	$(BIN)/python -m benchmarks.daemon
+	$(BIN)/python -m benchmarks.daemon --write
 
 accuracy: install
 	$(BIN)/python -m benchmarks.bench --random 300 --first 990000 --write

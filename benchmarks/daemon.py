@@ -1,7 +1,8 @@
 """What the daemon takes: `python -m benchmarks.daemon [--rest-s S]`.
 
 From its start to Ready with a warm disk; at rest with the simulated controller on loopback, processor and memory; and
-of a job with a 12 MP frame what the service adds to decoding and tracing.
+of a job with a 12 MP frame what the service adds to decoding and tracing. `--write` puts the table into
+docs/operating.md.
 """
 
 from __future__ import annotations
@@ -13,13 +14,18 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from statistics import median
+from textwrap import fill
 
-from benchmarks.daemon_job import job_times
+from benchmarks.daemon_job import JobTimes, job_times
+from benchmarks.page_section import put_section
 from tests.system.cell import Cell
 from tests.system.processes import until
 
+PAGE = Path(__file__).parents[1] / "docs" / "operating.md"
+PAGE_WIDTH = 120
 READY_S, REST_PERCENT, REST_MEGABYTES, JOB_MS = 2.0, 2.0, 250.0, 50.0
 STARTS = 5
 SETTLES_S = 2.0  # after a start, before the rest is measured
@@ -91,17 +97,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; 1 where a goal is missed."""
     parser = argparse.ArgumentParser(prog="benchmarks.daemon", description=__doc__)
     parser.add_argument("--rest-s", type=float, default=30.0, metavar="S", help="how long rest is measured; default 30")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/operating.md")
     args = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         figures = measured(Path(folder), args.rest_s)
         times = job_times(Path(folder) / "job")
     figures.append(Figure("trigger to accepted, 12 MP, decoding and tracing taken off", times.rest, "ms", JOB_MS))
-    print("| what | measured | goal | met |\n|---|---|---|---|")
-    for figure in figures:
-        print(figure)
-    print(f"\nThat job: decoding {times.decoding:.0f} ms, tracing {times.tracing:.0f} ms, evidence durable ", end="")
-    print(f"{times.archiving:.0f} ms after the controller's answer was in the journal.")
+    text = told(figures, times)
+    print(text)
+    if args.write:
+        put_section("what-it-takes", f"## What it takes\n\n{text}", PAGE)
     return 0 if all(figure.met for figure in figures) else 1
+
+
+def told(figures: Sequence[Figure], times: JobTimes) -> str:
+    """The table, and the job beside it, Markdown."""
+    job = (
+        f"{datetime.now(UTC):%Y-%m-%d}, on {os.cpu_count()} cores with a load of {os.getloadavg()[0]:.1f} at the end,"
+        f" `make bench-daemon`, simulated controller on loopback. Of that job decoding took {times.decoding:.0f} ms and"
+        f" tracing {times.tracing:.0f} ms; its evidence was durable {times.archiving:.0f} ms after the controller's"
+        " answer was in the journal."
+    )
+    rows = "\n".join(str(figure) for figure in figures)
+    return f"| what | measured | goal | met |\n|---|---|---|---|\n{rows}\n\n{fill(job, PAGE_WIDTH)}"
 
 
 def _yes(met: bool) -> str:

@@ -64,6 +64,14 @@ class LinuxCnc:
         """Do what an operator does; see operate.py."""
         subprocess.run(self.by_user(PYTHON, str(self.folder / "operate.py"), *words), check=True, timeout=60)
 
+    def set_pin(self, pin: str, value: str) -> None:
+        """Set a HAL pin that no signal is connected to."""
+        subprocess.run(self.by_user("halcmd", "setp", pin, value), check=True, timeout=30)
+
+    def pin(self, pin: str) -> str:
+        """What a HAL pin shows, as halcmd tells it."""
+        return subprocess.check_output(self.by_user("halcmd", "getp", pin), text=True, timeout=30).strip()
+
     def sampling(self, path: Path) -> subprocess.Popen[bytes]:
         """A process that samples the next program's way."""
         return subprocess.Popen(self.by_user(PYTHON, str(self.folder / "operate.py"), "sample", str(path)))

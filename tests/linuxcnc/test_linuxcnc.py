@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from contour.geometry import Contour
 from tests.linuxcnc.machine import bridge_on, linuxcnc_session
 from tests.linuxcnc.way_picture import draw_way
 from tests.real_parts import need_program
-from tests.system.processes import Process, combtrace, until
+from tests.system.processes import Process, combtrace, jobs, until
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = Path(__file__).parents[2] / "service" / "samples"
@@ -162,13 +163,46 @@ def test_the_operator_asks_for_a_measurement_and_an_emergency_stop_ends_the_read
             bridge.says("a measurement is asked for")
             bridge.says("job 1 started")
             machine.operate("estop")
-            bridge.says("job 1 stopped: emergency stop")
+            bridge.says("job 1 stopped: ")  # whichever of off and emergency stop LinuxCNC shows first
+            bridge.says("state 3: emergency stop")
             bridge.request()
             bridge.says("no measurement asked for: the machine is not ready")
             machine.operate("prepare")
             until(lambda: "-> Ready" in log.read_text().split("emergency")[-1], what="ready again")
         finally:
             service.stop()
+
+
+def test_the_hal_pins_ask_for_a_measurement_at_each_rising_edge_and_show_how_it_stands(machine, tmp_path):
+    with bridge_on(machine, "--run", "--simulated-too", "--hal") as bridge:
+        assert [machine.pin(f"combtrace.{name}") for name in ("ready", "busy", "request")] == ["FALSE"] * 3
+        service = Process(
+            tmp_path / "service.log",
+            *("simulate-service", "--controller", f"127.0.0.1:{bridge.port}", "--state", tmp_path / "state"),
+            *("--aligned", "--shape", "corner"),
+        )
+        try:
+            until(lambda: machine.pin("combtrace.ready") == "TRUE", what="ready")
+            machine.set_pin("combtrace.recipe", "1")
+            machine.set_pin("combtrace.thickness-mm", "12.5")
+            machine.set_pin("combtrace.request", "1")
+            until(lambda: machine.pin("combtrace.busy") == "TRUE", what="busy")
+            assert machine.pin("combtrace.ready") == "FALSE"
+            bridge.says("job 1 done", 60)
+            until(lambda: machine.pin("combtrace.ready") == "TRUE", what="ready again")
+            assert machine.pin("combtrace.busy") == "FALSE"
+            assert bridge.log.read_text().count("a measurement is asked for") == 1  # it is the edge that asks
+            machine.set_pin("combtrace.request", "0")
+            machine.set_pin("combtrace.recipe", "7")
+            until(lambda: machine.pin("combtrace.request") == "FALSE", what="the pin let go")
+            time.sleep(0.1)  # some scans of the bridge
+            machine.set_pin("combtrace.request", "1")
+            until(lambda: "job 2 refused" in service.text, what="the second job")
+        finally:
+            service.stop()
+        first, second = jobs(tmp_path / "state" / "journal.sqlite")
+        assert (first["outcome"], first["recipe"], first["thickness_um"]) == ("accepted", 1, 12_500)
+        assert (second["outcome"], second["reason"], second["recipe"]) == ("refused", 122, 7)
 
 
 def test_the_bridge_keeps_the_protocols_rules_as_the_hardware_in_loop_suite_tries_them(machine):

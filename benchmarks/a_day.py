@@ -11,12 +11,11 @@ import os
 import re
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from textwrap import fill
@@ -26,6 +25,7 @@ import numpy as np
 
 from tests.system.cell import SAMPLES, Cell
 from tests.system.processes import combtrace, until
+from tests.system.small_disk import mounted
 
 PAGE = Path(__file__).parents[1] / "docs" / "a-day.md"
 WIDTH = 120
@@ -215,26 +215,21 @@ def evening(day: Day) -> None:
 @contextmanager
 def started() -> Iterator[Day]:
     """The daemon, without its controller yet, on a folder with a small disk in it."""
-    folder = Path(tempfile.mkdtemp(prefix="combtrace-day-"))
-    small = folder / "disk"
-    small.mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=40m", "combtrace-day", small], check=True)
-    shutil.copytree(SAMPLES, folder / "pictures", ignore=shutil.ignore_patterns("*.yaml"))
-    cell = Cell(
-        folder,
-        camera=f"{{kind: files, path: {folder}/pictures, loop: true}}",
-        journal=f"{{path: {small}/journal.sqlite, min_free_bytes: 5000000}}",
-        trigger_every_s=1.0,
-        more=f"archive: {{path: {small}/archive, min_free_bytes: 8000000}}\n",
-    )
-    cell.journal = small / "journal.sqlite"
-    cell.controller.kill()
-    try:
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="combtrace-day-")))
+        small = stack.enter_context(mounted(folder / "disk", 40))
+        shutil.copytree(SAMPLES, folder / "pictures", ignore=shutil.ignore_patterns("*.yaml"))
+        cell = Cell(
+            folder,
+            camera=f"{{kind: files, path: {folder}/pictures, loop: true}}",
+            journal=f"{{path: {small}/journal.sqlite, min_free_bytes: 5000000}}",
+            trigger_every_s=1.0,
+            more=f"archive: {{path: {small}/archive, min_free_bytes: 8000000}}\n",
+        )
+        cell.journal = small / "journal.sqlite"
+        cell.controller.kill()
+        stack.callback(cell.stop)
         yield Day(cell, folder)
-    finally:
-        cell.stop()
-        subprocess.run(["umount", small], check=True)
-        shutil.rmtree(folder)
 
 
 SCENES: tuple[Callable[[Day], None], ...] = (

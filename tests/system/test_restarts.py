@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import random
+import shutil
 import time
 from pathlib import Path
 
-from tests.system.cell import Cell
+from tests.system.cell import SAMPLES, Cell
 from tests.system.processes import jobs, lines, until
 
 
@@ -65,6 +66,23 @@ def test_losing_the_controller_leads_to_error_and_its_return_back_to_ready(tmp_p
         cell.goes_on(1)
     finally:
         cell.stop()
+
+
+def test_losing_the_camera_leads_to_error_and_its_return_back_to_ready(tmp_path: Path) -> None:
+    pictures, unplugged = tmp_path / "pictures", tmp_path / "unplugged"
+    shutil.copytree(SAMPLES, pictures, ignore=shutil.ignore_patterns("*.yaml"))
+    cell = Cell(tmp_path, camera=f"{{kind: files, path: {pictures}, loop: true}}", trigger_every_s=0.3)
+    try:
+        cell.goes_on(1)
+        pictures.rename(unplugged)
+        until(lambda: "-> Error" in cell.service.text.rpartition("-> Ready")[2], what="Error")
+        unplugged.rename(pictures)
+        cell.goes_on(2)
+        assert cell.service.stop() == 0
+    finally:
+        cell.stop()
+    others = {(job["outcome"], job["reason"]) for job in jobs(cell.journal) if job["outcome"] != "accepted"}
+    assert others <= {("failed", 100), (None, None)}, "a job that met it failed by name; no other was begun"
 
 
 def test_a_second_service_on_the_same_state_is_refused(tmp_path: Path) -> None:

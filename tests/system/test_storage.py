@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from tests.real_parts import missing
 from tests.soak.long_run import run
 from tests.system.cell import Cell
-from tests.system.processes import combtrace, jobs, until
+from tests.system.processes import ENVIRONMENT, combtrace, jobs, until
+from tests.system.small_disk import CannotMount, mounted
 
 MEGABYTE = 1_000_000
 
@@ -20,17 +23,11 @@ MEGABYTE = 1_000_000
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
     """A file system of 40 MB of its own."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    done = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=40m", "combtrace-test", disk], capture_output=True, check=False
-    )
-    if done.returncode != 0:
-        pytest.skip(f"a small disk cannot be mounted here, which needs root: {done.stderr.decode().strip()}")
     try:
-        yield disk
-    finally:
-        subprocess.run(["umount", disk], check=True)
+        with mounted(tmp_path / "disk", 40) as disk:
+            yield disk
+    except CannotMount as why:
+        missing(str(why))
 
 
 def fill(disk: Path, leave: int) -> Path:
@@ -136,3 +133,15 @@ def test_many_jobs_leave_descriptors_threads_and_the_archive_as_they_were(tmp_pa
     assert {look.threads for look in course.later} == {course.first.threads}
     assert course.outcomes.keys() == {"accepted", "refused"}
     assert course.unsettled <= 1
+
+
+def test_a_small_disk_goes_with_the_test_that_is_killed(small_disk: Path, tmp_path: Path) -> None:
+    """The fixture's own promise, as a mount that stays would fill up with every run."""
+    program = (
+        "import os, signal, sys\nfrom pathlib import Path\nfrom tests.system.small_disk import mounted\n"
+        "with mounted(Path(sys.argv[1]), 1):\n    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    disk = tmp_path / "other"
+    subprocess.run([sys.executable, "-c", program, disk], check=False, env=ENVIRONMENT)
+    until(lambda: disk.exists() and not os.path.ismount(disk), what="the end of the mount")
+    assert os.path.ismount(small_disk)

@@ -24,11 +24,11 @@ test-camera: install
 	$(BIN)/python tests/camera_guest/guest.py --timeout 1800 -- env COMBTRACE_CAMERA_GUEST=1 \
 		$(BIN)/python -m pytest tests/camera_guest tests/contracts/test_camera_contract.py -p no:cacheprovider
 
-# FRAMES=100000: how memory fares over that many, half an hour.
 # Contours driven by a real CNC controller, in simulation (Debian's linuxcnc-uspace).
 test-linuxcnc: install
 	COMBTRACE_LINUXCNC=1 $(BIN)/python -m pytest tests/linuxcnc
 
+# FRAMES=100000: how memory fares over that many, half an hour.
 bench-camera: install
 	$(BIN)/python tests/camera_guest/guest.py --timeout 6000 -- $(BIN)/python -m benchmarks.cameras --frames $(or $(FRAMES),3000)
 

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from contour.geometry import Contour, area, signed_area
+from service.cli.main import main
 from service.cli.simulate_service import SHAPES as OFFERED
 from service.config import Recipe
+from service.config_file import SAMPLES
 from service.export.document import ExportDocument
 from service.export.geojson import to_geojson
 from service.given_contours import GivenContour, GivenContours, GivenContoursError, read_contours
@@ -57,6 +59,18 @@ def test_what_trace_writes_is_read_with_its_uncertainty_line_by_line(tmp_path):
     ]
     first, second = read(tmp_path, "\n".join(map(json.dumps, lines)) + "\n")
     assert (first.uncertainty_mm, second.uncertainty_mm) == (0.3, None)
+
+
+def test_what_the_trace_command_writes_is_what_is_sent(tmp_path):
+    written = tmp_path / "traced.jsonl"
+    picture, calibration = SAMPLES / "4-with-holes.jpg", SAMPLES / "calibration.yaml"
+    assert main(["trace", str(picture), "--calibration", str(calibration), "--json", str(written)]) == 0
+    traced = json.loads(written.read_text())
+    (given,) = read_contours(written)
+    assert given.uncertainty_mm == traced["uncertainty_mm"] > 0
+    assert np.array_equal(given.contour.exterior, traced["millimetres"]["exterior"])
+    assert len(given.contour.holes) == len(traced["millimetres"]["holes"]) == 2
+    assert measured(given)[0].reasons == ()
 
 
 def test_our_own_export_is_read_back(tmp_path):

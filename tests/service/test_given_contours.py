@@ -117,6 +117,12 @@ def test_contours_come_in_turn_and_begin_again():
     assert methods == ["given: rectangle", "given: holes", "given: rectangle"]
 
 
+def test_the_page_shows_every_shape():
+    page = (Path(__file__).parents[2] / "docs" / "simulated-service.md").read_text(encoding="utf-8")
+    shown = [line.split("`")[1] for line in page.splitlines() if line.startswith("| `")]
+    assert shown == list(SHAPES)
+
+
 def test_every_shape_is_offered_and_sound_but_the_one_that_crosses_itself():
     assert tuple(SHAPES) == OFFERED
     for name in SHAPES:

@@ -171,6 +171,48 @@ class Jobs(Answer):
     jobs: list[Job]
 
 
+Points = list[tuple[float, float]]
+
+
+class Axis(Answer):
+    """A line of one whole millimetre value, as it lies in the picture."""
+
+    axis: Literal["x", "y"]
+    mm: float
+    points: Points
+
+
+class Grid(Answer):
+    """x and y in millimetres at nodes over the whole picture, evenly from edge to edge, row by row from the top."""
+
+    columns: int
+    rows: int
+    millimetres: list[float]
+
+
+class SentinelMark(Answer):
+    """A fixed mark where the calibration saw it."""
+
+    id: int
+    corners: Points
+
+
+class Drawing(Answer):
+    """What is drawn over a job's frame, in its pixels; (0, 0) is the centre of the top-left one."""
+
+    job_id: int
+    width: int
+    height: int
+    refused: bool
+    exterior: Points
+    holes: list[Points]
+    band_px: float | None = Field(description="What the contour may be off by.")
+    size_mm: tuple[float, float] | None
+    sentinels: list[SentinelMark]
+    grid: Grid | None
+    axes: list[Axis]
+
+
 class ReasonText(Answer):
     """A reason in one language."""
 

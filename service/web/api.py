@@ -14,13 +14,16 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
+from service.archived_job import EvidenceError, load_archived
 from service.evidence import FRAME, job_fields
 from service.journal import Job
 from service.journal_reader import JobFilter, JournalUnreadable, reading
 from service.reasons import Language, Reason
 from service.web import answers
+from service.web.drawing import drawing
 from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept
 from service.web.guard import BodyTooLarge
+from service.web.live import MOST_VIEWERS, PERIOD_S, EventStream, Live
 from service.web.openapi import PREFIX, document
 from service.web.operations_table import MOST_JOBS, MOST_NOTES, OPERATIONS
 from service.web.orders import Orders, Refusal
@@ -41,11 +44,13 @@ class Api:
         self._archive = window.sources.archive_path
         self._journal = window.sources.journal_path
         self._pictures = Pictures()
+        self.live = Live(window)
         self._document = json.dumps(document(OPERATIONS, version), ensure_ascii=False).encode()
         self._reasons = _encoded(_reasons())
 
     def close(self) -> None:
         """Let go of threads."""
+        self.live.close()
         self._pictures.close()
 
     def routes(self) -> list[Route]:
@@ -55,7 +60,9 @@ class Api:
             "/jobs": self.jobs,
             "/jobs/{job}": self.job,
             "/jobs/{job}/files/{name}": self.file,
+            "/jobs/{job}/drawing": self.drawing,
             "/frames/{job}": self.frame,
+            "/events": self.events,
             "/reasons": self.reasons,
             "/audit": self.audit,
             "/openapi.json": self.openapi,
@@ -129,6 +136,17 @@ class Api:
             raise Refusal(404, f"{name} of job {number} is not kept. See archive.max_bytes")
         return path
 
+    async def drawing(self, request: Request) -> Response:
+        """What is drawn over a job's frame."""
+        number = _job_number(request)
+        return _answer(await asyncio.to_thread(lambda: drawing(load_archived(self._archive, number))))
+
+    async def events(self, _request: Request) -> Response:
+        """The state, as it changes."""
+        if self.live.full:
+            raise Refusal(503, f"{MOST_VIEWERS} viewers watch already", again_s=PERIOD_S)
+        return EventStream(self.live)
+
     async def reasons(self, _request: Request) -> Response:
         """The table of reasons."""
         return Response(self._reasons, media_type="application/json")
@@ -182,6 +200,8 @@ def told(endpoint: Endpoint) -> Endpoint:
             return problem(refusal.status, str(refusal), refusal.reason, refusal.again_s)
         except (DaemonSilent, JournalUnreadable) as error:
             return problem(503, str(error))
+        except EvidenceError as error:
+            return problem(404, str(error))
         except BodyTooLarge:
             return problem(413, "the body is too large")
 

@@ -52,6 +52,10 @@ OPERATIONS = (
         {400: "A parameter is not as expected.", **_NO_JOB},
         (_JOB, Parameter("width", {"type": "integer", "enum": list(WIDTHS_PX)}, "At most so wide, px.")),
     ),
+    Operation("GET", "/jobs/{job}/drawing", "What is drawn over its frame", answers.Drawing, _NO_JOB, (_JOB,)),
+    Operation(
+        "GET", "/events", "The service's state, again each second and after each change", "text/event-stream", _SILENT
+    ),
     Operation("GET", "/reasons", "Why jobs are not accepted, in words", answers.Reasons, {}),
     Operation(
         "GET",

@@ -21,6 +21,7 @@ from service.config import Page as PageSettings
 from service.operations import Operations
 from service.web.api import Api, problem
 from service.web.guard import Guard
+from service.web.html import Pages
 from service.web.orders import Orders
 from service.web.tokens import TokenFile, TokenFileError
 from service.web.window import Sources, Window
@@ -77,6 +78,7 @@ class PageServer:
             raise PageError(f"page: {error}") from error
         _check_certificate(settings)
         self.window = Window(sources)
+        self._pages = Pages(self.window, settings.language)
         orders = Orders(self.window, sources.journal, tokens)
         self._make_api: Callable[[], Api] = lambda: Api(self.window, orders, version)
         self._socket: socket.socket | None = _bound(settings.host, settings.port)
@@ -110,7 +112,7 @@ class PageServer:
     def _server_settings(self, api: Api) -> uvicorn.Config:
         settings = self._settings
         return uvicorn.Config(
-            Guard(application(api), settings.names),
+            Guard(application(api, self._pages), settings.names),
             loop="asyncio",
             http=_BoundedHttp,
             ws="none",
@@ -128,7 +130,7 @@ class PageServer:
         )
 
 
-def application(api: Api) -> Starlette:
+def application(api: Api, pages: Pages) -> Starlette:
     """All that is served; what is not there is told as every error is."""
 
     async def unknown(_request: Request, _error: Exception) -> Response:
@@ -137,7 +139,7 @@ def application(api: Api) -> Starlette:
     async def wrong_method(_request: Request, _error: Exception) -> Response:
         return problem(405, "not by this method. See /api/v1/openapi.json")
 
-    return Starlette(routes=api.routes(), exception_handlers={404: unknown, 405: wrong_method})
+    return Starlette(routes=[*pages.routes(), *api.routes()], exception_handlers={404: unknown, 405: wrong_method})
 
 
 def _serve(server: uvicorn.Server, listener: socket.socket) -> None:

@@ -61,7 +61,7 @@ class Window:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._operations: Operations | None = None
         self._outcomes: Counter[tuple[str, str]] = Counter()
-        self._listeners: list[Callable[[], None]] = []
+        self.on_change: Callable[[], None] = lambda: None  # told of every change in the daemon's loop; must not block
 
     def open(self, operations: Operations) -> None:
         """Begin to look; in the daemon's loop."""
@@ -71,18 +71,12 @@ class Window:
         self._loop = asyncio.get_running_loop()
         self._operations = operations
 
-    def listen(self, listener: Callable[[], None]) -> None:
-        """Tell `listener` of every change, in the daemon's loop; it must not block."""
-        self._listeners.append(listener)
-
     def _changed(self, _state: State, _reason: str | None) -> None:
-        for listener in self._listeners:
-            listener()
+        self.on_change()
 
     def _settled(self, job: Job) -> None:
         self._outcomes[str(job.outcome), "" if job.reason is None else job.reason.label] += 1
-        for listener in self._listeners:
-            listener()
+        self.on_change()
 
     # --- looking ------------------------------------------------------------------------------------------------
 

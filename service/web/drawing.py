@@ -1,0 +1,124 @@
+"""What is drawn over a job's frame: its contour in pixels, the band of its uncertainty, fixed marks, and millimetres.
+
+All in pixels of the full frame, (0, 0) the centre of the top-left one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.calibration import Calibration
+from contour.errors import CalibrationError
+from contour.geometry import Contour, area
+from service.archived_job import ArchivedJob, EvidenceError
+from service.calibration_file import CalibrationFileError, CalibrationRecord, record_of
+from service.web.answers import Axis, Drawing, Grid, SentinelMark
+
+Floats = NDArray[np.float64]
+
+GRID_COLUMNS, GRID_ROWS = 49, 37  # between the nodes a browser interpolates: docs/operators-guide.md says how well
+LINES_WANTED = 10
+LINE_POINTS = 33
+
+
+def drawing(archived: ArchivedJob) -> Drawing:
+    """What is drawn over the frame of an archived job; raise EvidenceError where there is no frame."""
+    document = archived.document
+    if document["frame"] is None:
+        raise EvidenceError(f"job {archived.job_id}: no frame was archived")
+    height, width = document["frame"]["shape"][:2]
+    measured = document["measurement"]
+    pixels = archived.contour("pixels") if measured else None
+    millimetres = archived.contour("millimetres") if measured else None
+    record = _record(archived)
+    grid = None if record is None else _grid(record.calibration, width, height, document["thickness_mm"])
+    return Drawing(
+        job_id=archived.job_id,
+        width=width,
+        height=height,
+        refused=document["job"]["outcome"] not in ("accepted", "written"),
+        exterior=_pairs(pixels.exterior) if pixels else [],
+        holes=[_pairs(hole) for hole in pixels.holes] if pixels else [],
+        band_px=_band_px(measured["uncertainty_mm"] if measured else None, pixels, millimetres),
+        size_mm=None if millimetres is None else _size(millimetres),
+        sentinels=_marks(record),
+        grid=grid,
+        axes=[] if record is None or grid is None else _axes(record.calibration, grid, document["thickness_mm"]),
+    )
+
+
+def _record(archived: ArchivedJob) -> CalibrationRecord | None:
+    kept = archived.document["calibration"]
+    if kept is None:
+        return None
+    try:
+        return record_of(kept["content"], str(archived.path))
+    except CalibrationFileError:  # of a form that this version does not know: then without millimetres
+        return None
+
+
+def _pairs(points: Floats) -> list[tuple[float, float]]:
+    return [(round(float(x), 2), round(float(y), 2)) for x, y in points]
+
+
+def _size(millimetres: Contour) -> tuple[float, float]:
+    width, height = np.ptp(millimetres.exterior, axis=0).tolist()
+    return round(width, 2), round(height, 2)
+
+
+def _band_px(uncertainty_mm: float | None, pixels: Contour | None, millimetres: Contour | None) -> float | None:
+    """What the contour may be off by, in pixels of about where it lies."""
+    if uncertainty_mm is None or pixels is None or millimetres is None:
+        return None
+    seen, true = area(pixels), area(millimetres)
+    return round(uncertainty_mm * math.sqrt(seen / true), 2) if true > 0 else None
+
+
+def _marks(record: CalibrationRecord | None) -> list[SentinelMark]:
+    if record is None or record.sentinels is None:
+        return []
+    return [SentinelMark(id=mark.id, corners=_pairs(mark.corners_px)) for mark in record.sentinels.marks]
+
+
+def _grid(calibration: Calibration, width: int, height: int, thickness_mm: float) -> Grid | None:
+    """Millimetres at nodes over the picture, row by row from the top; None where a node does not look at the plane."""
+    if (calibration.image_width, calibration.image_height) != (width, height):
+        return None
+    columns, rows = np.linspace(-0.5, width - 0.5, GRID_COLUMNS), np.linspace(-0.5, height - 0.5, GRID_ROWS)
+    nodes = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    try:
+        points = calibration.to_machine(calibration.to_work(nodes, thickness_mm))
+    except CalibrationError:
+        return None
+    flat = [round(float(value), 3) for value in points.ravel()]
+    return Grid(columns=GRID_COLUMNS, rows=GRID_ROWS, millimetres=flat)
+
+
+def _axes(calibration: Calibration, grid: Grid, thickness_mm: float) -> list[Axis]:
+    """Lines of whole millimetres across the picture, of x then of y."""
+    points = np.array(grid.millimetres).reshape(-1, 2)
+    least, most = points.min(axis=0), points.max(axis=0)
+    step = nice_step(float(max(most - least)) / LINES_WANTED)
+    lines = []
+    name: Literal["x", "y"]
+    for name, along, across in (("x", 0, 1), ("y", 1, 0)):
+        for k in range(math.ceil(least[along] / step), math.floor(most[along] / step) + 1):
+            line = np.empty((LINE_POINTS, 2))
+            line[:, along] = k * step
+            line[:, across] = np.linspace(least[across], most[across], LINE_POINTS)
+            try:
+                seen = calibration.to_pixels(line, thickness_mm)
+            except CalibrationError:  # behind the camera
+                continue
+            lines.append(Axis(axis=name, mm=round(k * step, 6), points=_pairs(seen)))
+    return lines
+
+
+def nice_step(least: float) -> float:
+    """The smallest of 1, 2, 5, 10, 20, 50 … (also below 1) that is not below `least`."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))

@@ -1,0 +1,137 @@
+// The service now: banner, counters, why it is not ready, and its parts at a glance.
+
+import { at, make, say, shape } from "./dom.js";
+import { bytes, chosen, duration, moment, number, onLanguage, words } from "./words.js";
+import { get } from "./service.js";
+
+const KINDS = {
+  Preoperational: "starting", Initialized: "starting", Ready: "ready", SingleExecution: "busy",
+  ContinuousExecution: "busy", Halted: "halted", Error: "fault",
+};
+
+let state = null;
+let heardAt = null;
+let isLost = false;
+let reasons = new Map();
+
+export async function loadReasons() {
+  const told = await get("/reasons");
+  reasons = new Map(told.reasons.map((entry) => [entry.code, entry]));
+}
+
+/** Sentence and next action of a reason's code, in the chosen language. */
+export function reasonOf(code) {
+  return reasons.get(code)?.[chosen()] ?? null;
+}
+
+export function show(next) {
+  state = next;
+  heardAt = new Date();
+  isLost = false;
+  refresh();
+}
+
+export function lose() {
+  isLost = true;
+  refresh();
+}
+
+export function current() {
+  return isLost ? null : state;
+}
+
+function refresh() {
+  document.body.classList.toggle("stale", isLost);
+  for (const button of document.querySelectorAll("#orders button")) button.disabled = isLost;
+  banner();
+  if (!state) return;
+  counters();
+  whys();
+  glance();
+}
+
+function banner() {
+  if (isLost || !state) {
+    if (isLost) put("lost", words("lost"), heardAt ? words("seen_last", { time: moment(heardAt) }) : words("never_seen"));
+    return;
+  }
+  const notReady = state.link && state.link.not_ready;
+  const kind = state.state === "Ready" && notReady ? "waiting" : KINDS[state.state];
+  const told = state.code ? reasonOf(state.code)?.sentence : null;
+  const why = told ?? (kind === "halted" ? state.reason : null);
+  const job = state.job === null ? null : words("job_runs", { job: state.job });
+  put(kind, words(kind === "waiting" ? "waiting" : state.state), [job, words("since", { time: duration(state.since_s) }), why].filter(Boolean).join(" · "));
+}
+
+function put(kind, word, line) {
+  const header = at("banner");
+  if (header.dataset.kind !== kind) {
+    header.dataset.kind = kind;
+    at("shape").firstElementChild.setAttribute("href", `#s-${kind}`);
+  }
+  say("state", word);
+  say("since", line);
+  document.title = `${word} – combtrace`;
+}
+
+function counters() {
+  const counts = { accepted: 0, refused: 0, failed: 0 };
+  const lines = { accepted: [], refused: [], failed: [] };
+  for (const { outcome, reason, count } of state.outcomes) {
+    const name = outcome === "written" ? "accepted" : outcome;
+    counts[name] += count;
+    if (reason) lines[name].push(`${reason}: ${count}`);
+  }
+  for (const name of Object.keys(counts)) {
+    say(`count-${name}`, number(counts[name]));
+    at(`count-${name}`).title = lines[name].join("\n");
+  }
+  say("count-missed", number(state.missed_triggers));
+}
+
+function whys() {
+  const entries = Object.entries(state.faults).map(([part, fault]) => why(reasonOf(fault.code), `${part}: ${fault.text}`));
+  const faults = entries.length;
+  if (state.state === "Halted" && !faults) entries.push(why(null, state.reason));
+  if (!faults && state.state === "Ready" && state.link?.not_ready) entries.push(why(null, state.link.not_ready));
+  for (const [part, text] of Object.entries(state.warnings)) entries.push(why({ sentence: words("warning"), next_action: "" }, `${part}: ${text}`));
+  const list = at("whys");
+  if (list.textContent !== entries.map((entry) => entry.textContent).join("")) list.replaceChildren(...entries);
+  at("why").hidden = !entries.length;
+  at("why").classList.toggle("mild", !faults);
+}
+
+function why(told, text) {
+  const head = told ? [make("strong", {}, told.sentence), " ", told.next_action] : [];
+  return make("li", {}, ...head, make("small", {}, text ?? ""));
+}
+
+function glance() {
+  const { camera, link, calibration, disk, faults } = state;
+  const lines = [
+    line("camera", camera.up, `${camera.what}, ${words(camera.up ? "works" : "broken")}`),
+    link
+      ? line("link", link.up, `${link.what}, ${link.up && link.round_trip_ms !== null ? words("round_trip", { ms: number(link.round_trip_ms, 1) }) : words(link.up ? "works" : "broken")}`)
+      : line("link", null, words("no_link")),
+    line("calibration", !("calibration" in faults) && (calibration ? true : null), ageOf(calibration)),
+    line("disk", !("storage" in faults || "journal" in faults), disk.journal_free_bytes === null ? words("not_known") : words("disk_free", { free: bytes(disk.journal_free_bytes), kept: bytes(disk.archive_bytes) })),
+  ];
+  at("glance").replaceChildren(...lines);
+}
+
+function ageOf(calibration) {
+  if (!calibration) return words("no_calibration");
+  const { age_days: age, max_age_days: most } = calibration;
+  if (age === null) return words("age_unknown");
+  const days = number(Math.max(age, 0));
+  return most ? words("days_of", { days, most: number(most) }) : words("days_old", { days });
+}
+
+function line(key, well, text) {
+  const kind = well === null ? "none" : well ? "accepted" : "failed";
+  const mark = shape(kind);
+  mark.dataset.kind = kind;
+  return make("li", {}, mark, make("span", { class: "what" }, words(key)), make("span", {}, text));
+}
+
+onLanguage(refresh);

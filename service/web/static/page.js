@@ -1,0 +1,61 @@
+// The operator's page: puts its parts together. It uses nothing but the REST interface under /api/v1.
+
+import { at, make, say } from "./dom.js";
+import { choose, chosen, keep, load, onLanguage, words } from "./words.js";
+import { listen } from "./service.js";
+import * as film from "./film.js";
+import * as now from "./now.js";
+import * as orders from "./orders.js";
+
+const THEMES = { auto: "dark", dark: "light", light: "auto" };
+let seen = "";
+
+function heard(state) {
+  now.show(state);
+  orders.show(state);
+  const newest = `${state.job} ${state.last_job?.job} ${state.settled_job} ${state.disk.archive_jobs}`;
+  if (newest !== seen) film.refresh();
+  seen = newest;
+}
+
+function lost() {
+  seen = "";
+  now.lose();
+}
+
+function switchLanguage() {
+  choose(chosen() === "en" ? "ru" : "en");
+}
+
+function switchTheme() {
+  const root = document.documentElement;
+  root.dataset.theme = THEMES[root.dataset.theme];
+  keep("theme", root.dataset.theme);
+}
+
+function help() {
+  const rows = [["M", "key_m"], ["F", "key_f"], ["R", "key_r"], ["← →", "key_arrows"], ["+ − 0", "key_zoom"], ["L", "key_l"], ["T", "key_t"], ["Esc", "key_esc"]];
+  at("keys").replaceChildren(...rows.flatMap(([key, text]) => [make("dt", {}, key), make("dd", {}, words(text))]));
+  say("version", words("service_version", { version: now.current()?.version ?? "–", host: location.host }));
+  if (!at("help-dialog").open) at("help-dialog").showModal();
+}
+
+// By the key's place, so that they work under a Russian layout too.
+const KEYS = {
+  KeyM: orders.measure, KeyF: film.freeze, KeyR: film.toggleRefused, KeyL: switchLanguage, KeyT: switchTheme, Slash: help,
+  ArrowLeft: () => film.go(-1), ArrowRight: () => film.go(1), Escape: film.live,
+};
+
+document.addEventListener("keydown", (event) => {
+  const busy = event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]");
+  if (busy || /^(INPUT|SELECT)$/.test(event.target.tagName) || !KEYS[event.code]) return;
+  event.preventDefault();
+  KEYS[event.code]();
+});
+at("language").addEventListener("click", switchLanguage);
+at("theme").addEventListener("click", switchTheme);
+at("help").addEventListener("click", help);
+onLanguage(() => at("help-dialog").open && help());
+
+await Promise.all([load(), now.loadReasons()]);
+listen(heard, lost);

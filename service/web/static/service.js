@@ -1,0 +1,74 @@
+// The service, by its REST interface: what is asked, what comes by itself, and the token of whoever gives orders.
+
+const BASE = "/api/v1";
+const FORGOTTEN_MS = 600_000;
+const SILENT_MS = 3_500;
+const AGAIN_MS = 2_000;
+
+let token = null;
+let forgetting = null;
+
+export class Refused extends Error {
+  constructor(status, problem) {
+    super(problem.error);
+    this.status = status;
+    this.code = problem.code;
+  }
+}
+
+export async function get(path) {
+  const answer = await fetch(BASE + path, { cache: "no-store" });
+  if (!answer.ok) throw new Refused(answer.status, await answer.json());
+  return answer.json();
+}
+
+export function hasToken() {
+  return token !== null;
+}
+
+export function remember(value) {
+  token = value;
+  clearTimeout(forgetting);
+  forgetting = setTimeout(forget, FORGOTTEN_MS);
+}
+
+export function forget() {
+  token = null;
+}
+
+export async function order(path, body) {
+  const headers = { "Content-Type": "application/json", Authorization: `Bearer ${token}` };
+  const answer = await fetch(BASE + path, { method: "POST", headers, body: JSON.stringify(body) });
+  const told = await answer.json();
+  if (answer.status === 401) forget();
+  if (!answer.ok) throw new Refused(answer.status, told);
+  remember(token);
+  return told;
+}
+
+/** Calls `heard` with each state, and `lost` once nothing is heard for some seconds or the connection breaks. */
+export function listen(heard, lost) {
+  let source = null;
+  let silence = null;
+  let isLost = false;
+  const lose = () => {
+    if (!isLost) lost();
+    isLost = true;
+  };
+  const open = () => {
+    source = new EventSource(`${BASE}/events`);
+    source.onmessage = (event) => {
+      clearTimeout(silence);
+      silence = setTimeout(lose, SILENT_MS);
+      isLost = false;
+      heard(JSON.parse(event.data));
+    };
+    source.onerror = () => {
+      lose();
+      source.close();
+      setTimeout(open, AGAIN_MS);
+    };
+  };
+  silence = setTimeout(lose, SILENT_MS);
+  open();
+}

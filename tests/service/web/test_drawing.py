@@ -1,0 +1,101 @@
+"""What is drawn over a frame lies where calibration and contour say."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from service.archived_job import ArchivedJob, EvidenceError
+from service.calibration_file import load_record
+from service.web.answers import Drawing, Grid
+from service.web.drawing import drawing, nice_step
+
+SAMPLES = Path(__file__).parents[3] / "service" / "samples"
+RECORD = load_record(SAMPLES / "calibration.yaml")
+WIDTH, HEIGHT = RECORD.calibration.image_width, RECORD.calibration.image_height
+SQUARE_MM = np.array([[100.0, 100.0], [300.0, 100.0], [300.0, 250.0], [100.0, 250.0]])
+THICKNESS_MM = 20.0
+
+
+def archived(**changes: Any) -> ArchivedJob:
+    pixels = RECORD.calibration.to_pixels(SQUARE_MM, THICKNESS_MM)
+    document: dict[str, Any] = {
+        "job": {"outcome": "accepted"},
+        "frame": {"shape": [HEIGHT, WIDTH, 3]},
+        "thickness_mm": THICKNESS_MM,
+        "calibration": {"content": yaml.safe_load((SAMPLES / "calibration.yaml").read_text())},
+        "measurement": {
+            "uncertainty_mm": 2.0,
+            "pixels": {"exterior": pixels.tolist(), "holes": []},
+            "millimetres": {"exterior": SQUARE_MM.tolist(), "holes": []},
+        },
+    }
+    return ArchivedJob(7, Path("7-accepted.json"), {**document, **changes})
+
+
+def interpolated(shown: Drawing, grid: Grid, x: float, y: float) -> tuple[float, float]:
+    """As static/picture.js does it."""
+    nodes = np.array(grid.millimetres).reshape(grid.rows, grid.columns, 2)
+    column, row = (x + 0.5) / shown.width * (grid.columns - 1), (y + 0.5) / shown.height * (grid.rows - 1)
+    left, top = min(int(column), grid.columns - 2), min(int(row), grid.rows - 2)
+    across, down = column - left, row - top
+    upper = (1 - across) * nodes[top, left] + across * nodes[top, left + 1]
+    lower = (1 - across) * nodes[top + 1, left] + across * nodes[top + 1, left + 1]
+    found = (1 - down) * upper + down * lower
+    return float(found[0]), float(found[1])
+
+
+def test_between_its_nodes_the_grid_is_true_to_a_twentieth_of_a_millimetre() -> None:
+    shown = drawing(archived())
+    assert shown.grid is not None
+    places = np.random.default_rng(5).uniform([0, 0], [WIDTH - 1, HEIGHT - 1], (400, 2))
+    true = RECORD.calibration.to_machine(RECORD.calibration.to_work(places, THICKNESS_MM))
+    seen = np.array([interpolated(shown, shown.grid, x, y) for x, y in places])
+    assert np.abs(seen - true).max() < 0.05
+
+
+def test_each_axis_lies_on_its_millimetres() -> None:
+    shown = drawing(archived())
+    assert {axis.axis for axis in shown.axes} == {"x", "y"}
+    for axis in shown.axes:
+        found = RECORD.calibration.to_machine(RECORD.calibration.to_work(np.array(axis.points), THICKNESS_MM))
+        assert np.abs(found[:, 0 if axis.axis == "x" else 1] - axis.mm).max() < 0.05
+
+
+def test_size_and_band_are_the_contours() -> None:
+    shown = drawing(archived())
+    assert shown.size_mm == (200, 150)
+    pixels = RECORD.calibration.to_pixels(SQUARE_MM, THICKNESS_MM)
+    px_per_mm = math.dist(pixels[0], pixels[1]) / 200
+    assert shown.band_px == pytest.approx(2 * px_per_mm, rel=0.02)
+
+
+def test_without_calibration_or_contour_the_frame_is_shown_alone() -> None:
+    shown = drawing(archived(calibration=None, measurement=None, job={"outcome": "refused"}))
+    assert (shown.grid, shown.axes, shown.exterior, shown.band_px, shown.size_mm, shown.refused) == (
+        None,
+        [],
+        [],
+        None,
+        None,
+        True,
+    )
+
+
+def test_another_pictures_calibration_draws_no_millimetres() -> None:
+    assert drawing(archived(frame={"shape": [100, 100]})).grid is None
+
+
+def test_without_a_frame_there_is_nothing_to_draw_on() -> None:
+    with pytest.raises(EvidenceError, match="no frame was archived"):
+        drawing(archived(frame=None))
+
+
+@pytest.mark.parametrize(("least", "step"), [(0.7, 1), (1, 1), (1.2, 2), (23, 50), (51, 100), (0.03, 0.05)])
+def test_steps_are_round(least: float, step: float) -> None:
+    assert nice_step(least) == pytest.approx(step)

@@ -1,0 +1,85 @@
+"""The page's files fit together: every word is there in both languages, and every pair of colours can be read."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import service.web
+from service.state import State
+from service.web.html import KINDS
+
+STATIC = Path(service.web.__file__).parent / "static"
+TEXTS = json.loads((STATIC / "texts.json").read_text())
+SCRIPTS = {path.name: path.read_text() for path in STATIC.glob("*.js")}
+PAGE = (STATIC / "page.html").read_text()
+CSS = (STATIC / "page.css").read_text()
+INK = ("ink", "dim", "good", "bad", "busy", "hold", "gone", "strong")
+
+
+def test_both_languages_have_the_same_words_with_the_same_places() -> None:
+    assert TEXTS["en"].keys() == TEXTS["ru"].keys()
+    for key, english in TEXTS["en"].items():
+        places = [sorted(re.findall(r"\{\w+\}", text)) for text in (english, TEXTS["ru"][key])]
+        assert places[0] == places[1], key
+
+
+def test_every_word_that_is_asked_for_is_there() -> None:
+    asked = set(re.findall(r'data-[ta]="(\w+)"', PAGE)) | {state.label for state in State}
+    for script in SCRIPTS.values():
+        asked |= set(re.findall(r'words\("(\w+)"', script))
+        asked |= set(re.findall(r'(?:line\(|\[)"(\w+)", (?:camera|link|report|job|size|sure|!)', script))
+        asked |= set(re.findall(r'\["[^"]+", "(key_\w+)"\]', script))
+        stages = re.search(r"STAGES = \[(.*?)\]", script)
+        asked |= set(re.findall(r'"(\w+)"', stages[1])) if stages else set()
+    assert len(asked) > 60
+    assert asked - TEXTS["en"].keys() == set()
+
+
+def test_the_server_and_the_script_tell_the_same_shape_of_each_state() -> None:
+    told = re.search(r"const KINDS = \{(.*?)\};", SCRIPTS["now.js"], re.DOTALL)
+    assert told is not None
+    assert dict(re.findall(r'(\w+): "(\w+)"', told[1])) == KINDS
+    assert KINDS.keys() == {state.label for state in State}
+    symbols = set(re.findall(r'id="s-(\w+)"', (STATIC / "symbols.svg").read_text()))
+    outcomes = {"accepted", "written", "refused", "failed", "none", "busy"}
+    assert symbols >= {*KINDS.values(), "lost", "waiting", *outcomes}
+
+
+def test_nothing_in_the_page_is_inline_or_from_elsewhere() -> None:
+    assert re.findall(r"\sstyle=|\son\w+=|<style|javascript:", PAGE) == []
+    assert re.findall(r"<script(?![^>]*\ssrc=)", PAGE) == []
+    for name, text in {**SCRIPTS, "page.html": PAGE, "page.css": CSS}.items():
+        outside = [url for url in re.findall(r"(?:https?:)?//[\w.-]+\.\w+[^\s\"']*", text) if "www.w3.org" not in url]
+        assert [url for url in outside if not url.startswith("//")] == [], name
+    for text in SCRIPTS.values():
+        assert re.findall(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(", text) == []
+
+
+def themes() -> list[dict[str, str]]:
+    blocks = re.findall(r":root(?:\[data-theme=\"(?:dark|auto)\"\])? \{(.*?)\}", CSS, re.DOTALL)
+    return [dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", block)) for block in blocks]
+
+
+@pytest.mark.parametrize("colours", themes(), ids=["light", "dark", "dark by the system"])
+def test_every_pair_of_colours_has_the_contrast_of_aa(colours: dict[str, str]) -> None:
+    for name in INK:
+        for ground in ("panel", "ground"):
+            assert contrast(colours[name], colours[ground]) >= 4.5, f"{name} on {ground}"
+    assert contrast(colours["on-strong"], colours["strong"]) >= 4.5
+    assert contrast(colours["focus"], colours["panel"]) >= 3
+
+
+def contrast(one: str, other: str) -> float:
+    """WCAG 2.1, contrast ratio of two colours #rrggbb."""
+    lighter, darker = sorted((luminance(one), luminance(other)), reverse=True)
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def luminance(colour: str) -> float:
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]

@@ -1,0 +1,281 @@
+"""The operator's page in a real browser, Debian's Chromium: what a person sees and does, beside a running daemon."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect, sync_playwright
+
+from service.reasons import Language, Reason
+from tests.real_parts import need_program
+from tests.system.cell import Cell
+from tests.system.page_client import TOKEN, Client, token_file
+from tests.system.processes import free_port, until
+
+PANEL = {"width": 1280, "height": 800}
+EXPECTED_NOISE = ("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "401", "ERR_EMPTY_RESPONSE", "409")
+
+
+@dataclass
+class Panel:
+    """A daemon, its page in a browser, and all that the browser complained of or asked for."""
+
+    cell: Cell
+    client: Client
+    page: Page
+    complaints: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.client.port}/"
+
+    def ordered(self, **content: Any) -> int:
+        """The number of a job that was ordered past the page, once its evidence is kept."""
+        until(lambda: self.client.get("/api/v1/state").json["link"]["not_ready"] is None, what="a ready controller")
+        reply = until(
+            lambda: (r := self.client.order("/api/v1/trigger", content=content)).status == 202 and r, what="it"
+        )
+        number = reply.json["job"]
+        until(lambda: self.client.get(f"/api/v1/jobs/{number}").json["files"], what="evidence")
+        return int(number)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    path = need_program("chromium", "apt-get install chromium")
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cell, Client]]:
+    folder, port = tmp_path_factory.mktemp("page"), free_port()
+    token_file(folder)
+    more = f"page: {{port: {port}, token_file: tokens}}\n"
+    started = Cell(folder, triggers="[]", trigger_every_s=None, more=more)
+    try:
+        started.ready()
+        yield started, Client(port)
+    finally:
+        started.stop()
+
+
+@pytest.fixture
+def panel(cell: tuple[Cell, Client], browser: Browser) -> Iterator[Panel]:
+    page = browser.new_page(viewport=PANEL, has_touch=True, locale="en-GB")
+    page.set_default_timeout(15_000)
+    opened = Panel(*cell, page)
+    page.on("console", lambda message: message.type == "error" and opened.complaints.append(message.text))
+    page.on("pageerror", lambda error: opened.complaints.append(str(error)))
+    page.on("request", lambda request: opened.asked.append(request.url))
+    page.goto(opened.url)
+    yield opened
+    page.close()
+    assert [one for one in opened.complaints if not any(noise in one for noise in EXPECTED_NOISE)] == []
+    assert [url for url in opened.asked if not url.startswith(opened.url)] == [], "nothing is loaded from elsewhere"
+
+
+def settled_state(panel: Panel, kind: str) -> None:
+    expect(panel.page.locator("#banner")).to_have_attribute("data-kind", kind, timeout=15_000)
+
+
+def test_the_first_view_tells_state_in_words_colour_and_shape_and_every_part(panel: Panel) -> None:
+    page = panel.page
+    settled_state(panel, "ready")
+    expect(page.locator("#state")).to_have_text("Ready")
+    expect(page.locator("#shape use")).to_have_attribute("href", "#s-ready")
+    assert page.locator("#state").evaluate("e => getComputedStyle(e).color") == "rgb(0, 107, 74)"
+    expect(page.locator("#glance li")).to_have_count(4)
+    expect(page.locator("#glance")).to_contain_text("modbus-tcp 127.0.0.1")
+    expect(page.locator("#why")).to_be_hidden()
+    assert page.evaluate("document.documentElement.scrollHeight <= innerHeight"), "all fits on the panel"
+    small = "[...document.querySelectorAll('button')].filter(b => b.offsetParent && b.offsetHeight < 40).map(b => b.id)"
+    assert page.evaluate(small) == []
+
+
+def test_the_server_says_the_state_before_any_script_runs(panel: Panel, browser: Browser) -> None:
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(panel.url)
+    expect(page.locator("#state")).to_have_text("Ready")
+    expect(page.locator("#trigger")).to_have_text("Measure")
+    context.close()
+
+
+def test_the_page_weighs_less_than_150_kb_without_the_frame(panel: Panel, browser: Browser) -> None:
+    page = browser.new_page()
+    weights: dict[str, int] = {}
+    page.on("response", lambda r: "/frames/" in r.url or "/events" in r.url or weights.update({r.url: len(r.body())}))
+    page.goto(panel.url)
+    expect(page.locator("#glance li")).to_have_count(4)
+    page.wait_for_timeout(300)
+    page.close()
+    assert any(url.endswith("page.js") for url in weights)
+    assert 20_000 < sum(weights.values()) < 150_000
+
+
+def test_a_job_appears_by_itself_with_its_contour_and_values(panel: Panel) -> None:
+    page = panel.page
+    page.evaluate("window.sameDocument = true")
+    number = panel.ordered()
+    expect(page.locator("#outcome")).to_have_text(f"job {number}: accepted")
+    job = panel.client.get(f"/api/v1/jobs/{number}").json
+    drawn = page.locator("#view path.exterior").get_attribute("d") or ""
+    holes = [hole.get_attribute("d") or "" for hole in page.locator("#view path.hole").all()]
+    assert sum(len(re.findall(r"[ML]", path)) for path in (drawn, *holes)) == job["report"]["vertices"]
+    image = page.locator("#view image")
+    expect(image).to_have_attribute("href", re.compile(rf"/frames/{number}\?width=1600"))
+    expect(page.locator("#values")).to_contain_text(f"{job['report']['area_mm2']:,.0f}")
+    expect(page.locator("#values")).to_contain_text("±")
+    expect(page.locator("#stages")).to_contain_text("contour")
+    expect(page.locator(f'#strip button[data-job="{number}"]')).to_have_attribute("aria-current", "true")
+    assert page.evaluate("window.sameDocument") is True
+
+
+def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:
+    page = panel.page
+    number = panel.ordered()
+    expect(page.locator("#outcome")).to_contain_text(f"job {number}")
+    document = panel.client.get(f"/api/v1/jobs/{number}/files/document.json").json["measurement"]
+    (x, y), (x_mm, y_mm) = document["pixels"]["exterior"][0], document["millimetres"]["exterior"][0]
+    to_screen = "([x, y]) => { const p = new DOMPoint(x, y).matrixTransform(view.getScreenCTM()); return [p.x, p.y]; }"
+    for _ in range(3):
+        place = page.evaluate(to_screen, [x, y])
+        page.mouse.move(*place)
+        told = re.fullmatch(r"x (-?[\d.,]+)  y (-?[\d.,]+) mm", page.locator("#cursor").text_content() or "")
+        assert told is not None
+        assert abs(float(told[1].replace(",", "")) - x_mm) < 0.6
+        assert abs(float(told[2].replace(",", "")) - y_mm) < 0.6
+        page.mouse.wheel(0, -100)
+        page.wait_for_timeout(50)
+    whole = page.locator("#view").get_attribute("viewBox")
+    page.mouse.move(500, 350)
+    page.mouse.wheel(0, -300)
+    assert page.locator("#view").get_attribute("viewBox") != whole
+    before = page.locator("#view").get_attribute("viewBox")
+    page.mouse.down()
+    page.mouse.move(450, 330)
+    page.mouse.up()
+    assert page.locator("#view").get_attribute("viewBox") != before
+    page.locator("#frame").press("0")
+    assert (page.locator("#view").get_attribute("viewBox") or "").startswith("-0.5 -0.5 ")
+
+
+def test_the_filmstrip_freezes_filters_and_opens_one_with_all_its_values(panel: Panel, tmp_path: Path) -> None:
+    page = panel.page
+    good = panel.ordered()
+    bad = panel.ordered(recipe=77)
+    expect(page.locator("#outcome")).to_have_text(f"job {bad}: refused")
+    expect(page.locator("#because")).to_contain_text(Reason.UNKNOWN_RECIPE.explained().next_action)
+    expect(page.locator("#no-picture")).to_be_visible()
+    page.locator(f'#strip button[data-job="{good}"]').click()
+    expect(page.locator("#outcome")).to_have_text(f"job {good}: accepted")
+    later = panel.ordered()
+    expect(page.locator(f'#strip button[data-job="{later}"]')).to_be_visible()
+    expect(page.locator("#outcome")).to_have_text(f"job {good}: accepted")
+    expect(page.locator("#seen-note")).to_contain_text("frozen")
+    with page.expect_download() as download:
+        page.locator("#downloads a", has_text="document.json").click()
+    download.value.save_as(tmp_path / "saved.json")
+    assert (tmp_path / "saved.json").read_bytes() == panel.client.get(f"/api/v1/jobs/{good}/files/document.json").body
+    page.locator("#freeze").click()
+    expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
+    page.keyboard.press("r")
+    expect(page.locator("#strip button")).to_have_count(len(page.locator("#strip [data-kind=refused]").all()))
+    expect(page.locator("#outcome")).to_contain_text("refused")
+    page.keyboard.press("r")
+    expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("#outcome")).to_have_text(f"job {bad}: refused")
+    page.keyboard.press("Escape")
+    expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
+
+
+def test_a_wrong_token_is_told_and_a_right_one_measures_halts_and_resumes(panel: Panel) -> None:
+    page = panel.page
+    settled_state(panel, "ready")
+    before = panel.client.get("/api/v1/state").json["settled_job"]
+    page.locator("#trigger").click()
+    page.locator("#token").fill("guessed")
+    page.keyboard.press("Enter")
+    expect(page.locator("#token-told")).to_have_text("the token is not known")
+    assert panel.client.get("/api/v1/state").json["settled_job"] == before
+    page.locator("#token").fill(TOKEN)
+    page.locator("#token-ok").click()
+    expect(page.locator("#told")).to_have_text(f"Job {before + 1} is being measured.")
+    expect(page.locator("#outcome")).to_have_text(f"job {before + 1}: accepted")
+    page.locator("#halt").click()
+    settled_state(panel, "halted")
+    expect(page.locator("#whys")).to_contain_text("anna from 127.0.0.1")
+    page.locator("#trigger").click()
+    expect(page.locator("#told")).to_contain_text(Reason.NOT_READY.explained().sentence)
+    page.locator("#resume").click()
+    settled_state(panel, "ready")
+    stored = page.evaluate("[document.cookie, JSON.stringify(localStorage), JSON.stringify(sessionStorage)].join()")
+    assert TOKEN not in stored
+
+
+def test_the_language_is_switched_without_a_reload_and_kept(panel: Panel) -> None:
+    page = panel.page
+    number = panel.ordered()
+    expect(page.locator("#outcome")).to_have_text(f"job {number}: accepted")
+    page.evaluate("window.sameDocument = true")
+    page.locator("#language").click()
+    expect(page.locator("#state")).to_have_text("Готов")
+    expect(page.locator("#outcome")).to_have_text(f"задание {number}: принято")
+    expect(page.locator("#seen-title")).to_contain_text("Заготовка и контур")
+    expect(page.locator("#values")).to_contain_text("мм²")
+    assert page.locator("#zoom-in").get_attribute("aria-label") == "Крупнее"
+    assert page.evaluate("[document.documentElement.lang, window.sameDocument]") == ["ru", True]
+    (cookie,) = page.context.cookies()
+    assert (cookie["name"], cookie["value"], cookie["sameSite"]) == ("language", "ru", "Strict")
+    page.reload()
+    expect(page.locator("#trigger")).to_have_text("Измерить")
+    page.keyboard.press("l")
+    expect(page.locator("#trigger")).to_have_text("Measure")
+
+
+def test_what_keeps_it_from_ready_and_a_lost_daemon_are_shown_and_neither_stays_green(panel: Panel) -> None:
+    page, cell = panel.page, panel.cell
+    settled_state(panel, "ready")
+    cell.controller.kill()
+    settled_state(panel, "fault")
+    lost = Reason.CONTROLLER_LOST
+    expect(page.locator("#whys strong")).to_have_text(lost.explained().sentence)
+    page.locator("#language").click()
+    expect(page.locator("#whys")).to_contain_text(lost.explained(Language.RUSSIAN).next_action)
+    expect(page.locator("#state")).to_have_text("Не готов")
+    cell.controller = cell.start_controller()
+    settled_state(panel, "ready")
+    cell.service.kill()
+    killed_at = time.monotonic()
+    settled_state(panel, "lost")
+    assert time.monotonic() - killed_at < 15
+    expect(page.locator("#state")).to_have_text("Нет связи со службой")
+    expect(page.locator("body")).to_have_class("stale")
+    expect(page.locator("#trigger")).to_be_disabled()
+    cell.service = cell.start_service()
+    settled_state(panel, "ready")
+    expect(page.locator("body")).not_to_have_class("stale")
+
+
+def test_a_daemon_that_stands_still_is_lost_too(panel: Panel) -> None:
+    import os
+    import signal
+
+    settled_state(panel, "ready")
+    os.kill(panel.cell.service.process_id, signal.SIGSTOP)
+    try:
+        settled_state(panel, "lost")
+    finally:
+        os.kill(panel.cell.service.process_id, signal.SIGCONT)
+    until(lambda: panel.page.locator("#banner").get_attribute("data-kind") != "lost", what="it to be heard of again")

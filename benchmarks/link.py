@@ -278,7 +278,7 @@ and server are programs here, which others of the machine disturb.
 
 The link is back when nothing keeps a contour from being sent: connected, answered, the controller's heartbeat seen to
 move, its test echo right. The controller is a process that is killed and started, or stopped in its tracks and let go
-on, away for 0.5 to 4 s; the return counts from when it listens or goes on.
+on, away for 0.5 to 2.5 s; the return counts from when it listens or goes on.
 
 """
 

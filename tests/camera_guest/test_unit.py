@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from service.install_files import packaged
+from tests.real_parts import need_program
 
 ROOT = Path(__file__).parents[2]
 SOURCES, PROGRAM = Path("/opt/src"), Path("/opt/combtrace/bin/combtrace")
@@ -98,6 +99,7 @@ class Systemd:
 
 @pytest.fixture
 def systemd() -> Iterator[Systemd]:
+    need_program("systemd-analyze", "apt-get install systemd")
     SOURCES.mkdir(parents=True, exist_ok=True)
     done("/bin/busybox", "mount", "-o", "bind", ROOT, SOURCES)  # its own place may be below /tmp, which the unit hides
     for folder in (Path("/root"), SOURCES):

@@ -39,14 +39,19 @@ Random scenes of fresh seeds are the stricter test.
 """
 
 
-def write_page(blocks: Sequence[tuple[str, str]], gallery: Gallery) -> list[str]:
-    """Write the page and its pictures; their names. Sections that other commands wrote are kept."""
+def write_page(blocks: Sequence[tuple[str, str]], gallery: Gallery, left_out: Sequence[str]) -> list[str]:
+    """Write the page and its pictures; their names. Sections that other commands wrote are kept.
+
+    `left_out` are the methods that this run did not measure.
+    """
     kept = kept_sections(PAGE)
     paths = gallery.write()
     machine = (
         f"{os.cpu_count()} cores, Python {platform.python_version()}, numpy {np.__version__}, OpenCV {cv2.__version__}"
     )
     parts = [_HEAD.format(arguments=shlex.join(sys.argv[1:])), f"Measured on {machine}.\n"]
+    if left_out:
+        parts.append(f"Not measured in this run, to keep it short: {', '.join(left_out)}.\n")
     *tables, last = blocks
     parts += [f"## {title}\n\n{text}\n" for title, text in tables]
     parts += [f"{section}\n" for section in kept]

@@ -47,7 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for title, text in blocks:
         print(f"\n## {title}\n\n{text}")
     if gallery is not None:
-        print("\nwritten: " + ", ".join(write_page(blocks, gallery)))
+        left_out = [name for name in available_methods()[0] if name not in methods]
+        print("\nwritten: " + ", ".join(write_page(blocks, gallery, left_out)))
     return 0
 
 

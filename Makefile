@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon accuracy refusals rules soak soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page accuracy refusals rules soak soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -40,6 +40,10 @@ bench-link: install
 
 bench-daemon: install
 	$(BIN)/python -m benchmarks.daemon --write
+
+# First paint and weight of the operator's page, and what a viewer costs a job.
+bench-page: install
+	$(BIN)/python -m benchmarks.page --write
 
 accuracy: install
 	$(BIN)/python -m benchmarks.bench --random 300 --first 990000 --write

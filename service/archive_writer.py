@@ -55,6 +55,7 @@ class ArchiveWriter:
         self._table: tuple[TableRecord, str] | None = None
         self._opened = self._closing = False
         self.trouble: str | None = None
+        self.on_stored: Callable[[Evidence], None] = lambda _evidence: None  # told in the writer's thread
 
     @property
     def figures(self) -> ArchiveFigures:
@@ -146,6 +147,7 @@ class ArchiveWriter:
         document = document_bytes(evidence, self._stored_table(evidence.measurer.table))
         self._archive.store(job.job_id, job.outcome, files, document)
         self._stored += 1
+        self.on_stored(evidence)
         if errors:
             raise ArchiveError(f"job {job.job_id}: not exported: {'; '.join(errors)}")
 

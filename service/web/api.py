@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import math
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import cv2
 from pydantic import BaseModel, ValidationError
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
 from service.archived_job import EvidenceError, load_archived
-from service.evidence import FRAME, job_fields
+from service.evidence import FRAME, Evidence, job_fields
 from service.journal import Job
 from service.journal_reader import JobFilter, JournalUnreadable, reading
 from service.reasons import Language, Reason
 from service.web import answers
 from service.web.drawing import drawing
-from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept
+from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept, tag_of
 from service.web.guard import BodyTooLarge
 from service.web.live import MOST_VIEWERS, PERIOD_S, EventStream, Live
 from service.web.openapi import PREFIX, document
@@ -31,6 +33,8 @@ from service.web.window import DaemonSilent, Window
 
 M = TypeVar("M", bound=BaseModel)
 Endpoint = Callable[[Request], Awaitable[Response]]
+
+log = logging.getLogger("combtrace.page")
 
 LARGEST_JOB = 0xFFFFFFFF
 
@@ -45,13 +49,29 @@ class Api:
         self._journal = window.sources.journal_path
         self._pictures = Pictures()
         self.live = Live(window)
+        if window.sources.archive is not None:
+            window.sources.archive.on_stored = self._stored
         self._document = json.dumps(document(OPERATIONS, version), ensure_ascii=False).encode()
         self._reasons = _encoded(_reasons())
 
     def close(self) -> None:
         """Let go of threads."""
         self.live.close()
+        if self._window.sources.archive is not None:
+            self._window.sources.archive.on_stored = lambda _evidence: None
         self._pictures.close()
+
+    def _stored(self, evidence: Evidence) -> None:
+        """In the archive's thread: have the pictures ready for those who watch, and tell them."""
+        if evidence.frame is None or not self.live.watched:
+            return
+        try:
+            frame = file_of(self._archive, evidence.job, FRAME)
+            if frame is not None:
+                self._pictures.prepare(frame, evidence.frame.pixels)
+        except (OSError, cv2.error) as error:  # it is read back then, if it is asked for
+            log.warning("page: job %d: %s", evidence.job.job_id, error)
+        self.live.look_soon()
 
     def routes(self) -> list[Route]:
         """All of them."""
@@ -114,12 +134,13 @@ class Api:
         """A job's frame, made small."""
         number = _job_number(request)
         width_px = _whole(request, "width", WIDTHS_PX[-1], WIDTHS_PX[-1])
-        if width_px not in WIDTHS_PX:
+        if width_px is None or width_px not in WIDTHS_PX:
             raise Refusal(400, f"width is {width_px}, expected one of {', '.join(map(str, WIDTHS_PX))}")
         path = await asyncio.to_thread(self._kept, number, FRAME)
-        tag = f'"{path.stat().st_mtime_ns:x}-{width_px}"'
-        headers = {"etag": tag, "cache-control": "no-cache"}  # kept by the browser, and asked about each time
-        if request.headers.get("if-none-match") == tag:
+        tag = tag_of(path)
+        etag = f'"{tag}-{width_px}"'
+        headers = {"etag": etag, "cache-control": "no-cache"}  # kept by the browser, and asked about each time
+        if request.headers.get("if-none-match") == etag:
             return Response(status_code=304, headers=headers)
         try:
             picture = await self._pictures.small(path, tag, width_px)

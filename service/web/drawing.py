@@ -20,7 +20,7 @@ from service.web.answers import Axis, Drawing, Grid, SentinelMark
 
 Floats = NDArray[np.float64]
 
-GRID_COLUMNS, GRID_ROWS = 49, 37  # between the nodes a browser interpolates: docs/operators-guide.md says how well
+GRID_COLUMNS, GRID_ROWS = 33, 25  # between the nodes a browser interpolates: docs/operators-guide.md says how well
 LINES_WANTED = 10
 LINE_POINTS = 33
 
@@ -94,7 +94,7 @@ def _grid(calibration: Calibration, width: int, height: int, thickness_mm: float
         points = calibration.to_machine(calibration.to_work(nodes, thickness_mm))
     except CalibrationError:
         return None
-    flat = [round(float(value), 3) for value in points.ravel()]
+    flat = [round(value, 2) for value in points.ravel().tolist()]
     return Grid(columns=GRID_COLUMNS, rows=GRID_ROWS, millimetres=flat)
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from service.archive import folder_of
 from service.evidence import FRAME, OVERLAY
@@ -54,12 +55,13 @@ def files_kept(archive: Path, job: Job) -> list[str]:
 
 
 class Pictures:
-    """Frames made small, one at a time in a thread of low priority; the last ones are kept."""
+    """Frames made small, in a thread of low priority; the last ones are kept. May be called from any thread."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(1, "page pictures", initializer=_go_last)
-        self._kept: OrderedDict[tuple[str, int], bytes] = OrderedDict()
+        self._kept: OrderedDict[tuple[str, str, int], bytes] = OrderedDict()
         self._bytes = 0
+        self._lock = threading.Lock()
 
     def close(self) -> None:
         """Let the thread end; what it is making is not waited for."""
@@ -67,28 +69,45 @@ class Pictures:
 
     async def small(self, frame: Path, tag: str, width_px: int) -> bytes:
         """The frame at most `width_px` wide, as JPEG; raise NoPicture. tag: changes when the file does."""
-        key = f"{frame} {tag}", width_px
-        if key not in self._kept:
-            made = await asyncio.get_running_loop().run_in_executor(self._pool, _made_small, frame, width_px)
-            self._keep(key, made)
-        self._kept.move_to_end(key)
-        return self._kept[key]
+        found = self._found(frame, tag, width_px)
+        if found is None:
+            made = await asyncio.get_running_loop().run_in_executor(self._pool, _read_small, frame)
+            self._keep(frame, tag, made)
+            found = made[width_px]
+        return found
 
-    def _keep(self, key: tuple[str, int], picture: bytes) -> None:
-        if key in self._kept:  # two asked at once
-            return
-        self._kept[key] = picture
-        self._bytes += len(picture)
-        while self._bytes > MOST_KEPT_BYTES and len(self._kept) > 1:
-            _, old = self._kept.popitem(last=False)
-            self._bytes -= len(old)
+    def prepare(self, frame: Path, pixels: NDArray[np.uint8]) -> None:
+        """Make small what is at hand, before it is asked for: to read it back would take five times as long."""
+        self._keep(frame, tag_of(frame), _made_small(pixels))
+
+    def _found(self, frame: Path, tag: str, width_px: int) -> bytes | None:
+        key = str(frame), tag, width_px
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+            return self._kept.get(key)
+
+    def _keep(self, frame: Path, tag: str, pictures: dict[int, bytes]) -> None:
+        with self._lock:
+            for width_px, picture in pictures.items():
+                old = self._kept.pop((str(frame), tag, width_px), b"")
+                self._kept[str(frame), tag, width_px] = picture
+                self._bytes += len(picture) - len(old)
+            while self._bytes > MOST_KEPT_BYTES and len(self._kept) > len(WIDTHS_PX):
+                _, oldest = self._kept.popitem(last=False)
+                self._bytes -= len(oldest)
+
+
+def tag_of(path: Path) -> str:
+    """What changes when the file does."""
+    return f"{path.stat().st_mtime_ns:x}"
 
 
 def _go_last() -> None:
     os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
 
 
-def _made_small(frame: Path, width_px: int) -> bytes:
+def _read_small(frame: Path) -> dict[int, bytes]:
     try:
         data = np.frombuffer(frame.read_bytes(), np.uint8)
     except OSError as error:
@@ -96,9 +115,17 @@ def _made_small(frame: Path, width_px: int) -> bytes:
     pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     if pixels is None:
         raise NoPicture("the frame's file is no picture")
-    height, width = pixels.shape[:2]
-    if width > width_px:
-        size = width_px, max(round(height * width_px / width), 1)
-        pixels = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA)
-    _, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return jpeg.tobytes()
+    return _made_small(np.asarray(pixels, dtype=np.uint8))
+
+
+def _made_small(pixels: NDArray[np.uint8]) -> dict[int, bytes]:
+    """The picture as JPEG by each of WIDTHS_PX, no wider."""
+    made = {}
+    for width_px in sorted(WIDTHS_PX, reverse=True):  # each from the one before: what follows is the smaller work
+        height, width = pixels.shape[:2]
+        if width > width_px:
+            size = width_px, max(round(height * width_px / width), 1)
+            pixels = np.asarray(cv2.resize(pixels, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        _, jpeg = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        made[width_px] = jpeg.tobytes()
+    return made

@@ -46,13 +46,9 @@ class Pages:
         self._files = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != PAGE}
         self._tags = {name: f'"{hashlib.sha256(data).hexdigest()[:16]}"' for name, data in self._files.items()}
         self._texts: dict[str, dict[str, str]] = json.loads(self._files["texts.json"])
-        template = (folder / PAGE).read_text(encoding="utf-8").replace("{{preload}}", self._preload())
+        template = (folder / PAGE).read_text(encoding="utf-8")
         template = template.replace("{{symbols}}", self._files["symbols.svg"].decode())
         self._templates: dict[str, str] = {language: _worded(template, self._texts[language]) for language in LANGUAGES}
-
-    def _preload(self) -> str:
-        scripts = sorted(name for name in self._files if name.endswith(".js") and name != "page.js")
-        return "\n".join(f'<link rel="modulepreload" href="/static/{name}">' for name in scripts)
 
     def routes(self) -> list[Route]:
         """The page, and its files."""

@@ -33,6 +33,17 @@ class Live:
         self._nudge = asyncio.Event()
         self._looking: asyncio.Task[None] | None = None
         self._closed = False
+        self._loop: asyncio.AbstractEventLoop | None = None
+
+    @property
+    def watched(self) -> bool:
+        """True where anybody watches; from any thread."""
+        return self._viewers > 0 and not self._closed
+
+    def look_soon(self) -> None:
+        """Something is new; from any thread."""
+        if self._loop is not None:
+            _from_elsewhere(self._loop, self._nudge)
 
     @property
     def full(self) -> bool:
@@ -48,8 +59,8 @@ class Live:
         """Have each new state shown, as long as `show` takes it in time."""
         self._viewers += 1
         if self._looking is None:
-            loop = asyncio.get_running_loop()
-            self._window.on_change = lambda: _from_elsewhere(loop, self._nudge)
+            self._loop = asyncio.get_running_loop()
+            self._window.on_change = self.look_soon
             self._looking = asyncio.create_task(self._look())
         try:
             shown = self._latest  # which may be a second old: a look is due at once

@@ -6,9 +6,9 @@ import { get } from "./service.js";
 import * as job from "./job.js";
 import * as picture from "./picture.js";
 
-const SHOWN = 24;
-const EVIDENCE_TRIES = 12;
-const EVIDENCE_PAUSE_MS = 350;
+const SHOWN = 16;
+const EVIDENCE_TRIES = 5; // the service tells too; this is for what it cannot tell
+const EVIDENCE_PAUSE_MS = 1000;
 
 let jobs = [];
 let opened = null; // the job that is looked at; null = always the newest

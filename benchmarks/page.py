@@ -1,0 +1,171 @@
+"""What the operator's page takes: `python -m benchmarks.page [--rounds N] [--write]`.
+
+First paint and weight in Debian's Chromium; and what a viewer costs a job. A viewer asks for what the page asks for
+after each job: the list, the drawing, the frame at both sizes, beside the events. Jobs follow one another without a
+pause, so that all of it falls into the next job. Rounds with and without a viewer alternate, and a job is compared with
+jobs of the same picture, for other load on the machine comes and goes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import http.client
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+from playwright.sync_api import Response, sync_playwright
+
+from benchmarks.daemon import Figure, processor_s
+from service.journal_reader import JobFilter, reading
+from tests.real_parts import need_program
+from tests.system.cell import Cell
+from tests.system.page_client import Client
+from tests.system.processes import free_port, until
+
+PAINT_MS, WEIGHT_KB, COST_PERCENT = 300.0, 150.0, 2.0
+LOADS = 9
+JOBS_A_ROUND = 8
+PAGE = Path(__file__).parents[1] / "docs" / "page-speed.md"
+
+
+@dataclass(frozen=True)
+class Loading:
+    """First contentful paints of the page and of one with a line of text, ms; kilobytes but frames and events."""
+
+    paints: list[float]
+    bare_paints: list[float]
+    weight_kb: float
+
+
+def loading(url: str) -> Loading:
+    """Each load with an empty cache, the page and the bare one in turns: both see the same other load."""
+    paints: dict[str, list[float]] = {url: [], f"{url}nowhere": []}
+    weights: dict[str, int] = {}
+
+    def weigh(response: Response) -> None:
+        if not any(part in response.url for part in ("/frames/", "/events", "/nowhere")):
+            weights[response.url] = len(response.body())
+
+    with sync_playwright() as playwright:
+        path = need_program("chromium", "apt-get install chromium")
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        for _ in range(LOADS + 1):
+            for address, found in paints.items():
+                page = browser.new_page(viewport={"width": 1280, "height": 800})
+                page.on("response", weigh)
+                page.goto(address)
+                page.wait_for_timeout(1000)
+                entries = "performance.getEntriesByName('first-contentful-paint').map(entry => entry.startTime)"
+                found.extend(page.evaluate(entries))
+                page.close()
+        browser.close()
+    full, bare = (found[1:] for found in paints.values())  # the first also starts the browser's own processes
+    return Loading(full, bare, sum(weights.values()) / 1000)
+
+
+def watch(port: int) -> None:
+    """Be a viewer until killed."""
+    events = http.client.HTTPConnection("127.0.0.1", port)
+    events.request("GET", "/api/v1/events")
+    stream = events.getresponse()
+    client, seen, shown = Client(port), "", 0
+    while line := stream.readline():
+        if not line.startswith(b"data: "):
+            continue
+        state = json.loads(line[6:])
+        key = f"{state['job']} {state['settled_job']} {state['disk']['archive_jobs']}"
+        if key == seen:
+            continue
+        seen = key
+        newest = client.get("/api/v1/jobs?limit=16").json["jobs"]
+        kept = next((one["job_id"] for one in newest if "frame.png" in one["files"]), shown)
+        if kept != shown:
+            client.get(f"/api/v1/jobs/{kept}/drawing")
+            for width in (1600, 320):
+                client.get(f"/api/v1/frames/{kept}?width={width}")
+            shown = kept
+
+
+def viewers_cost(cell: Cell, port: int, rounds: int) -> tuple[float, float]:
+    """Percent that a job takes longer with a viewer, and milliseconds of processor more that the daemon takes a job."""
+    times: dict[bool, dict[str, list[float]]] = {watched: defaultdict(list) for watched in (False, True)}
+    used: dict[bool, list[float]] = {False: [], True: []}
+    for number in range(2 * rounds):
+        watched = bool(number % 2)
+        viewer = subprocess.Popen([sys.executable, "-m", "benchmarks.page", "--watch", str(port)]) if watched else None
+        try:
+            time.sleep(1.5)  # the viewer's own start
+            begun, before = processor_s(cell.service.process_id), len(cell.settled())
+            until(lambda before=before: len(cell.settled()) >= before + JOBS_A_ROUND, 120, "jobs")
+            count = len(cell.settled()) - before
+            used[watched].append((processor_s(cell.service.process_id) - begun) / count * 1000)
+        finally:
+            if viewer is not None:
+                viewer.kill()
+                viewer.wait()
+        with reading(cell.journal) as journal:
+            for job in journal.jobs(JobFilter(), JOBS_A_ROUND):
+                if "total_ms" in job.report and "frame" in job.report:
+                    times[watched][job.report["frame"]].append(job.report["total_ms"])
+    pictures = [name for name in times[True] if name in times[False]]
+    alone, seen = (sum(median(times[watched][name]) for name in pictures) for watched in (False, True))
+    return 100 * (seen / alone - 1), median(used[True]) - median(used[False])
+
+
+def figures(folder: Path, rounds: int) -> tuple[list[Figure], str]:
+    """All of them, and what belongs to them in words."""
+    port = free_port()
+    cell = Cell(folder, trigger_every_s=0.02, more=f"page: {{port: {port}}}\n")
+    try:
+        cell.ready()
+        cell.goes_on(2)
+        cost, processor_ms = viewers_cost(cell, port, rounds)
+        cell.controller.stop()
+        time.sleep(2)
+        loaded = loading(f"http://127.0.0.1:{port}/")
+    finally:
+        cell.service.kill()
+        cell.stop()
+    shown = [
+        Figure(f"first paint, empty cache, median of {LOADS}", median(loaded.paints), "ms", PAINT_MS),
+        Figure("all that is loaded, without the frame", loaded.weight_kb, "kB", WEIGHT_KB),
+        Figure("a job takes longer with a viewer by", cost, "%", COST_PERCENT),
+    ]
+    told = (
+        f"A page of one line, loaded in turns with it, painted after {median(loaded.bare_paints):.0f} ms. "
+        f"{os.getloadavg()[1]:.0f} programs\nwanted to run on {os.cpu_count()} cores meanwhile. "
+        f"Of the processor the daemon takes {processor_ms:.0f} ms more for a job\nthat is looked at, after the job."
+    )
+    return shown, told
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table; 1 where a goal is missed."""
+    parser = argparse.ArgumentParser(prog="benchmarks.page", description=__doc__)
+    parser.add_argument("--rounds", type=int, default=6, metavar="N", help="with a viewer, and as many without")
+    parser.add_argument("--watch", type=int, metavar="PORT", help=argparse.SUPPRESS)
+    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    args = parser.parse_args(arguments)
+    if args.watch is not None:
+        watch(args.watch)
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        shown, told = figures(Path(folder), args.rounds)
+    text = "\n".join(["| what | measured | goal | met |", "|---|---|---|---|", *map(str, shown), "", told])
+    print(text)
+    if args.write:
+        PAGE.write_text(f"# What the page takes\n\nWritten by `python -m benchmarks.page --write`.\n\n{text}\n")
+    return 0 if all(figure.met for figure in shown) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -40,13 +40,19 @@ class Lock:
         what: str = "this state folder",
         next_step: str = "Stop it, or give this one its own service.state_dir and journal.path",
     ) -> None:
+        self._path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            self._file = self._open()
         except OSError as error:
             raise LockError(f"{path}: cannot be opened: {error.strerror}. Check service.state_dir") from error
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            while not os.path.sameopenfile(self._file, again := self._open()):  # taken away before we held it
+                os.close(self._file)
+                self._file = again
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            os.close(again)
         except OSError as error:
             holder = os.pread(self._file, 20, 0).decode("ascii", "replace").strip() or "unknown"
             os.close(self._file)
@@ -60,6 +66,14 @@ class Lock:
     def release(self) -> None:
         """Let it go."""
         os.close(self._file)
+
+    def leave_no_file(self) -> None:
+        """Take the file away while it is held, so that nothing tells of this run."""
+        with suppress(OSError):
+            self._path.unlink()
+
+    def _open(self) -> int:
+        return os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
 
 
 def journal_lock(journal: Path) -> Lock:

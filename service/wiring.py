@@ -272,13 +272,17 @@ def _make_journal(config: Config) -> tuple[Locks, Journal]:
     locks = Locks()
     state_lock = config.service.state_dir / "combtrace.lock"
     ran_before = state_lock.exists()
+    state: Lock | None = None
     try:
-        locks.add(Lock(state_lock))
+        state = Lock(state_lock)
+        locks.add(state)
         locks.add(journal_lock(config.journal.path))
         for name in controller_names(config):
             locks.add(NameLock(name))
         journal = open_journal(config.journal.path, config.archive.path, ran_before=ran_before)
     except (LockError, JournalError) as error:
+        if state is not None and not ran_before:  # or the next start would take a journal that never was for lost
+            state.leave_no_file()
         locks.release()
         raise WiringError(str(error)) from error
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from service.config import Config
-from service.lock import LockError, Locks, NameLock, journal_lock, network_names, serial_name
+from service.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
 from service.wiring import controller_names
 
 
@@ -88,3 +89,22 @@ def test_all_locks_are_let_go() -> None:
     locks.release()
     NameLock("test/one").release()
     NameLock("test/two").release()
+
+
+def test_a_lock_whose_file_was_taken_away_while_one_waited_to_hold_it_is_not_held_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file is opened, and before it is locked its holder takes it away and lets it go."""
+    first = Lock(tmp_path / "lock")
+    let_go = iter([lambda: (first.leave_no_file(), first.release())])
+    flock = fcntl.flock
+
+    def late(file: int, how: int) -> None:
+        next(let_go, lambda: None)()
+        flock(file, how)
+
+    monkeypatch.setattr("service.lock.fcntl.flock", late)
+    second = Lock(tmp_path / "lock")
+    with pytest.raises(LockError, match="another combtrace"):
+        Lock(tmp_path / "lock")
+    second.release()

@@ -51,6 +51,18 @@ async def test_a_second_daemon_of_this_machine_on_the_same_controller_does_not_s
         assert (await one.job()).outcome is Outcome.ACCEPTED
 
 
+async def test_a_start_that_was_refused_leaves_nothing_that_makes_the_next_one_take_its_journal_for_lost(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with SimulatedController() as controller:
+        async with wired(tmp_path / "one", tcp(controller.port)):
+            with pytest.raises(WiringError, match="runs on it"):
+                WiredDaemon(tmp_path / "two", tcp(controller.port))
+        async with wired(tmp_path / "two", tcp(controller.port)) as two:
+            assert (await two.job()).job_id < 100
+    assert not any("is lost" in record.getMessage() for record in caplog.records)
+
+
 async def test_two_state_folders_that_name_one_journal_are_noticed(tmp_path: Path) -> None:
     journal = {"path": str(tmp_path / "shared.sqlite")}
     async with (

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from service.calibration_guard import CalibrationGuard
 from service.checkup.finding import Finding, fault, ok, warning
+from service.checkup.page import check_page
 from service.config import Config, Gcode
 from service.recipe_exports import trial
 from service.wiring import WiringError, find_guard, find_table
@@ -22,11 +23,13 @@ def summary(config: Config) -> str:
 
 
 def check_files(config: Config) -> Iterator[Finding]:
-    """Calibration, exports and table."""
+    """Calibration, exports, table, and what the operator's page needs."""
     yield from check_calibration(config)
     yield from _exports(config)
     if config.table is not None:
         yield _table(config)
+    if config.page is not None:
+        yield from check_page(config.page)
 
 
 def check_calibration(config: Config) -> Iterator[Finding]:

@@ -76,7 +76,7 @@ class PageServer:
                 tokens.read()
         except TokenFileError as error:
             raise PageError(f"page: {error}") from error
-        _check_certificate(settings)
+        check_certificate(settings)
         self.window = Window(sources)
         self._pages = Pages(self.window, settings.language)
         orders = Orders(self.window, sources.journal, tokens)
@@ -168,7 +168,8 @@ def _bound(host: str, port: int) -> socket.socket:
     return listener
 
 
-def _check_certificate(settings: PageSettings) -> None:
+def check_certificate(settings: PageSettings) -> None:
+    """Raise PageError where there is one that cannot be used."""
     if settings.certificate is None or settings.key is None:
         return
     try:

@@ -15,6 +15,7 @@ import pytest
 from service.checkup.devices import check_devices
 from service.checkup.files import check_files
 from service.checkup.finding import Finding, Level
+from service.checkup.page import check_page
 from service.checkup.running import holder
 from service.checkup.storage import check_storage
 from service.cli.main import main
@@ -206,3 +207,26 @@ def test_exports_that_no_job_could_make_are_told_by_the_check(tmp_path: Path, gc
 
 def test_without_exports_there_is_nothing_to_say_of_them(tmp_path: Path) -> None:
     assert not [one for one in check_files(config(tmp_path)) if one.part == "exports"]
+
+
+# --- the operator's page ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("page", "level", "text"),
+    [
+        ("{}", Level.OK, "127.0.0.1:9770, it can only be looked at"),
+        ("{token_file: tokens}", Level.OK, "orders by anna"),
+        ("{token_file: nowhere}", Level.FAULT, "cannot be read"),
+        ("{host: 0.0.0.0}", Level.WARNING, "open to the network without TLS"),
+        ("{certificate: tokens, key: tokens}", Level.FAULT, "cannot be used"),
+    ],
+)
+def test_a_page_that_is_not_safe_or_cannot_be_served_is_told(
+    tmp_path: Path, page: str, level: Level, text: str
+) -> None:
+    (tmp_path / "tokens").write_text("anna 0123456789abcdefghij\n")
+    (tmp_path / "tokens").chmod(0o600)
+    settings = config(tmp_path, more=f"page: {page}\n").page
+    assert settings is not None
+    assert any(one.level is level and text in one.text for one in check_page(settings))

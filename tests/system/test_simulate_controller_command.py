@@ -18,7 +18,7 @@ def simulate(*arguments: str | Path):
 
 
 def test_a_service_keeps_the_protocol_while_commits_are_in_doubt(tmp_path: Path) -> None:
-    scenario = tmp_path / "scenario.yaml"
+    scenario = tmp_path / "in-doubt.yaml"  # the cell writes one of its own
     scenario.write_text((SCENARIOS / "commit-in-doubt.yaml").read_text().replace("every_s: 1}", "every_s: 0.2}"))
     cell = Cell(tmp_path, trigger_every_s=None)
     cell.controller.stop()

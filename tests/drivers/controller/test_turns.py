@@ -12,7 +12,6 @@ from drivers.controller.mailbox import MailboxLayout, Page, ServiceBlock
 from drivers.controller.modbus import LONGEST_EXCHANGE_S, ModbusRtuController, RequestLimits, SerialLine
 from tests.drivers.controller.line_server import LineServer
 from tests.pty_line import PtyLine
-from tests.service.waiting import until
 
 PATIENT_S = 60.0
 LAYOUT = MailboxLayout()
@@ -48,13 +47,13 @@ async def test_a_heartbeats_three_requests_go_one_after_the_other_while_a_page_w
     controller: ModbusRtuController, server: LineServer
 ) -> None:
     page = asyncio.ensure_future(controller.write_page(PAGE))
-    await until(lambda: len(server.requests) == 2)
+    await asyncio.sleep(0)  # its first request is on its way, or waits for the line's silence
     await controller.read_link()
     await controller.read_service()
     await controller.write_service(ServiceBlock())
     went = "".join("P" if of_a_page(request) else "h" for request in server.requests)
     assert not page.done()
-    assert went in ("PPhhh", "PPPhhh", "PPhhhP", "PPPhhhP")
+    assert went in ("hhh", "Phhh", "hhhP", "PhhhP")
     await page
 
 

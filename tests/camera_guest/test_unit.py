@@ -7,6 +7,7 @@ needs: where Python and sources lie, a shorter watchdog, no waiting for the part
 from __future__ import annotations
 
 import os
+import pwd
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -60,6 +61,10 @@ def write(path: Path, content: str) -> None:
     path.write_text(content)
 
 
+def knows_user(name: str) -> bool:
+    return any(user.pw_name == name for user in pwd.getpwall())
+
+
 class Systemd:
     """A system manager in a namespace, and its commands."""
 
@@ -109,7 +114,8 @@ def systemd() -> Iterator[Systemd]:
     write(Path("/etc/combtrace/config.yaml"), CONFIG)
     write(Path("/etc/systemd/system/combtrace.service"), packaged()["systemd/combtrace.service"])
     write(Path("/etc/systemd/system/combtrace.service.d/here.conf"), DROP_IN)
-    done("useradd", "--system", "--home-dir", "/var/lib/combtrace", "--shell", "/usr/sbin/nologin", "combtrace")
+    if not knows_user("combtrace"):  # the guest sees this machine's users
+        done("useradd", "--system", "--home-dir", "/var/lib/combtrace", "--shell", "/usr/sbin/nologin", "combtrace")
     for device, group in (("/dev/video0", "video"), ("/dev/ttyS3", "dialout")):  # as udev does
         done("chgrp", group, device)
         Path(device).chmod(0o660)

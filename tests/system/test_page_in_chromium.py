@@ -20,6 +20,7 @@ from tests.system.cell import Cell
 from tests.system.page_client import TOKEN, Client, token_file
 from tests.system.processes import free_port, until
 
+expect.set_options(timeout=15_000)  # a job on a busy machine
 PANEL = {"width": 1280, "height": 800}
 EXPECTED_NOISE = ("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "401", "ERR_EMPTY_RESPONSE", "409")
 

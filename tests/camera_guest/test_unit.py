@@ -36,7 +36,7 @@ DefaultDependencies=no
 [Service]
 Environment=PYTHONPATH={SOURCES}
 ProtectHome=read-only
-WatchdogSec=20
+WatchdogSec=45
 StandardOutput=append:{LOG}
 StandardError=append:{LOG}
 """
@@ -49,7 +49,7 @@ def done(*command: str | Path) -> str:
     return found.stdout.strip()
 
 
-def until(condition: Callable[[], object], what: str, bound_s: float = 120.0) -> None:
+def until(condition: Callable[[], object], what: str, bound_s: float = 300.0) -> None:
     give_up_at = time.monotonic() + bound_s
     while not condition():
         assert time.monotonic() < give_up_at, f"no {what}: {LOG.read_text() if LOG.exists() else ''}"
@@ -139,12 +139,12 @@ def test_the_unit_runs_closed_in_reloads_is_started_again_where_it_hangs_and_sto
     for folder, writable in (("/etc/combtrace", False), ("/opt/combtrace", False), ("/var/lib/combtrace", True)):
         command = ["nsenter", "-t", main, "-m", "-r", "touch", f"{folder}/tried"]  # by root: only the mount forbids it
         tried = subprocess.run(systemd.inside(*command), capture_output=True, text=True, check=False)
-        assert (tried.returncode == 0) is writable, f"{folder}: {tried.stderr}"
+        assert (tried.returncode == 0) is writable, f"{folder}: {tried.stderr}{LOG.read_text()}"
 
     systemd.ctl("reload", "combtrace")
     until(lambda: "configuration reloaded" in LOG.read_text(), "reload")
 
-    time.sleep(25)  # more than the watchdog waits
+    time.sleep(50)  # more than the watchdog waits
     assert systemd.shown("NRestarts") == "0", "work feeds the watchdog"
     done(*systemd.inside("kill", "-STOP", main))
     until(lambda: systemd.shown("NRestarts") == "1", "restart")

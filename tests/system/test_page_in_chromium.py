@@ -244,7 +244,8 @@ def test_the_language_is_switched_without_a_reload_and_kept(panel: Panel) -> Non
     assert page.evaluate("[document.documentElement.lang, window.sameDocument]") == ["ru", True]
     (cookie,) = page.context.cookies()
     assert (cookie["name"], cookie["value"], cookie["sameSite"]) == ("language", "ru", "Strict")
-    page.reload()
+    with page.expect_response("**/static/texts.json"):  # asked for by the script that hears keys
+        page.reload()
     expect(page.locator("#trigger")).to_have_text("Измерить")
     page.keyboard.press("l")
     expect(page.locator("#trigger")).to_have_text("Measure")

@@ -162,7 +162,7 @@ async def test_wireshark_reads_a_transfer_as_the_protocol_tells_it(
         assert chunk.address == starts[-1]
         starts.append(chunk.address + chunk.count)
     assert starts[-1] == 64 + 2 + 4 * VERTICES
-    assert len(chunks) == 17
+    assert len(chunks) == (17 if framing == TCP else 27)  # over a slow line heartbeats go between shorter requests
 
     written = [value for chunk in chunks for value in chunk.values]
     contour = decode_contour([((3, *written[:31]), written[31:])], word_order)

@@ -8,6 +8,7 @@ import * as now from "./now.js";
 import * as orders from "./orders.js";
 
 const THEMES = { auto: "dark", dark: "light", light: "auto" };
+const ready = Promise.all([load(), now.loadReasons()]);
 let seen = "";
 
 function heard(state) {
@@ -23,7 +24,8 @@ function lost() {
   now.lose();
 }
 
-function switchLanguage() {
+async function switchLanguage() {
+  await ready;  // a key may come before the words
   choose(chosen() === "en" ? "ru" : "en");
 }
 
@@ -57,5 +59,5 @@ at("theme").addEventListener("click", switchTheme);
 at("help").addEventListener("click", help);
 onLanguage(() => at("help-dialog").open && help());
 
-await Promise.all([load(), now.loadReasons()]);
+await ready;
 listen(heard, lost);

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, Route, expect, sync_playwright
 
 from service.reasons import Language, Reason
 from tests.real_parts import need_program
@@ -22,7 +22,7 @@ from tests.system.processes import free_port, until
 
 expect.set_options(timeout=15_000)  # a job on a busy machine
 PANEL = {"width": 1280, "height": 800}
-EXPECTED_NOISE = ("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "401", "ERR_EMPTY_RESPONSE", "409")
+EXPECTED_NOISE = ("ERR_CONNECTION_REFUSED", "ERR_FAILED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "401", "ERR_EMPTY_RESPONSE", "409")
 
 
 @dataclass
@@ -112,6 +112,31 @@ def test_the_server_says_the_state_before_any_script_runs(panel: Panel, browser:
     expect(page.locator("#state")).to_have_text("Ready")
     expect(page.locator("#trigger")).to_have_text("Measure")
     context.close()
+
+
+def test_no_control_can_be_pressed_before_the_script_hears_it(panel: Panel) -> None:
+    page = panel.page
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:
+        held.append(route)
+
+    page.route("**/static/page.js", hold)
+    page.reload()
+    expect(page.locator("#state")).to_have_text("Ready")
+    assert page.locator("main button:enabled, header button:enabled, footer button:enabled, #recipe:enabled").count() == 0
+    held.pop().continue_()
+    expect(page.locator("#trigger")).to_be_enabled()
+    assert page.locator("button:disabled").count() == 0
+
+
+def test_a_service_that_answers_too_late_while_the_page_loads_is_told_and_asked_again(panel: Panel) -> None:
+    page = panel.page
+    page.route("**/api/v1/reasons", lambda route: route.abort(), times=1)
+    page.reload()
+    settled_state(panel, "lost")
+    settled_state(panel, "ready")
+    expect(page.locator("#trigger")).to_be_enabled()
 
 
 def test_the_page_weighs_less_than_150_kb_without_the_frame(panel: Panel, browser: Browser) -> None:

@@ -8,8 +8,21 @@ import * as now from "./now.js";
 import * as orders from "./orders.js";
 
 const THEMES = { auto: "dark", dark: "light", light: "auto" };
-const ready = Promise.all([load(), now.loadReasons()]);
+const AGAIN_MS = 2_000;
+const ready = Promise.all([insist(load), insist(now.loadReasons)]);
 let seen = "";
+
+/** The task done, however often the service must be asked; meanwhile the banner says that it does not answer. */
+async function insist(task) {
+  for (;;) {
+    try {
+      return await task();
+    } catch {
+      now.lose();
+      await new Promise((again) => setTimeout(again, AGAIN_MS));
+    }
+  }
+}
 
 function heard(state) {
   now.show(state);
@@ -60,4 +73,5 @@ at("help").addEventListener("click", help);
 onLanguage(() => at("help-dialog").open && help());
 
 await ready;
+for (const control of document.querySelectorAll(":disabled")) control.disabled = false; // whoever pressed sooner would wait in vain
 listen(heard, lost);

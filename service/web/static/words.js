@@ -12,9 +12,10 @@ export function chosen() {
   return language;
 }
 
-/** The words of a key, with {name} filled in. */
+/** The words of a key, with {name} filled in; dots as long as there are none. */
 export function words(key, values = {}) {
-  const text = texts[language]?.[key] ?? key;
+  if (!texts[language]) return "…";
+  const text = texts[language][key] ?? key;
   return text.replace(/\{(\w+)\}/g, (_, name) => values[name]);
 }
 

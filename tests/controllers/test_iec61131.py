@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.scanned_server import scanned_server
 from tests.structured_text import Program, StructuredTextError, compiled
 from tests.system.processes import combtrace
 
@@ -20,9 +21,8 @@ ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "controllers" / "iec61131"
 TEXT = (FOLDER / "combtrace.st").read_text(encoding="utf-8")
 VECTORS = json.loads((ROOT / "docs" / "golden-vectors.json").read_text(encoding="utf-8"))
-sys.path[:0] = [str(ROOT / "controllers" / "linuxcnc"), str(FOLDER)]
+sys.path.insert(0, str(FOLDER))
 from golden_vectors import program  # noqa: E402
-from modbus_server import ModbusServer  # noqa: E402
 
 ACCEPTED, BAD_CRC, BAD_LAYOUT, GEOMETRY, EXPIRED, BEFORE, OPERATOR, OUTDATED, MISSING, NOT_READY, WITHDRAWN = range(
     1, 12
@@ -313,31 +313,19 @@ def test_the_golden_program_passes_and_finds_a_wrong_crc_word_order_or_answer():
 
 @contextmanager
 def served(**inputs):
-    """The block behind a Modbus server, one scan each 5 ms: its port, and the controller."""
+    """The block behind a Modbus server: its port, and the controller."""
     plc = Plc()
     plc.inputs |= inputs
     plc.lock, plc.writable = threading.Lock(), range(16, 2048)
-    server = ModbusServer(("127.0.0.1", 0), plc)
-    ended = threading.Event()
     begun = time.monotonic()
 
-    def scans():
-        while not ended.wait(0.005):
-            plc.inputs["now_ms"] = 1 + int((time.monotonic() - begun) * 1000)
-            with plc.lock:
-                plc.scan()
+    def scan():
+        plc.inputs["now_ms"] = 1 + int((time.monotonic() - begun) * 1000)
+        with plc.lock:
+            plc.scan()
 
-    threads = [threading.Thread(target=server.serve_forever, args=(0.05,)), threading.Thread(target=scans)]
-    for thread in threads:
-        thread.start()
-    try:
-        yield server.server_address[1], plc
-    finally:
-        ended.set()
-        server.shutdown()
-        for thread in threads:
-            thread.join()
-        server.server_close()
+    with scanned_server(plc, scan) as port:
+        yield port, plc
 
 
 def test_our_service_brings_it_a_contour_of_many_pages(tmp_path):

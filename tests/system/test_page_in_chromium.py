@@ -22,7 +22,14 @@ from tests.system.processes import free_port, until
 
 expect.set_options(timeout=15_000)  # a job on a busy machine
 PANEL = {"width": 1280, "height": 800}
-EXPECTED_NOISE = ("ERR_CONNECTION_REFUSED", "ERR_FAILED", "ERR_INCOMPLETE_CHUNKED_ENCODING", "401", "ERR_EMPTY_RESPONSE", "409")
+EXPECTED_NOISE = (
+    "ERR_CONNECTION_REFUSED",
+    "ERR_FAILED",
+    "ERR_INCOMPLETE_CHUNKED_ENCODING",
+    "401",
+    "ERR_EMPTY_RESPONSE",
+    "409",
+)
 
 
 @dataclass
@@ -124,7 +131,9 @@ def test_no_control_can_be_pressed_before_the_script_hears_it(panel: Panel) -> N
     page.route("**/static/page.js", hold)
     page.reload()
     expect(page.locator("#state")).to_have_text("Ready")
-    assert page.locator("main button:enabled, header button:enabled, footer button:enabled, #recipe:enabled").count() == 0
+    assert (
+        page.locator("main button:enabled, header button:enabled, footer button:enabled, #recipe:enabled").count() == 0
+    )
     held.pop().continue_()
     expect(page.locator("#trigger")).to_be_enabled()
     assert page.locator("button:disabled").count() == 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-import threading
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,13 +12,12 @@ from pymodbus.client import ModbusTcpClient
 
 from tests.interop.programs import libmodbus_tcp
 from tests.protocol_decoder import decode_contour
+from tests.scanned_server import scanned_server
 from tests.system.processes import Process, combtrace, free_port, jobs, lines, until
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "controllers" / "linuxcnc"))
 import mailbox as bridge  # noqa: E402
-
-from modbus_server import ModbusServer  # noqa: E402
 
 RECTANGLE = [[0, 0], [100, 0], [100, 50], [0, 50]]
 FROM_NO_CAMERA, LAST_PAGE, ALIGNED = 1, 4, 8
@@ -51,24 +49,8 @@ def linuxcnc_mailbox(folder: Path):
     taken: list[bridge.Contour] = []
     mailbox = bridge.Mailbox(bridge.Memory(str(folder / "memory.json")), lambda _: bridge.ACCEPTED, taken.append)
     mailbox.set_state(bridge.READY_STATE)
-    server = ModbusServer(("127.0.0.1", 0), mailbox)
-    ended = threading.Event()
-
-    def scans() -> None:
-        while not ended.wait(0.005):
-            mailbox.scan()
-
-    threads = [threading.Thread(target=server.serve_forever, args=(0.05,)), threading.Thread(target=scans)]
-    for thread in threads:
-        thread.start()
-    try:
-        yield server.server_address[1], taken
-    finally:
-        ended.set()
-        server.shutdown()
-        for thread in threads:
-            thread.join()
-        server.server_close()
+    with scanned_server(mailbox, mailbox.scan) as port:
+        yield port, taken
 
 
 def test_a_controller_that_asks_gets_shape_after_shape_or_a_reason(tmp_path):

@@ -23,7 +23,8 @@ from statistics import median, stdev
 
 from playwright.sync_api import Response, sync_playwright
 
-from benchmarks.daemon import Figure, processor_s
+from benchmarks.daemon import Figure
+from benchmarks.rest import processor_s
 from service.journal_reader import JobFilter, reading
 from tests.real_parts import need_program
 from tests.system.cell import Cell

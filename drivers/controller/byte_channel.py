@@ -5,7 +5,10 @@ from __future__ import annotations
 import asyncio
 import os
 import select
+import time
 from collections.abc import Callable
+
+from drivers.controller.looking import LOOK_S, Looking
 
 # A reply has at most 260 bytes. asyncio's own transports ask for 256 KiB at each read: 10 µs more a request.
 CHUNK = 4096
@@ -33,6 +36,7 @@ class ByteChannel:
         self._closed = False
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(descriptor, self._read)
+        self._looking = Looking()
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
 
@@ -55,10 +59,20 @@ class ByteChannel:
 
     def wait(self, longest_s: float) -> bool:
         """True where something came within `longest_s`, which the receiver has by then. It holds the event loop."""
-        if self._closed or self._unsent or not self._poll.poll(1000 * longest_s):
+        if self._closed or self._unsent:
+            return False
+        if not (self._looking.worth() and self._looked()) and not self._poll.poll(1000 * longest_s):
             return False
         self._read()
         return True
+
+    def _looked(self) -> bool:
+        poll, monotonic = self._poll.poll, time.monotonic
+        until = monotonic() + LOOK_S
+        while not (came := bool(poll(0))) and monotonic() < until:
+            pass
+        self._looking.ended(came)
+        return came
 
     def close(self) -> None:
         """Forget what is unsent and let the descriptor go; a second call does nothing."""

@@ -15,6 +15,7 @@ from contour.outline_curves import curve_points, within
 from contour.outline_joints import Flags, Joints, arc_points, thinned, without_reversed
 from contour.outline_labelling import label
 from contour.outline_models import Complex, Real, distance
+from contour.outline_overlooked import overlooked, with_bounds
 from contour.outline_proposals import FEW, gather, propose
 from contour.outline_segments import Segments, around, fitted, runs
 from contour.outline_spread import unseen_share, vertex_sigma
@@ -24,6 +25,7 @@ from contour.wall_evidence import RingEvidence
 
 _FEWEST = 6
 _ROUNDS = 4
+_LOOKS = 2
 # Residuals understate the noise where a segment has hardly more witnesses than parameters.
 _LEAST_NOISE = 0.7
 _CHORD_PX = 0.3
@@ -62,6 +64,22 @@ def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifi
             f"no outline: {len(evidence.points)} wall ends along a ring, {_FEWEST} or more are needed; "
             "check focus and light, or that the ring is no single missing cell"
         )
+    fitted = _fitted(evidence, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
+    bounds, left_out = overlooked(evidence, fitted.ring, pitch_px, rectifier)
+    for _ in range(_LOOKS):
+        if not len(bounds):
+            break
+        more, own = with_bounds(evidence, bounds)
+        again = _fitted(more, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
+        others, still = overlooked(evidence, again.ring, pitch_px, rectifier)
+        if still < left_out:
+            fitted, left_out = replace(again, inlier=again.inlier[own], residual=again.residual[own]), still
+        bounds = np.union1d(bounds, others) if len(others) else others
+    return fitted
+
+
+def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None) -> FittedRing:
+    """The outline through witnesses as they are."""
     witnesses = prepare(evidence, pitch_px, rectifier)
     witnesses = scaled(witnesses, max(noise_from_neighbours(witnesses), 0.7))
     witnesses, segments = segmented(witnesses)
@@ -122,7 +140,7 @@ def residuals(witnesses: Witnesses, segments: Segments) -> Real:
 
 def _inlying(witnesses: Witnesses, residual: Real) -> Flags:
     sigma = np.where(residual > 0.0, witnesses.outer, witnesses.inner)
-    inlying: Flags = np.abs(residual) < 3.0 * sigma
+    inlying: Flags = (np.abs(residual) < 3.0 * sigma) & np.isfinite(witnesses.inner)
     return inlying
 
 

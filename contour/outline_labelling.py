@@ -85,7 +85,8 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Index, Index, I
     saved = witnesses.cap_inside[place] - cost(
         witnesses, distance(proposals.models.take(which), witnesses.points[place]), place
     )
-    last, following = supports(saved > _LIES * witnesses.cap_inside[place], place, begin[which], (begin + reach)[which])
+    lies = (saved > _LIES * witnesses.cap_inside[place]) & np.isfinite(witnesses.inner[place])
+    last, following = supports(lies, place, begin[which], (begin + reach)[which])
     running = np.concatenate([[0.0], np.cumsum(saved)])
     here = np.arange(len(which))
     low = np.maximum(here - _NEARBY, begin[which])

@@ -26,6 +26,10 @@ _NOISIEST, _NOISIEST_OF_FEW = 3.0, 1.5
 _HOLE = 1.7
 # How much cheaper an outermost point's depth is: the wall behind a zigzag edge lies anywhere within half a pitch.
 _SERRATION = 0.03
+# What it costs to leave a bound outside, over what it costs with a witness.
+_DEARER_BOUND = 2.0
+# For what costs nothing inside, but must not come to 0 / 0.
+_NOTHING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -33,9 +37,10 @@ class Witnesses:
     """Witnesses of one ring in travel order, shape (N,) each, in pixels of the fitting plane.
 
     points and normal (outwards) are complex. inner, outer: standard deviations for points inside and outside of the
-    outline. cap_inside, cap_outside: the most a point costs there (nats). clean: a wall end, fit to measure the noise
-    by. gap: distance to the next witness along the coarse ring (cyclic). rare: -1 where turns to the right are the rare
-    ones (an exterior runs to the left on the whole), 1 for a hole.
+    outline; inner is infinite for a bound, which costs nothing inside. cap_inside, cap_outside: the most a point costs
+    there (nats). clean: a wall end, fit to measure the noise by. gap: distance to the next witness along the coarse
+    ring (cyclic). rare: -1 where turns to the right are the rare ones (an exterior runs to the left on the whole), 1
+    for a hole.
     """
 
     points: Complex
@@ -64,15 +69,16 @@ def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None
     z = points[:, 0] + 1j * points[:, 1]
     outwards = normal[:, 0] + 1j * normal[:, 1]
     outwards = (outwards / np.maximum(np.abs(outwards), 1e-12)).astype(np.complex128)
-    outermost = evidence.kind == WitnessKind.OUTERMOST
+    ends = evidence.kind < WitnessKind.OUTERMOST
     sigma = np.maximum(evidence.sigma, _LEAST_SIGMA_PX)
     coarse = evidence.coarse
     length = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
     gap = np.diff(evidence.position, append=evidence.position[:1] + length)
-    inner = np.where(outermost, np.maximum(sigma, _SERRATION * pitch_px), sigma)
+    inner = np.where(ends, sigma, np.maximum(sigma, _SERRATION * pitch_px))
+    inner = np.where(evidence.kind == WitnessKind.BOUND, np.inf, inner)
     gap = np.maximum(gap, 0.0)
     rare = 1.0 if evidence.is_hole else -1.0
-    witnesses = Witnesses(z, outwards, inner, sigma, inner, inner, ~outermost, gap, pitch_px, rare)
+    witnesses = Witnesses(z, outwards, inner, sigma, inner, inner, ends, gap, pitch_px, rare)
     return scaled(witnesses, 1.0)
 
 
@@ -86,13 +92,15 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
     odds = witnesses.pitch / (np.sqrt(2.0 * np.pi) * np.minimum(inner, outer))
     inside = np.log((1.0 - _SHARE_INSIDE) / _SHARE_INSIDE * odds)
     dearer = _HOLE if witnesses.rare > 0.0 else 1.0
-    outside = np.log((1.0 - _SHARE_OUTSIDE) / _SHARE_OUTSIDE * odds)
+    inside = np.where(witnesses.inner > witnesses.outer * 1.01, 4.0, np.clip(inside, 3.0, 5.5))
+    outside = np.clip(np.log((1.0 - _SHARE_OUTSIDE) / _SHARE_OUTSIDE * odds), 5.0, 6.5)
+    bound = np.isinf(inner)
     return replace(
         witnesses,
         inner=inner,
         outer=outer,
-        cap_inside=dearer * np.where(witnesses.inner > witnesses.outer * 1.01, 4.0, np.clip(inside, 3.0, 5.5)),
-        cap_outside=np.clip(outside, 5.0, 6.5),
+        cap_inside=np.where(bound, _NOTHING, dearer * inside),
+        cap_outside=np.where(bound, _DEARER_BOUND * outside, outside),
     )
 
 
@@ -108,7 +116,7 @@ def cost(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None))
     outside = signed > 0.0
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
     cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
-    beyond = np.clip(np.abs(signed) / witnesses.pitch - _DEEPEST, 0.0, 3.0)
+    beyond = np.clip(np.where(np.isinf(sigma), 0.0, np.abs(signed)) / witnesses.pitch - _DEEPEST, 0.0, 3.0)
     square = 0.5 * (signed / sigma) ** 2
     bent: Real = cap * square / (cap + square) + 4.0 * beyond**2
     if witnesses.rare > 0.0:

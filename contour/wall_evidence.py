@@ -4,7 +4,7 @@ fitting.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -21,6 +21,22 @@ class WitnessKind(IntEnum):
     CLEAN = 0  # the end of a wall that sticks out: a cut wall seen whole
     BLUNT = 1  # an end that is wide, short or merged with a neighbour: less sure along its axis
     OUTERMOST = 2  # no wall end within a pitch: the outermost wall point there (a wall that lies along the cut)
+    BOUND = 3  # no witness of the edge: a wall that the outline must not leave outside, however deep it lies inside
+
+
+@dataclass(frozen=True)
+class WallPoints:
+    """Boundary of the block's own walls along a ring, some eight points a pitch, each chain's in order: points and
+    outward normals at their feet on the coarse ring (K, 2), arc lengths of the feet (K,), pixels.
+    """
+
+    points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    position: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    normal: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+
+    def take(self, index: NDArray[np.bool_] | NDArray[np.intp]) -> WallPoints:
+        """The points at `index`."""
+        return WallPoints(self.points[index], self.position[index], self.normal[index])
 
 
 @dataclass(frozen=True)
@@ -32,7 +48,8 @@ class RingEvidence:
     coarse: coarse ring, shape (M, 2), pixels. points: where the material ends, shape (N, 2), float64, pixels,
     sub-pixel. position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal:
     outward unit normal of the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected
-    standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind.
+    standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind. walls: all
+    that was seen of walls near the edge, whether it witnesses the outline or not.
     """
 
     coarse: Ring
@@ -42,6 +59,7 @@ class RingEvidence:
     normal: NDArray[np.float64]
     sigma: NDArray[np.float64]
     kind: NDArray[np.int8]
+    walls: WallPoints = field(default_factory=WallPoints)
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from contour.errors import NoBlockFound
 from contour.faint_links import with_faint_links
 from contour.pieces import pieces_beside, reaches_frame
 from contour.wall_cells import Cells, probe
-from contour.wall_ends import edge_chains, find_ends, outermost
-from contour.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
+from contour.wall_ends import Chains, edge_chains, find_ends, outermost
+from contour.wall_evidence import BlockEvidence, RingEvidence, WallPoints, WitnessKind
 from contour.wall_light import light_from_table, wall_light
 from contour.wall_mask import FINE_PITCH, WallMask, wall_mask, without_specks
 from contour.wall_parallax import Parallax, parallax
@@ -51,6 +51,9 @@ _DARK_SIGMA_PX = 1.0
 _MASK_BLUR_PX = 0.8
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
 _SUBSAMPLED_PITCH = 20.0
+_WALL_POINTS_PER_PITCH = 8
+# Walls farther inside than this cannot end up outside of any outline.
+_WALLS_INSIDE = 0.5
 
 
 def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
@@ -149,7 +152,7 @@ def _evidence(
     sides = replace(sides, points=_raised(sides.points, normal, depth))
     polarity = "bright" if cells.bright else "dark"
     return BlockEvidence(
-        _rings(coarse, tips, sides, scale),
+        _rings(coarse, tips, sides, _walls(chains, coarse, pitch), depth, scale),
         cells.pitch,
         cells.wall,
         polarity,
@@ -233,16 +236,27 @@ def _nearest(points: Points, others: Points) -> Vector:
     return np.asarray(np.sqrt(square.min(axis=1)), np.float64)
 
 
-def _rings(coarse: CoarseBlock, tips: _Witnesses, sides: _Witnesses, scale: int) -> tuple[RingEvidence, ...]:
-    """All witnesses, each at its nearest ring, in order along it."""
+def _walls(chains: Chains, coarse: CoarseBlock, pitch: float) -> Points:
+    """Points of the walls' boundary near the coarse edge, shape (K, 2), mask pixels."""
+    points = chains.points[:: max(1, round(pitch / _WALL_POINTS_PER_PITCH))]
+    return points[coarse.depth_at(points) < _WALLS_INSIDE * pitch]
+
+
+def _rings(
+    coarse: CoarseBlock, tips: _Witnesses, sides: _Witnesses, walls: Points, depth: Parallax, scale: int
+) -> tuple[RingEvidence, ...]:
+    """All witnesses, each at its nearest ring, in order along it, and the walls about it."""
     points = np.concatenate([tips.points, sides.points])
     kind, sigma = np.concatenate([tips.kind, sides.kind]), np.concatenate([tips.sigma, sides.sigma])
     ring, arc, normal = coarse.feet((points + 0.5) / scale - 0.5)
+    beside, foot, across = coarse.feet(walls)
+    wall_points = WallPoints(_raised((walls + 0.5) * scale - 0.5, across, depth), foot * scale, across)
     evidence = []
     for number, one in enumerate(coarse.rings):
         mine = np.flatnonzero(ring == number)
         mine = mine[np.argsort(arc[mine], kind="stable")]
         vertices = (one.vertices + 0.5) * scale - 0.5
         arcs = arc[mine] * scale
-        evidence.append(RingEvidence(vertices, one.is_hole, points[mine], arcs, normal[mine], sigma[mine], kind[mine]))
+        seen = (points[mine], arcs, normal[mine], sigma[mine], kind[mine], wall_points.take(beside == number))
+        evidence.append(RingEvidence(vertices, one.is_hole, *seen))
     return tuple(evidence)

@@ -106,6 +106,11 @@ class CoarseBlock:
         """
         return grid[_PAD:-_PAD, _PAD:-_PAD]
 
+    def enlarged(self, grid: Gray, shape: tuple[int, ...]) -> Gray:
+        """A map on the coarse grid at the size of the wall mask, whose `shape` is (H, W)."""
+        rows = np.repeat(self.unpadded(grid), self.step, axis=0)
+        return np.repeat(rows, self.step, axis=1)[: shape[0], : shape[1]]
+
     def _nearest_at(self, points: Points) -> NDArray[np.int32]:
         grid = np.rint(self._grid(points)).astype(np.int64)
         height, width = self.nearest.shape

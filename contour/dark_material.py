@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.coarse_block import CoarseBlock
 from contour.pixel_sampling import sample_at
 
 Gray = NDArray[np.uint8]
@@ -12,6 +14,10 @@ Points = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
 _STEP_PX = 0.5
+# How far beyond the coarse edge and inside of it the edge of dark material is looked for, and how long it is where it
+# is more than a speck.
+_BEYOND_PITCHES, _WITHIN_PITCHES = 3.0, 0.5
+_LONG_PITCHES = 6.0
 
 
 def midway_to_table(light: Gray, level: float, contrast: float) -> float | None:
@@ -39,3 +45,15 @@ def dark_beyond(light: Gray, place: Points, normal: Points, *, midway: float, re
     part = (midway - before) / np.maximum(there - before, 1e-9)
     distance = np.where(first > 0, _STEP_PX * (first - 1 + part), 0.0)
     return np.asarray(np.where(light_at.any(axis=1), distance, np.inf), np.float64)
+
+
+def dark_edge(light: Gray, coarse: CoarseBlock, pitch: float, midway: float) -> Points:
+    """Points along the edge of what is darker than `midway` in `light` (H, W), where that hangs together around the
+    block, shape (K, 2), pixels.
+    """
+    near = (coarse.depth > -_BEYOND_PITCHES * pitch) & (coarse.depth < _WITHIN_PITCHES * pitch)
+    _, dark = cv2.threshold(light, midway, 255, cv2.THRESH_BINARY_INV)
+    dark = cv2.bitwise_and(dark, coarse.enlarged(near.astype(np.uint8) * 255, light.shape))
+    chains, _ = cv2.findContours(np.asarray(dark, np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    long = [chain[:, 0, :].astype(np.float64) for chain in chains if len(chain) > _LONG_PITCHES * pitch]
+    return np.concatenate([np.empty((0, 2)), *long])

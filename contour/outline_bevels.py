@@ -1,8 +1,8 @@
-"""Corners that the wall ends seen behind them speak against, cut part of the way back to those ends."""
+"""Corners that what was seen behind them speaks against, cut part of the way back to it."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,80 +11,114 @@ from contour.outline_models import Complex, Index, feet
 from contour.outline_segments import Segments
 from contour.outline_witnesses import Witnesses
 
-# Of the way from the chord to the corner: of a cut-off corner no witness reached more than four tenths, of other
-# corners they did six tenths and more (600 random scenes).
-_LOW = 0.45
-# Sharper corners (chord over depth of a right angle: 2), as a crescent's horns, are narrower than a cell for more than
-# a pitch, and show little of their walls.
-_SHARP = 1.2
-# A corner nearer than this to what was seen is drawn whole: less is at stake than by cutting it, pitches.
-_AT_STAKE = 0.85
-# The most that a bevel leaves out of a corner that is there after all, pitches.
-_LEAVES_OUT = 0.9
-# Farther out than this a cut shows so many ends that the fit sees an edge in them, pitches.
-_CUT_SHOWS = 1.25
+# Unseen area of a corner, square pitches (a cell has 0.87). Up to the first it is what a lost cell and the edges
+# beside it leave, or a horn that is narrower than a cell; from the second on, more than two cells would have to be lost
+# in one place, and from the third on where nothing at all was seen behind the corner.
+_ONE_CELL, _TWO_CELLS, _CELLS_UNSEEN = 1.0, 2.2, 2.6
+# A corner nearer than this to what was seen is drawn whole: less is at stake than by cutting it, pitches. The second
+# holds where lost cells are likely.
+_AT_STAKE, _AT_STAKE_OF_ENDS = 0.85, 0.93
+# The most that a bevel leaves out of a corner that may be there after all, pitches, and where that is as likely as not.
+_MOST_LEFT_OUT, _LEAVES_OUT = 0.95, 0.9
+# What stands no higher above the chord is part of the edges, pitches.
+_NEAR_CHORD = 0.05
 
 
-def bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Flags) -> Joints:
+@dataclass(frozen=True)
+class _Corner:
+    """What is unseen of a corner: area in square pitches; its distance from what was seen, at all and across the chord
+    behind it, and from that chord, pitches. only_ends: nothing but clean wall ends was seen behind it.
+    """
+
+    area: float
+    distance: float
+    clear: float
+    depth: float
+    only_ends: bool
+
+
+def bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Flags, walls: Complex) -> Joints:
     """The joints with doubtful convex corners cut parallel to the chord between the last witnesses on their edges.
 
-    A corner is doubtful where it lies far outside of all that was seen of it, while something was seen between that
-    chord and the corner, near the chord. Either the corner was cut off there, or its cell is missing; the labelling
-    holds the two for about equally likely. Corners behind which nothing was seen were all there (600 random scenes).
+    `walls`: boundary points of all walls near the edge. A corner of which much was not seen was cut off, or its cells
+    are missing. Which of the two is told by how much that is: a cell, or more.
     """
     first, last = ends(witnesses, segments, inlier)
     begin, end = found.begin.copy(), found.end.copy()
     for k in range(len(segments)):
         after = (k + 1) % len(segments)
         corner, near, far = complex(found.end[k]), complex(last[k]), complex(first[after])
-        chord = far - near
-        if found.begin[k] != corner or not abs(chord):
+        if found.begin[k] != corner or abs(far - near) < 1e-9:
             continue
-        outwards = -1j * chord / abs(chord)
-        depth = ((corner - near) * outwards.conjugate()).real
-        if depth <= 0.5 * witnesses.pitch or abs(chord) < _SHARP * depth:
-            continue
-        behind = _between(segments, inlier, k, after)
-        height = ((witnesses.points[behind] - near) * outwards.conjugate()).real
-        if not (height > 0.0).any() or height.max() > _LOW * depth:
-            continue
-        at_stake = _distance(corner, near, far, witnesses.points[behind[height > 0.0]]) / witnesses.pitch
-        left_out = _left_out(at_stake, bool(witnesses.clean[behind].all())) * witnesses.pitch
+        unseen = _unseen(witnesses, _between(segments, inlier, k, after), walls, corner=corner, near=near, far=far)
+        left_out = _left_out(unseen)
         if left_out <= 0.0:
             continue
-        share = 1.0 - left_out / _distance(corner, near, far, np.zeros(0, dtype=np.complex128))
+        share = 1.0 - left_out / unseen.depth
         cut = np.array([near + share * (corner - near), far + share * (corner - far)])
         end[k], begin[k] = feet(segments.models.take(np.array([k, after])), cut)[0]
     return replace(found, end=end, begin=begin)
 
 
-def _left_out(at_stake: float, only_ends: bool) -> float:
-    """How much of a doubtful corner is cut off, all in pitches; `at_stake` is how far it lies off what was seen.
+def _left_out(corner: _Corner) -> float:
+    """How much of a corner is cut off across the chord behind it, pitches, at most back to what was seen.
 
-    Torn out cells leave ends of the walls that led to them, so where only ends were seen the corner is cut no further
-    than less than a pitch is wrong if it is a cut. Where the side of a whole cell stands behind it, halfway.
+    So that less than a pitch is wrong whether it is cut or whole, as long as there is room for that: torn out cells
+    leave ends of the walls that led to them, so where only ends were seen no more is cut than that takes. Where the
+    side of a whole cell stands behind the corner, half of it; where more cells would be lost than are ever, the most.
     """
-    if at_stake <= _AT_STAKE:
+    nothing = corner.clear > corner.depth - _NEAR_CHORD
+    if corner.distance <= _AT_STAKE or corner.area < (_CELLS_UNSEEN if nothing else _ONE_CELL):
         return 0.0
-    if only_ends:
-        return at_stake - _AT_STAKE if at_stake < _CUT_SHOWS else 0.0
-    return min(0.5 * at_stake, _LEAVES_OUT)
+    if corner.area > _TWO_CELLS:
+        hopeless = corner.distance > _MOST_LEFT_OUT + _AT_STAKE_OF_ENDS
+        return corner.clear if hopeless else min(_MOST_LEFT_OUT, corner.clear)
+    if corner.only_ends:
+        return min(max(corner.distance - _AT_STAKE_OF_ENDS, 0.0), corner.clear)
+    return min(0.5 * corner.distance, _LEAVES_OUT, corner.clear)
 
 
-def _distance(corner: complex, near: complex, far: complex, between: Complex) -> float:
-    """Distance of a corner from the convex chain that runs from `near` to `far` around the points between them."""
+def _unseen(
+    witnesses: Witnesses, between: Index, walls: Complex, *, corner: complex, near: complex, far: complex
+) -> _Corner:
+    """What lies between a corner and the convex chain from `near` to `far` around all that was seen in it."""
     along = (far - near) / abs(far - near)
-    points = between[np.argsort(((between - near) * along.conjugate()).real)]
+    depth = ((corner - near) * (-1j * along).conjugate()).real
+    if depth <= 0.0:
+        return _Corner(0.0, 0.0, 0.0, 0.0, only_ends=True)
+    ahead, behind = corner - near, far - corner
+    within = (
+        (((walls - near) * along.conjugate()).imag < 0.0)
+        & ((ahead.conjugate() * (walls - near)).imag > 0.0)
+        & ((behind.conjugate() * (walls - corner)).imag > 0.0)
+    )
+    seen = np.concatenate([witnesses.points[between], walls[within]])
+    chain = _around(near, far, seen[((seen - near) * along.conjugate()).imag < 0.0])
+    start, stop = chain[:-1], chain[1:]
+    way = stop - start
+    share = np.clip(((corner - start) * way.conj()).real / np.maximum(np.abs(way) ** 2, 1e-12), 0.0, 1.0)
+    area = 0.5 * float(((start - corner).conj() * (stop - corner)).imag.sum())
+    highest = float(-((chain - near) * along.conjugate()).imag.min())
+    pitch = witnesses.pitch
+    return _Corner(
+        abs(area) / pitch**2,
+        float(np.abs(corner - start - share * way).min()) / pitch,
+        (depth - highest) / pitch,
+        depth / pitch,
+        only_ends=bool(witnesses.clean[between].all()),
+    )
+
+
+def _around(near: complex, far: complex, points: Complex) -> Complex:
+    """The convex chain from `near` to `far` around the points between them."""
+    along = (far - near) / abs(far - near)
     chain = [near]
-    for point in (*points, far):
+    for point in (*points[np.argsort(((points - near) * along.conjugate()).real)], far):
         # Material lies on the left: what turns left at its last point bulges outwards.
         while len(chain) > 1 and ((chain[-1] - chain[-2]).conjugate() * (point - chain[-1])).imag <= 0.0:
             chain.pop()
         chain.append(complex(point))
-    start, stop = np.array(chain[:-1]), np.array(chain[1:])
-    way = stop - start
-    share = np.clip(((corner - start) * way.conj()).real / np.maximum(np.abs(way) ** 2, 1e-12), 0.0, 1.0)
-    return float(np.abs(corner - start - share * way).min())
+    return np.array(chain)
 
 
 def _between(segments: Segments, inlier: Flags, before: int, after: int) -> Index:

@@ -90,7 +90,7 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
     for chain in chains:
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
-    found = bevelled(witnesses, segments, found, inlier)
+    found = bevelled(witnesses, segments, found, inlier, _material(evidence, rectifier))
     ring, owners = polygon(witnesses, segments, found, chains)
     spread = _spread(residual[inlier], wall_px)
     sigma = vertex_sigma(witnesses, segments, inlier, ring=ring, owners=owners, spread=spread)
@@ -99,6 +99,15 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
         vertices = rectifier.unrectify(vertices)
     pieces = len(segments) - sum(len(chain.segments) - 1 for chain in chains)
     return FittedRing(vertices, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces)
+
+
+def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complex:
+    """Points of walls and of dark material's edge in the fitting plane, shape (K,)."""
+    points = np.concatenate([evidence.walls.points, evidence.dark])
+    if rectifier is not None:
+        points = rectifier.rectify(points)
+    places: Complex = points[:, 0] + 1j * points[:, 1]
+    return places
 
 
 def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:

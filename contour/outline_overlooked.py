@@ -26,9 +26,7 @@ _CHAIN_BREAKS = 0.4
 _BOUNDS_APART = 0.3
 
 
-def overlooked(
-    evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: Rectifier | None
-) -> tuple[Index, float]:
+def overlooked(evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: Rectifier | None) -> tuple[Index, float]:
     """Indices of the evidence's wall points that bound the outline from inside where `ring` leaves walls out, and how
     far it does in all, pitches.
 

@@ -53,9 +53,9 @@ def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
     # A sample's margin around the block's own walls keeps chips that lie beside it out, and their thin ends in.
     own = cv2.dilate(coarse.walls, np.ones((3, 3), np.uint8))
     band = ((np.abs(coarse.depth) < _BAND_PITCHES * pitch) & (own > 0)).astype(np.uint8) * 255
-    height, width = mask.shape
-    near = np.repeat(np.repeat(coarse.unpadded(band), coarse.step, axis=0), coarse.step, axis=1)[:height, :width]
-    chains, _ = cv2.findContours(cv2.bitwise_and(mask, near), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    chains, _ = cv2.findContours(
+        cv2.bitwise_and(mask, coarse.enlarged(band, mask.shape)), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
+    )
     kept = [chain for chain in chains if len(chain) >= 12]
     if not kept:
         return Chains(np.empty((0, 2)), np.empty(0, np.int64), np.empty(0, np.int64))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.coarse_block import CoarseBlock, coarse_block
-from contour.dark_material import dark_beyond, midway_to_table
+from contour.dark_material import dark_beyond, dark_edge, midway_to_table
 from contour.errors import NoBlockFound
 from contour.faint_links import with_faint_links
 from contour.pieces import pieces_beside, reaches_frame
@@ -45,13 +45,13 @@ _FAINT_HEIGHT = 0.45
 _FAINT_SIGMA_PX = 3.0
 # How far the edge of dark material is looked for from the last wall seen in it, and how near is the wall's own edge.
 _DARK_PITCHES = 4.0
-_INSIDE_PITCHES = 0.4
-_DARK_SIGMA_PX = 1.0
+_INSIDE_PITCHES, _ENDS_INSIDE_PITCHES = 0.4, 0.25
+_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES = 1.0, 0.07
 # What the mask's own light blur (3 × 3) adds.
 _MASK_BLUR_PX = 0.8
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
 _SUBSAMPLED_PITCH = 20.0
-_WALL_POINTS_PER_PITCH = 8
+_WALL_POINTS_PER_PITCH, _DARK_POINTS_PER_PITCH = 8, 4
 # Walls farther inside than this cannot end up outside of any outline.
 _WALLS_INSIDE = 0.5
 
@@ -93,6 +93,8 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
     coarse = coarse_block(seen.mask, small, cells.pitch / scale)
     others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)
     evidence = _evidence(light, seen, coarse, cells, scale, midway)
+    if midway is not None:
+        evidence = _with_dark_edge(evidence, small, coarse, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
 
 
@@ -104,6 +106,17 @@ def _darker_than_table(seen: WallMask, light: Gray, midway: float) -> WallMask:
     """
     _, dark = cv2.threshold(light, midway, 255, cv2.THRESH_BINARY_INV)
     return replace(seen, mask=np.asarray(cv2.bitwise_and(seen.mask, dark), np.uint8))
+
+
+def _with_dark_edge(
+    evidence: BlockEvidence, light: Gray, coarse: CoarseBlock, scale: int, midway: float
+) -> BlockEvidence:
+    """The evidence with the edge of dark material beside each ring."""
+    pitch = evidence.pitch_px / scale
+    edge = dark_edge(light, coarse, pitch, midway)[:: max(1, round(pitch / _DARK_POINTS_PER_PITCH))]
+    ring, points = coarse.feet(edge)[0], (edge + 0.5) * scale - 0.5
+    rings = tuple(replace(one, dark=points[ring == number]) for number, one in enumerate(evidence.rings))
+    return replace(evidence, rings=rings)
 
 
 @dataclass(frozen=True)
@@ -143,12 +156,19 @@ def _evidence(
     ends = _Ends(tip, axis, coarse.feet(found.tip)[2], straight)
     model = _learnt(light, ends, cells, depth.width or cells.wall, seen)
     tips = _tips(light, ends, cells, model)
+    if midway is not None:
+        normal = coarse.feet((tips.points + 0.5) / scale - 0.5)[2]
+        hidden = depth.across(tips.points, normal) >= 0.0
+        least = np.where(hidden, _ENDS_INSIDE_PITCHES * cells.pitch, np.inf)
+        tips = _to_the_table(light, tips, tips.points, normal, least, cells.pitch, midway)
     tips = replace(tips, points=_raised(tips.points, coarse.feet((tips.points + 0.5) / scale - 0.5)[2], depth))
     outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch]
     normal, place = coarse.feet(outer)[2], (outer + 0.5) * scale - 0.5
     sides = _sides(light, place, normal, depth.width or cells.wall, model)
-    if midway is not None and depth.width is None:
-        sides = _to_the_table(light, sides, place, normal, cells.pitch, midway)
+    if midway is not None:
+        faint = (sides.sigma >= _FAINT_SIGMA_PX) & (depth.across(place, normal) >= 0.0)
+        least = np.where(faint, _INSIDE_PITCHES * cells.pitch, np.inf)
+        sides = _to_the_table(light, sides, place, normal, least, cells.pitch, midway)
     sides = replace(sides, points=_raised(sides.points, normal, depth))
     polarity = "bright" if cells.bright else "dark"
     return BlockEvidence(
@@ -211,14 +231,23 @@ def _sides(light: Gray, place: Points, normal: Points, wall: float, model: EndMo
 
 
 def _to_the_table(
-    light: Gray, sides: _Witnesses, place: Points, normal: Points, pitch: float, midway: float
+    light: Gray,
+    seen: _Witnesses,
+    place: Points,
+    normal: Points,
+    least: Vector,
+    pitch: float,
+    midway: float,
 ) -> _Witnesses:
-    """Sides, with those that lie inside of dark material, where its walls show no more, moved out to its edge."""
+    """Witnesses at `place`, with those that lie inside of dark material by `least` (N,) pixels or more, where its walls
+    show no more, moved out to its edge.
+    """
     beyond = dark_beyond(light, place, normal, midway=midway, reach=_DARK_PITCHES * pitch)
-    moved = (sides.sigma >= _FAINT_SIGMA_PX) & (beyond > _INSIDE_PITCHES * pitch) & np.isfinite(beyond)
+    moved = (beyond > least) & np.isfinite(beyond)
     edge = place + np.where(moved, beyond, 0.0)[:, None] * normal
-    points = np.where(moved[:, None], edge, sides.points)
-    return replace(sides, points=points, sigma=np.where(moved, _DARK_SIGMA_PX, sides.sigma))
+    points = np.where(moved[:, None], edge, seen.points)
+    sigma = np.where(moved, max(_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES * pitch), seen.sigma)
+    return _Witnesses(points, np.where(moved, np.int8(WitnessKind.OUTERMOST), seen.kind), sigma)
 
 
 def _raised(points: Points, normal: Points, depth: Parallax) -> Points:

@@ -8,7 +8,8 @@ import pytest
 from benchmarks.metrics import agreement
 from benchmarks.random_scenes import random_scene
 from benchmarks.trials import calibration_for
-from contour.dark_material import dark_beyond, midway_to_table
+from contour.coarse_block import coarse_block
+from contour.dark_material import dark_beyond, dark_edge, midway_to_table
 from contour.synthetic import render
 from contour.tracing import TraceSettings, trace
 
@@ -20,6 +21,28 @@ def test_a_corner_where_walls_fade_into_dark_cells_is_seen_against_the_table() -
     found = trace(rendered.picture, TraceSettings(method="wall-tips"), rectifier=rectifier)
     agreed = agreement(found.contour, rendered.truth_px, rectifier=rectifier)
     assert agreed.hausdorff_px < 0.25 * rendered.pitch_px
+
+
+def test_a_curve_where_wall_ends_fade_is_followed_to_the_table_beside_visible_parallax() -> None:
+    # Between dark dots of wall at the cut, walls fade: the last ends seen lie two thirds of a cell inside.
+    rendered = render(random_scene(988045).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    found = trace(rendered.picture, TraceSettings(method="wall-tips"), rectifier=rectifier)
+    agreed = agreement(found.contour, rendered.truth_px, rectifier=rectifier)
+    assert agreed.hausdorff_px < 0.4 * rendered.pitch_px
+
+
+def test_the_edge_of_dark_material_is_found_where_it_hangs_together_and_no_speck_is() -> None:
+    light = np.full((240, 240), 180, np.uint8)
+    light[60:180, 60:180] = 60
+    light[36:40, 100:104] = 60
+    walls = np.zeros_like(light)
+    walls[64:176:10, 64:176] = walls[64:176, 64:176:10] = 255
+    edge = dark_edge(light, coarse_block(walls, light, 20.0), 20.0, midway=120.0)
+    outer = edge[(edge.min(axis=1) < 61) | (edge.max(axis=1) > 178)]
+    assert len(outer) > 400
+    assert outer.min() == 60.0
+    assert outer.max() == 179.0
 
 
 def ramp() -> np.ndarray:

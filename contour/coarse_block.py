@@ -24,6 +24,7 @@ _CLOSING_PITCHES = 0.72
 _LINK_PITCHES = 1.0
 _FRAGMENT_PITCHES = 2.0
 _SPECK_PITCHES = 0.4
+_STRAND_PITCHES = 0.8
 # All gaps around an opening together, its line being a sample or two wide.
 _GAPS_PITCHES = 2.5
 # Samples of another piece within two of the main one that make both of them one block.
@@ -56,14 +57,16 @@ class CoarseRing:
 class CoarseBlock:
     """Rings (exterior first) and the maps that place any point: signed distance and nearest ring vertex.
 
-    filled, walls: coarse grid, uint8, 1 in the block, and where it has walls. depth: coarse grid, float32, mask
-    pixels, positive inside. nearest: coarse grid, int32, index into all vertices of all rings one after the other.
-    step: mask pixels a coarse sample. leaves: whether the block runs out of the picture.
+    filled, walls, strands: coarse grid, uint8, 1 in the block, where it has walls, and where there are others that hang
+    on nothing. depth: coarse grid, float32, mask pixels, positive inside. nearest: coarse grid, int32, index into all
+    vertices of all rings one after the other. step: mask pixels a coarse sample. leaves: whether the block runs out of
+    the picture.
     """
 
     rings: tuple[CoarseRing, ...]
     filled: Gray
     walls: Gray
+    strands: Gray
     depth: NDArray[np.float32]
     nearest: NDArray[np.int32]
     step: int
@@ -84,6 +87,11 @@ class CoarseBlock:
         base = np.concatenate([r.base for r in self.rings])[index]
         normal = np.concatenate([r.normal for r in self.rings])[index]
         return np.asarray(((points - base) * normal).sum(axis=1), np.float64)
+
+    def strands_near(self, reach: float) -> Points:
+        """Places of strands within `reach` mask pixels outside of the coarse edge, shape (K, 2), mask pixels."""
+        rows, columns = np.nonzero(self.strands & (self.depth > -reach))
+        return np.asarray((np.stack([columns, rows], axis=1) - _PAD + 0.5) * self.step - 0.5, np.float64)
 
     def feet(self, points: Points) -> tuple[NDArray[np.int64], NDArray[np.float64], Points]:
         """Ring number, arc length and outward normal at the foot of each point on its nearest ring."""
@@ -142,7 +150,7 @@ def coarse_block(mask: Gray, light: Gray, pitch: float) -> CoarseBlock:
             "no block found: a pattern of cells runs out of the picture on all four sides, as a table's does. "
             "Check that a block lies in view with table around it"
         )
-    return _with_rings(filled, kept, step, samples)
+    return _with_rings(filled, kept, _strands(walls & (1 - kept), samples), step, samples)
 
 
 def _main_piece(walls: Gray, samples: float) -> Gray:
@@ -267,7 +275,15 @@ def _fill_missing_cells(filled: Gray, walls: Gray, shade: Gray, radius: float) -
     return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
 
 
-def _with_rings(filled: Gray, walls: Gray, step: int, samples: float) -> CoarseBlock:
+def _strands(walls: Gray, samples: float) -> Gray:
+    """Those of the walls that are as long as a cell's wall and more, no specks."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > _STRAND_PITCHES * samples
+    long[0] = False
+    return np.asarray(long[labels], np.uint8)
+
+
+def _with_rings(filled: Gray, walls: Gray, strands: Gray, step: int, samples: float) -> CoarseBlock:
     chains, hierarchy = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     order = sorted(range(len(chains)), key=lambda i: (hierarchy[0][i][3] >= 0, -len(chains[i])))
     pixels = [
@@ -286,7 +302,8 @@ def _with_rings(filled: Gray, walls: Gray, step: int, samples: float) -> CoarseB
     outside = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
     depth = np.where(filled > 0, inside - 0.5, 0.5 - outside).astype(np.float32) * step
     leaves = bool(_sides(filled, samples))
-    return CoarseBlock(tuple(rings), filled, walls, depth.astype(np.float32), index_of_label[labels], step, leaves)
+    nearest = index_of_label[labels]
+    return CoarseBlock(tuple(rings), filled, walls, strands, depth.astype(np.float32), nearest, step, leaves)
 
 
 def _ring(chain: NDArray[np.int32], is_hole: bool, step: int, samples: float) -> CoarseRing:

@@ -37,11 +37,11 @@ class _Corner:
     only_ends: bool
 
 
-def bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Flags, walls: Complex) -> Joints:
+def bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Flags, material: Complex) -> Joints:
     """The joints with doubtful convex corners cut parallel to the chord between the last witnesses on their edges.
 
-    `walls`: boundary points of all walls near the edge. A corner of which much was not seen was cut off, or its cells
-    are missing. Which of the two is told by how much that is: a cell, or more.
+    `material`: points of all walls near the edge, and of what else may be material. A corner of which much was not seen
+    was cut off, or its cells are missing. Which of the two is told by how much that is: a cell, or more.
     """
     first, last = ends(witnesses, segments, inlier)
     begin, end = found.begin.copy(), found.end.copy()
@@ -50,7 +50,7 @@ def bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Fl
         corner, near, far = complex(found.end[k]), complex(last[k]), complex(first[after])
         if found.begin[k] != corner or abs(far - near) < 1e-9:
             continue
-        unseen = _unseen(witnesses, _between(segments, inlier, k, after), walls, corner=corner, near=near, far=far)
+        unseen = _unseen(witnesses, _between(segments, inlier, k, after), material, corner=corner, near=near, far=far)
         left_out = _left_out(unseen)
         if left_out <= 0.0:
             continue
@@ -79,7 +79,7 @@ def _left_out(corner: _Corner) -> float:
 
 
 def _unseen(
-    witnesses: Witnesses, between: Index, walls: Complex, *, corner: complex, near: complex, far: complex
+    witnesses: Witnesses, between: Index, material: Complex, *, corner: complex, near: complex, far: complex
 ) -> _Corner:
     """What lies between a corner and the convex chain from `near` to `far` around all that was seen in it."""
     along = (far - near) / abs(far - near)
@@ -88,11 +88,11 @@ def _unseen(
         return _Corner(0.0, 0.0, 0.0, 0.0, only_ends=True)
     ahead, behind = corner - near, far - corner
     within = (
-        (((walls - near) * along.conjugate()).imag < 0.0)
-        & ((ahead.conjugate() * (walls - near)).imag > 0.0)
-        & ((behind.conjugate() * (walls - corner)).imag > 0.0)
+        (((material - near) * along.conjugate()).imag < 0.0)
+        & ((ahead.conjugate() * (material - near)).imag > 0.0)
+        & ((behind.conjugate() * (material - corner)).imag > 0.0)
     )
-    seen = np.concatenate([witnesses.points[between], walls[within]])
+    seen = np.concatenate([witnesses.points[between], material[within]])
     chain = _around(near, far, seen[((seen - near) * along.conjugate()).imag < 0.0])
     start, stop = chain[:-1], chain[1:]
     way = stop - start

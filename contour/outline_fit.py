@@ -102,8 +102,8 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
 
 
 def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complex:
-    """Points of walls and of dark material's edge in the fitting plane, shape (K,)."""
-    points = np.concatenate([evidence.walls.points, evidence.dark])
+    """Points of walls, and of what else may be material, in the fitting plane, shape (K,)."""
+    points = np.concatenate([evidence.walls.points, evidence.beside])
     if rectifier is not None:
         points = rectifier.rectify(points)
     places: Complex = points[:, 0] + 1j * points[:, 1]

@@ -49,8 +49,9 @@ class RingEvidence:
     sub-pixel. position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal:
     outward unit normal of the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected
     standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind. walls: all
-    that was seen of walls near the edge, whether it witnesses the outline or not. dark: edge of dark material there,
-    shape (M, 2), pixels, some four points a pitch; none where cells show the table.
+    that was seen of walls near the edge, whether it witnesses the outline or not. beside: what may be
+    material as well, strands of wall that hang on nothing and the edge of dark material, shape (M, 2), pixels, some
+    four points a pitch.
     """
 
     coarse: Ring
@@ -61,7 +62,7 @@ class RingEvidence:
     sigma: NDArray[np.float64]
     kind: NDArray[np.int8]
     walls: WallPoints = field(default_factory=WallPoints)
-    dark: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    beside: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
 
 @dataclass(frozen=True)

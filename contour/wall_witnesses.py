@@ -52,6 +52,8 @@ _MASK_BLUR_PX = 0.8
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
 _SUBSAMPLED_PITCH = 20.0
 _WALL_POINTS_PER_PITCH, _DARK_POINTS_PER_PITCH = 8, 4
+# A horn that hangs on nothing reaches no farther from the block.
+_STRANDS_PITCHES = 5.0
 # Walls farther inside than this cannot end up outside of any outline.
 _WALLS_INSIDE = 0.5
 
@@ -93,8 +95,7 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
     coarse = coarse_block(seen.mask, small, cells.pitch / scale)
     others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)
     evidence = _evidence(light, seen, coarse, cells, scale, midway)
-    if midway is not None:
-        evidence = _with_dark_edge(evidence, small, coarse, scale, midway)
+    evidence = _with_beside(evidence, small, coarse, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
 
 
@@ -108,14 +109,17 @@ def _darker_than_table(seen: WallMask, light: Gray, midway: float) -> WallMask:
     return replace(seen, mask=np.asarray(cv2.bitwise_and(seen.mask, dark), np.uint8))
 
 
-def _with_dark_edge(
-    evidence: BlockEvidence, light: Gray, coarse: CoarseBlock, scale: int, midway: float
+def _with_beside(
+    evidence: BlockEvidence, light: Gray, coarse: CoarseBlock, scale: int, midway: float | None
 ) -> BlockEvidence:
-    """The evidence with the edge of dark material beside each ring."""
+    """The evidence with strands that hang on nothing and, where `midway` is given, the edge of dark material."""
     pitch = evidence.pitch_px / scale
-    edge = dark_edge(light, coarse, pitch, midway)[:: max(1, round(pitch / _DARK_POINTS_PER_PITCH))]
-    ring, points = coarse.feet(edge)[0], (edge + 0.5) * scale - 0.5
-    rings = tuple(replace(one, dark=points[ring == number]) for number, one in enumerate(evidence.rings))
+    beside = coarse.strands_near(_STRANDS_PITCHES * pitch)
+    if midway is not None:
+        edge = dark_edge(light, coarse, pitch, midway)[:: max(1, round(pitch / _DARK_POINTS_PER_PITCH))]
+        beside = np.concatenate([beside, edge])
+    ring, points = coarse.feet(beside)[0], (beside + 0.5) * scale - 0.5
+    rings = tuple(replace(one, beside=points[ring == number]) for number, one in enumerate(evidence.rings))
     return replace(evidence, rings=rings)
 
 

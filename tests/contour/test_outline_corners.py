@@ -64,6 +64,18 @@ def test_a_corner_behind_which_nothing_is_seen_is_where_its_edges_meet() -> None
         assert distances(CORNER[None], fitted(replace(evidence, **parts)).ring)[0] < 0.1 * PITCH, seed
 
 
+def test_a_corner_hidden_by_more_than_two_cells_is_cut_unless_something_stands_in_it() -> None:
+    low, far = 300.0, 2.8 * PITCH
+    for seed in range(3):
+        evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
+        seen = np.abs(evidence.points - CORNER).sum(axis=1) > far
+        parts = {name: getattr(evidence, name)[seen] for name in ("points", "position", "normal", "sigma", "kind")}
+        evidence = replace(evidence, **parts)
+        assert distances(CORNER[None], fitted(evidence).ring)[0] > 1.5 * PITCH, seed
+        strand = np.array([[low + 0.3 * PITCH, low + 0.8 * PITCH], [low + 0.8 * PITCH, low + 0.3 * PITCH]])
+        assert distances(CORNER[None], fitted(replace(evidence, beside=strand)).ring)[0] < 0.1 * PITCH, seed
+
+
 def test_a_sharp_horn_is_drawn_to_its_tip_though_a_wall_is_seen_short_of_it() -> None:
     tip = np.array([300.0, 300.0])
     horn = np.array([tip, [900.0, 120.0], [900.0, 480.0]])

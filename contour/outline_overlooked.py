@@ -21,6 +21,8 @@ _FAR_OUTSIDE = 0.2
 # How far apart a wall's boundary must leave the outline and come back to it, pitches: ends of walls and specks that
 # touch the block come back within 0.4, also those of debris.
 _SPAN = 0.6
+# Cells stand out by less than half of that span; a streak that a wall's side makes below its top stands out farther.
+_HIGH_PER_SPAN = 0.75
 # Neighbours on one chain are an eighth of a pitch apart.
 _CHAIN_BREAKS = 0.4
 _BOUNDS_APART = 0.3
@@ -48,10 +50,11 @@ def overlooked(evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: R
     found, total = [np.zeros(0, dtype=np.intp)], 0.0
     for start, stop in zip(starts, stops, strict=True):
         run = (start + np.arange((stop - start) % len(walls) + 1)) % len(walls)
-        if height[run].max() < _FAR_OUTSIDE or np.hypot(*(walls[stop] - walls[start])) < _SPAN * pitch_px:
+        high, span = float(height[run].max()), float(np.hypot(*(walls[stop] - walls[start]))) / pitch_px
+        if high < _FAR_OUTSIDE or span < max(_SPAN, high / _HIGH_PER_SPAN):
             continue
         found.append(_spaced(run, walls, height, pitch_px))
-        total += float(height[run].max())
+        total += high
     return np.unique(np.concatenate(found)), total
 
 

@@ -59,7 +59,7 @@ def test_a_wall_that_comes_back_to_the_outline_elsewhere_is_overlooked(wide: flo
     assert (evidence.walls.points[bounds][:, 1] < 200.0).all()
 
 
-@pytest.mark.parametrize(("wide", "high"), [(0.1, 0.4), (0.3, 2.0), (0.4, 0.3)])
+@pytest.mark.parametrize(("wide", "high"), [(0.1, 0.4), (0.3, 2.0), (0.4, 0.3), (0.8, 1.4)])
 def test_an_end_of_a_wall_or_debris_that_touches_is_not_overlooked(wide: float, high: float) -> None:
     evidence = with_walls(witnesses(BLOCK, seed=1), bump(wide, high))
     assert overlooked(evidence, BLOCK, PITCH, None)[1] == 0.0

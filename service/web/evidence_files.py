@@ -61,6 +61,7 @@ class Pictures:
         self._pool = ThreadPoolExecutor(1, "page pictures", initializer=_go_last)
         self._kept: OrderedDict[tuple[str, str, int], bytes] = OrderedDict()
         self._bytes = 0
+        self._newest: tuple[Path, str, NDArray[np.uint8]] | None = None  # the last that was prepared, as large as it is
         self._lock = threading.Lock()
 
     def close(self) -> None:
@@ -71,14 +72,22 @@ class Pictures:
         """The frame at most `width_px` wide, as JPEG; raise NoPicture. tag: changes when the file does."""
         found = self._found(frame, tag, width_px)
         if found is None:
-            made = await asyncio.get_running_loop().run_in_executor(self._pool, _read_small, frame)
+            made = await asyncio.get_running_loop().run_in_executor(self._pool, self._made, frame, tag)
             self._keep(frame, tag, made)
             found = made[width_px]
         return found
 
     def prepare(self, frame: Path, pixels: NDArray[np.uint8]) -> None:
-        """Make small what is at hand, before it is asked for: to read it back would take five times as long."""
-        self._keep(frame, tag_of(frame), _made_small(pixels))
+        """Make what the strip will ask for of a frame at hand, and keep that for a look at it: not to read it back."""
+        tag = tag_of(frame)
+        self._newest = frame, tag, pixels
+        self._keep(frame, tag, _made_small(pixels, WIDTHS_PX[:1]))
+
+    def _made(self, frame: Path, tag: str) -> dict[int, bytes]:
+        newest = self._newest
+        if newest is not None and newest[:2] == (frame, tag):
+            return _made_small(newest[2])
+        return _made_small(_read(frame))
 
     def _found(self, frame: Path, tag: str, width_px: int) -> bytes | None:
         key = str(frame), tag, width_px
@@ -107,7 +116,7 @@ def _go_last() -> None:
     os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
 
 
-def _read_small(frame: Path) -> dict[int, bytes]:
+def _read(frame: Path) -> NDArray[np.uint8]:
     try:
         data = np.frombuffer(frame.read_bytes(), np.uint8)
     except OSError as error:
@@ -115,13 +124,13 @@ def _read_small(frame: Path) -> dict[int, bytes]:
     pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     if pixels is None:
         raise NoPicture("the frame's file is no picture")
-    return _made_small(np.asarray(pixels, dtype=np.uint8))
+    return np.asarray(pixels, dtype=np.uint8)
 
 
-def _made_small(pixels: NDArray[np.uint8]) -> dict[int, bytes]:
-    """The picture as JPEG by each of WIDTHS_PX, no wider."""
+def _made_small(pixels: NDArray[np.uint8], widths_px: tuple[int, ...] = WIDTHS_PX) -> dict[int, bytes]:
+    """The picture as JPEG by each width, no wider."""
     made = {}
-    for width_px in sorted(WIDTHS_PX, reverse=True):  # each from the one before: what follows is the smaller work
+    for width_px in sorted(widths_px, reverse=True):  # each from the one before: what follows is the smaller work
         height, width = pixels.shape[:2]
         if width > width_px:
             size = width_px, max(round(height * width_px / width), 1)

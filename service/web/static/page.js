@@ -3,6 +3,7 @@
 import { at, make, say } from "./dom.js";
 import { choose, chosen, keep, load, onLanguage, words } from "./words.js";
 import { listen } from "./service.js";
+import { paced } from "./pace.js";
 import * as film from "./film.js";
 import * as now from "./now.js";
 import * as orders from "./orders.js";
@@ -11,6 +12,8 @@ const THEMES = { auto: "dark", dark: "light", light: "auto" };
 const AGAIN_MS = 2_000;
 const ready = Promise.all([insist(load), insist(now.loadReasons)]);
 let seen = "";
+// Three for a job that begins, ends and is kept; a machine of five jobs a second is not held up by who watches it.
+const lookSoon = paced(film.refresh, 3, 1_000);
 
 /** The task done, however often the service must be asked; meanwhile the banner says that it does not answer. */
 async function insist(task) {
@@ -28,7 +31,7 @@ function heard(state) {
   now.show(state);
   orders.show(state);
   const newest = `${state.job} ${state.last_job?.job} ${state.settled_job} ${state.disk.archive_jobs}`;
-  if (newest !== seen) film.refresh();
+  if (newest !== seen) lookSoon();
   seen = newest;
 }
 

@@ -21,6 +21,12 @@ from tests.system.processes import free_port, until
 
 SIZE = {"width": 1280, "height": 800}
 QUALITY = 82
+# An image in SVG tells nothing of itself; the frame is there once its resource is.
+ALL_LOADED = """() => {
+  const frame = document.querySelector("#view image")?.href.baseVal;
+  const come = performance.getEntriesByType("resource").some((e) => e.name.endsWith(frame) && e.responseEnd > 0);
+  return come && [...document.querySelectorAll("#strip img")].every((image) => image.complete && image.naturalWidth > 0);
+}"""
 
 
 def pictures_to_take(folder: Path) -> None:
@@ -46,6 +52,7 @@ def take(page: Page, to: Path, name: str) -> None:
         page.evaluate("([theme]) => { document.documentElement.dataset.theme = theme; }", [theme])
         if page.evaluate("document.documentElement.lang") != language:
             page.locator("#language").click()
+        until(lambda: page.evaluate(ALL_LOADED), what="the pictures on the page")
         page.wait_for_timeout(600)
         page.screenshot(path=to / f"page-{name}-{language}.jpg", type="jpeg", quality=QUALITY)
     page.locator("#language").click()

@@ -16,7 +16,7 @@ from service.web.window import DaemonSilent, Window
 log = logging.getLogger("combtrace.page")
 
 PERIOD_S = 1.0  # a viewer that hears nothing for some of these says that the connection is lost
-LEAST_GAP_S = 0.2  # between two looks, however fast jobs follow one another
+LEAST_GAP_S = 0.2  # between two looks, however fast jobs follow one another; and from a change to its look
 MOST_VIEWERS = 16
 STALLED_S = 10.0  # a viewer who does not read that long is let go
 
@@ -78,7 +78,7 @@ class Live:
             self._viewers -= 1
 
     async def _look(self) -> None:
-        """Look at once after a change, else each period; end with the last viewer."""
+        """Look soon after a change, else each period; end with the last viewer."""
         while self._viewers and not self._closed:
             self._nudge.clear()
             try:
@@ -88,10 +88,10 @@ class Live:
             else:
                 self._latest = b"data: " + state.model_dump_json().encode() + b"\n\n"
                 self._tell()
-            await asyncio.sleep(LEAST_GAP_S)
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(self._period_s - LEAST_GAP_S):
                     await self._nudge.wait()
+            await asyncio.sleep(LEAST_GAP_S)  # after a change, not before: a job that begins has the processor first
         self._looking = None
         self._tell()
 

@@ -184,7 +184,7 @@ def test_a_job_appears_by_itself_with_its_contour_and_values(panel: Panel) -> No
 def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:
     page = panel.page
     number = panel.ordered()
-    expect(page.locator("#outcome")).to_contain_text(f"job {number}")
+    expect(page.locator("#view image")).to_have_attribute("href", re.compile(rf"/frames/{number}\?"))
     document = panel.client.get(f"/api/v1/jobs/{number}/files/document.json").json["measurement"]
     (x, y), (x_mm, y_mm) = document["pixels"]["exterior"][0], document["millimetres"]["exterior"][0]
     to_screen = "([x, y]) => { const p = new DOMPoint(x, y).matrixTransform(view.getScreenCTM()); return [p.x, p.y]; }"

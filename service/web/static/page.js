@@ -12,8 +12,8 @@ const THEMES = { auto: "dark", dark: "light", light: "auto" };
 const AGAIN_MS = 2_000;
 const ready = Promise.all([insist(load), insist(now.loadReasons)]);
 let seen = "";
-// Three for a job that begins, ends and is kept; a machine of five jobs a second is not held up by who watches it.
-const lookSoon = paced(film.refresh, 3, 1_000);
+// Two for a job that ends and is kept; a machine of five jobs a second is not held up by who watches it.
+const lookSoon = paced(film.refresh, 2, 500);
 
 /** The task done, however often the service must be asked; meanwhile the banner says that it does not answer. */
 async function insist(task) {
@@ -30,7 +30,7 @@ async function insist(task) {
 function heard(state) {
   now.show(state);
   orders.show(state);
-  const newest = `${state.job} ${state.last_job?.job} ${state.settled_job} ${state.disk.archive_jobs}`;
+  const newest = `${state.last_job?.job} ${state.settled_job} ${state.disk.archive_jobs}`; // not a job's begin: nothing disturbs it
   if (newest !== seen) lookSoon();
   seen = newest;
 }

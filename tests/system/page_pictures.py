@@ -25,7 +25,8 @@ QUALITY = 82
 ALL_LOADED = """() => {
   const frame = document.querySelector("#view image")?.href.baseVal;
   const come = performance.getEntriesByType("resource").some((e) => e.name.endsWith(frame) && e.responseEnd > 0);
-  return come && [...document.querySelectorAll("#strip img")].every((image) => image.complete && image.naturalWidth > 0);
+  const strip = [...document.querySelectorAll("#strip img")];
+  return come && strip.every((image) => image.complete && image.naturalWidth > 0);
 }"""
 
 

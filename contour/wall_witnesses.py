@@ -162,8 +162,9 @@ def _evidence(
     tips = _tips(light, ends, cells, model)
     if midway is not None:
         normal = coarse.feet((tips.points + 0.5) / scale - 0.5)[2]
-        hidden = depth.across(tips.points, normal) >= 0.0
-        least = np.where(hidden, _ENDS_INSIDE_PITCHES * cells.pitch, np.inf)
+        # A clean end is where the wall ends; what is dark beyond it is the block's shadow.
+        faded = (depth.across(tips.points, normal) >= 0.0) & (tips.kind != WitnessKind.CLEAN)
+        least = np.where(faded, _ENDS_INSIDE_PITCHES * cells.pitch, np.inf)
         tips = _to_the_table(light, tips, tips.points, normal, least, cells.pitch, midway)
     tips = replace(tips, points=_raised(tips.points, coarse.feet((tips.points + 0.5) / scale - 0.5)[2], depth))
     outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch]

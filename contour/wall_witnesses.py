@@ -54,8 +54,8 @@ _SUBSAMPLED_PITCH = 20.0
 _WALL_POINTS_PER_PITCH, _DARK_POINTS_PER_PITCH = 8, 4
 # A horn that hangs on nothing reaches no farther from the block.
 _STRANDS_PITCHES = 5.0
-# Walls farther inside than this cannot end up outside of any outline.
-_WALLS_INSIDE = 0.5
+# Walls farther inside than this are no part of the boundary towards the table, the dents of open cells included.
+_WALLS_INSIDE = 1.1
 
 
 def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:

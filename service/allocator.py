@@ -1,4 +1,4 @@
-"""How the C library keeps memory: in few arenas, so that what threads leave behind does not add up over months."""
+"""How the C library keeps memory: in few arenas, given back now and then, so that it does not add up over months."""
 
 from __future__ import annotations
 
@@ -12,3 +12,12 @@ def keep_few_arenas() -> bool:
     """True where the C library took it; others than glibc have no arenas. To be called before threads are started."""
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     return mallopt is not None and mallopt(M_ARENA_MAX, ARENAS) == 1
+
+
+def give_back() -> bool:
+    """True where memory that nobody uses went back to the kernel; some milliseconds, in which others cannot allocate.
+
+    By itself the library gives back only the end of a heap: one block that stays keeps all that was freed before it.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    return trim is not None and trim(0) == 1

@@ -13,6 +13,7 @@ from functools import partial
 import cv2
 
 from contour.errors import PictureError
+from service.allocator import give_back
 from service.archive import Archive, ArchiveError
 from service.evidence import (
     FRAME,
@@ -31,6 +32,9 @@ log = logging.getLogger("combtrace.archive")
 DEPTH = 4  # frames that may wait: a burst of jobs; each may be tens of megabytes
 NICENESS = 10  # the next job goes before the last one's picture
 CLOSE_BOUND_S = 10.0
+GIVEN_BACK_EVERY = (
+    200  # jobs; frames and their copies are the largest that a job leaves behind in the allocator's heaps
+)
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class ArchiveWriter:
         self._archive = archive
         self._queue: queue.Queue[Evidence | None] = queue.Queue(depth)
         self._thread = threading.Thread(target=self._run, name="archive", daemon=True)
-        self._stored = self._dropped = self._failed = 0
+        self._stored = self._dropped = self._failed = self._since_given = 0
         self._table: tuple[TableRecord, str] | None = None
         self._opened = self._closing = False
         self.trouble: str | None = None
@@ -101,11 +105,19 @@ class ArchiveWriter:
             evidence = self._queue.get()
             if evidence is not None:
                 self._tell(partial(self._store, evidence))
+                self._give_back()
             elif self._closing and self._queue.empty():
                 return
             else:
                 self._tell(self._make_room)
             evidence = None  # or it would hold a frame until the next job
+
+    def _give_back(self) -> None:
+        """Where nothing waits, so that it falls between two jobs where it can."""
+        self._since_given += 1
+        if self._since_given >= GIVEN_BACK_EVERY and self._queue.empty():
+            self._since_given = 0
+            give_back()
 
     def _make_room(self) -> None:
         self._open()

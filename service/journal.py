@@ -34,6 +34,7 @@ RESTORED = (
 UNSETTLED = "outcome IS NULL"
 PRUNED_AT_ONCE = 500  # rows: some milliseconds, for a job may wait behind it
 MOST_NOTES = 10_000  # of the audit: who asked for what
+PAGE_CACHE_KIB = 512  # a job looks at the newest rows; the library's 2 MB fill over the first two thousand jobs
 LARGEST_LOG_BYTES = 8_000_000  # of the write-ahead log, once it was taken over into the file
 
 
@@ -133,6 +134,7 @@ class Journal:
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = FULL")
         self._db.execute(f"PRAGMA journal_size_limit = {LARGEST_LOG_BYTES}")
+        self._db.execute(f"PRAGMA cache_size = -{PAGE_CACHE_KIB}")
         version = self._db.execute("PRAGMA user_version").fetchone()[0]
         if version == 0:
             self._db.executescript(

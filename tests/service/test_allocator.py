@@ -36,3 +36,34 @@ def test_threads_share_few_arenas() -> None:
         )
         > 2
     )
+
+
+HELD_BY_ONE = """
+import ctypes
+from pathlib import Path
+from service.allocator import give_back
+library = ctypes.CDLL(None)
+library.malloc.restype = ctypes.c_void_p
+library.free.argtypes = [ctypes.c_void_p]
+library.memset.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t]
+def resident():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+blocks = [library.malloc(64_000) for _ in range(1000)]
+for block in blocks:
+    library.memset(block, 1, 64_000)
+for block in blocks[:-1]:
+    library.free(block)
+before = resident()
+given = give_back()
+print(given, before - resident() > 50e6)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="malloc_trim is glibc's")
+def test_what_one_block_kept_from_the_kernel_is_given_back() -> None:
+    done = subprocess.run([sys.executable, "-c", HELD_BY_ONE], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "True"]
+    without = HELD_BY_ONE.replace("give_back()", "False")
+    assert subprocess.run(
+        [sys.executable, "-c", without], capture_output=True, text=True, check=True
+    ).stdout.split() == ["False", "False"]

@@ -141,6 +141,7 @@ def test_no_control_can_be_pressed_before_the_script_hears_it(panel: Panel) -> N
 
 def test_a_service_that_answers_too_late_while_the_page_loads_is_told_and_asked_again(panel: Panel) -> None:
     page = panel.page
+    expect(page.locator("#trigger")).to_be_enabled()  # this page has asked already
     page.route("**/api/v1/reasons", lambda route: route.abort(), times=1)
     page.reload()
     settled_state(panel, "lost")

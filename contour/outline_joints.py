@@ -15,6 +15,8 @@ Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 _REACH = 1.7
 _SLACK = 0.8
+# A single witness so much farther out on an edge's line than its corner is dust: alone it draws no spike.
+_LONE = 1.6
 _SMOOTH_SINE = 0.26
 _ASIDE = 0.8
 
@@ -32,15 +34,16 @@ class Joints:
     kink: Real
 
 
-def ends(witnesses: Witnesses, segments: Segments, inlier: Flags) -> tuple[Complex, Complex]:
-    """Feet of each segment's first and last inlying witness on its model, shape (S,) each."""
+def ends(witnesses: Witnesses, segments: Segments, inlier: Flags, *, but: int = 0) -> tuple[Complex, Complex]:
+    """Feet of each segment's first and last inlying witness on its model, shape (S,) each; `but` so many at either."""
     count = len(witnesses)
     places_first, places_last = segments.first.copy(), segments.first + segments.length - 1
     for k in range(len(segments)):
         inside = np.flatnonzero(inlier[(segments.first[k] + np.arange(segments.length[k])) % count])
         if len(inside):
-            places_first[k] = segments.first[k] + inside[0]
-            places_last[k] = segments.first[k] + inside[-1]
+            skipped = min(but, (len(inside) - 1) // 2)
+            places_first[k] = segments.first[k] + inside[skipped]
+            places_last[k] = segments.first[k] + inside[-1 - skipped]
     first, _ = feet(segments.models, witnesses.points[places_first % count])
     last, _ = feet(segments.models, witnesses.points[places_last % count])
     return first, last
@@ -63,7 +66,13 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
     slack = _SLACK * witnesses.pitch
     ahead = ((point - near) * tangent.conj()).real
     behind = ((far - point) * next_tangent.conj()).real
-    corner = met & (ahead > -slack) & (ahead < reach) & (behind > -slack) & (behind < reach)
+    lone = _LONE * witnesses.pitch
+    inner_first, inner_last = ends(witnesses, segments, inlier, but=1)
+    lone_last = (ahead > -lone) & (((point - inner_last) * tangent.conj()).real > 0.0)
+    lone_first = (behind > -lone) & (((inner_first[after] - point) * next_tangent.conj()).real > 0.0)
+    corner = (
+        met & ((ahead > -slack) | lone_last) & (ahead < reach) & ((behind > -slack) | lone_first) & (behind < reach)
+    )
     corner &= (np.abs(point - near) < 1.5 * reach) & (np.abs(point - far) < 1.5 * reach)
     middle = 0.5 * (near + far)
     one, one_tangent = feet(segments.models, middle)

@@ -90,6 +90,18 @@ def test_a_sharp_horn_is_drawn_to_its_tip_though_a_wall_is_seen_short_of_it() ->
         assert distances(tip[None], fitted(replace(evidence, **parts)).ring)[0] < 0.2 * PITCH, seed
 
 
+@pytest.mark.parametrize("beyond", [0.9, 1.2, 1.5])
+def test_a_speck_on_an_edges_line_beyond_its_corner_draws_no_spike(beyond: float) -> None:
+    for seed in range(4):
+        evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
+        seen = np.append(np.arange(len(evidence.points)), -1)
+        parts = {name: getattr(evidence, name)[seen] for name in ("points", "position", "normal", "sigma", "kind")}
+        parts["points"][-1] = CORNER - [0.0, beyond * PITCH]
+        parts["position"][-1] += 0.3 * PITCH
+        ring = fitted(replace(evidence, **parts)).ring
+        assert errors(ring, cut_corner(0.0)).max() < 0.2 * PITCH, seed
+
+
 def lost_corner(seed: int) -> RingEvidence:
     """A square with the walls about its first corner pushed in by about half a cell, each by another amount."""
     evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)

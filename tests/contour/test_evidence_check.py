@@ -58,15 +58,3 @@ def test_three_ends_in_a_row_are_missing_cells() -> None:
     off = np.isin(np.arange(len(evidence.points)), np.arange(10, 13))
     moved = evidence.points - np.where(off, 0.8 * PITCH, 0.0)[:, None] * evidence.normal
     check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
-
-
-def test_four_ends_behind_one_another_are_one_missing_cell() -> None:
-    evidence = witnesses(BLOCK, seed=2)
-    more = {
-        name: np.insert(value, np.full(3, 10), value[10:13], axis=0)
-        for name in ("points", "position", "normal", "sigma", "kind")
-        for value in [getattr(evidence, name)]
-    }
-    more["position"][10:16] = np.linspace(0.0, 1.2 * PITCH, 6) + evidence.position[10]
-    more["points"][10:16] -= 0.8 * PITCH * more["normal"][10:16]
-    check_against_evidence(replace(evidence, **more), BLOCK, PITCH, None)

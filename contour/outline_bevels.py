@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contour.outline_joints import Flags, Joints, ends
-from contour.outline_models import Complex, Index, feet
+from contour.outline_models import Complex, Index, Real, feet
 from contour.outline_segments import Segments
 from contour.outline_witnesses import Witnesses
 
@@ -90,21 +90,26 @@ def _unseen(
     depth = ((corner - near) * (-1j * along).conjugate()).real
     if depth <= 0.0:
         return _Corner(0.0, 0.0, 0.0, 0.0, anything=False, only_ends=True)
+
+    def height(points: Complex) -> Real:
+        """How far points lie beyond the chord, towards the corner."""
+        return np.asarray(-((points - near) * along.conjugate()).imag, np.float64)
+
     ahead, behind = corner - near, far - corner
     within = (
-        (((material - near) * along.conjugate()).imag < 0.0)
+        (height(material) > 0.0)
         & ((ahead.conjugate() * (material - near)).imag > 0.0)
         & ((behind.conjugate() * (material - corner)).imag > 0.0)
     )
     seen = np.concatenate([witnesses.points[between], material[within]])
-    chain = _around(near, far, seen[((seen - near) * along.conjugate()).imag < 0.0])
+    chain = _around(near, far, seen[height(seen) > 0.0])
     start, stop = chain[:-1], chain[1:]
     way = stop - start
     share = np.clip(((corner - start) * way.conj()).real / np.maximum(np.abs(way) ** 2, 1e-12), 0.0, 1.0)
     area = 0.5 * float(((start - corner).conj() * (stop - corner)).imag.sum())
     pitch = witnesses.pitch
-    highest = float(-((chain - near) * along.conjugate()).imag.min())
-    ends_at = -((witnesses.points[between] - near) * along.conjugate()).imag > -_NEAR_CHORD * pitch
+    highest = float(height(chain).max())
+    ends_at = height(witnesses.points[between]) > -_NEAR_CHORD * pitch
     return _Corner(
         abs(area) / pitch**2,
         float(np.abs(corner - start - share * way).min()) / pitch,

@@ -149,7 +149,7 @@ def residuals(witnesses: Witnesses, segments: Segments) -> Real:
 
 def _inlying(witnesses: Witnesses, residual: Real) -> Flags:
     sigma = np.where(residual > 0.0, witnesses.outer, witnesses.inner)
-    inlying: Flags = (np.abs(residual) < 3.0 * sigma) & np.isfinite(witnesses.inner)
+    inlying: Flags = (np.abs(residual) < 3.0 * sigma) & ~witnesses.bound
     return inlying
 
 

@@ -85,7 +85,7 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Index, Index, I
     saved = witnesses.cap_inside[place] - cost(
         witnesses, distance(proposals.models.take(which), witnesses.points[place]), place
     )
-    lies = (saved > _LIES * witnesses.cap_inside[place]) & np.isfinite(witnesses.inner[place])
+    lies = (saved > _LIES * witnesses.cap_inside[place]) & ~witnesses.bound[place]
     last, following = supports(lies, place, begin[which], (begin + reach)[which])
     running = np.concatenate([[0.0], np.cumsum(saved)])
     here = np.arange(len(which))

@@ -57,6 +57,11 @@ class Witnesses:
     def __len__(self) -> int:
         return len(self.points)
 
+    @property
+    def bound(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """Which are no witnesses of the edge, but bound it from inside."""
+        return np.isinf(self.inner)
+
 
 def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None) -> Witnesses:
     """The ring's witnesses in the fitting plane (rectified where `rectifier` is given), with noise as the evidence
@@ -94,7 +99,7 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
     dearer = _HOLE if witnesses.rare > 0.0 else 1.0
     inside = np.where(witnesses.inner > witnesses.outer * 1.01, 4.0, np.clip(inside, 3.0, 5.5))
     outside = np.clip(np.log((1.0 - _SHARE_OUTSIDE) / _SHARE_OUTSIDE * odds), 5.0, 6.5)
-    bound = np.isinf(inner)
+    bound = witnesses.bound
     return replace(
         witnesses,
         inner=inner,

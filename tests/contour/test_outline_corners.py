@@ -21,6 +21,12 @@ def fitted(evidence: RingEvidence) -> FittedRing:
     return fit_ring(evidence, pitch_px=PITCH, wall_px=3.0, rectifier=None)
 
 
+def taken(evidence: RingEvidence, index: NDArray[np.bool_] | NDArray[np.intp]) -> RingEvidence:
+    """The evidence with those of its witnesses alone, as copies."""
+    names = ("points", "position", "normal", "sigma", "kind")
+    return replace(evidence, **{name: getattr(evidence, name)[index] for name in names})
+
+
 def cut_corner(length: float, size: float = 600.0) -> NDArray[np.float64]:
     """A square whose first corner is cut off `length` px along either edge."""
     low, high = 300.0, 300.0 + size
@@ -60,8 +66,7 @@ def test_a_corner_behind_which_nothing_is_seen_is_where_its_edges_meet() -> None
     for seed in range(8):
         evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
         seen = np.abs(evidence.points - CORNER).sum(axis=1) > 1.3 * PITCH
-        parts = {name: getattr(evidence, name)[seen] for name in ("points", "position", "normal", "sigma", "kind")}
-        assert distances(CORNER[None], fitted(replace(evidence, **parts)).ring)[0] < 0.1 * PITCH, seed
+        assert distances(CORNER[None], fitted(taken(evidence, seen)).ring)[0] < 0.1 * PITCH, seed
 
 
 def test_a_corner_hidden_by_more_than_two_cells_is_cut_unless_something_stands_in_it() -> None:
@@ -69,8 +74,7 @@ def test_a_corner_hidden_by_more_than_two_cells_is_cut_unless_something_stands_i
     for seed in range(3):
         evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
         seen = np.abs(evidence.points - CORNER).sum(axis=1) > far
-        parts = {name: getattr(evidence, name)[seen] for name in ("points", "position", "normal", "sigma", "kind")}
-        evidence = replace(evidence, **parts)
+        evidence = taken(evidence, seen)
         assert distances(CORNER[None], fitted(evidence).ring)[0] > 1.5 * PITCH, seed
         strand = np.array([[low + 0.3 * PITCH, low + 0.8 * PITCH], [low + 0.8 * PITCH, low + 0.3 * PITCH]])
         assert distances(CORNER[None], fitted(replace(evidence, beside=strand)).ring)[0] < 0.1 * PITCH, seed
@@ -84,10 +88,10 @@ def test_a_sharp_horn_is_drawn_to_its_tip_though_a_wall_is_seen_short_of_it() ->
         away = np.flatnonzero(evidence.points[:, 0] > tip[0] + 1.4 * PITCH)
         last = away[-1]
         seen = np.append(away, last)
-        parts = {name: getattr(evidence, name)[seen] for name in ("points", "position", "normal", "sigma", "kind")}
-        parts["points"][-1] = (tip[0] + 1.35 * PITCH, tip[1] + 2.0)
-        parts["position"][-1] += 0.5 * PITCH
-        assert distances(tip[None], fitted(replace(evidence, **parts)).ring)[0] < 0.2 * PITCH, seed
+        evidence = taken(evidence, seen)
+        evidence.points[-1] = (tip[0] + 1.35 * PITCH, tip[1] + 2.0)
+        evidence.position[-1] += 0.5 * PITCH
+        assert distances(tip[None], fitted(evidence).ring)[0] < 0.2 * PITCH, seed
 
 
 @pytest.mark.parametrize("beyond", [0.9, 1.2, 1.5])
@@ -95,10 +99,10 @@ def test_a_speck_on_an_edges_line_beyond_its_corner_draws_no_spike(beyond: float
     for seed in range(4):
         evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
         seen = np.append(np.arange(len(evidence.points)), -1)
-        parts = {name: getattr(evidence, name)[seen] for name in ("points", "position", "normal", "sigma", "kind")}
-        parts["points"][-1] = CORNER - [0.0, beyond * PITCH]
-        parts["position"][-1] += 0.3 * PITCH
-        ring = fitted(replace(evidence, **parts)).ring
+        evidence = taken(evidence, seen)
+        evidence.points[-1] = CORNER - [0.0, beyond * PITCH]
+        evidence.position[-1] += 0.3 * PITCH
+        ring = fitted(evidence).ring
         assert errors(ring, cut_corner(0.0)).max() < 0.2 * PITCH, seed
 
 

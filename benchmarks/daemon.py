@@ -21,7 +21,7 @@ from textwrap import fill
 
 from benchmarks.daemon_job import JobTimes, job_times
 from benchmarks.page_section import put_section
-from benchmarks.rest import SETTLES_S, link_and_bare, share_percent
+from benchmarks.rest import SETTLES_S, medians_percent, share_percent
 from tests.system.cell import Cell
 from tests.system.processes import until
 
@@ -78,7 +78,7 @@ def measured(folder: Path, rest_s: float) -> list[Figure]:
         share = median(share_percent(process, rest_s / RESTS) for _ in range(RESTS))
         memory = resident_megabytes(process)
         cell.service.stop()
-        _, bare = link_and_bare(cell.port, rest_s / RESTS, RESTS)
+        (bare,) = medians_percent(["bare"], cell.port, rest_s / RESTS, RESTS)
     finally:
         cell.stop()
     return [

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.link_recovery import recoveries
-from benchmarks.rest import link_and_bare
+from benchmarks.rest import medians_percent
 from benchmarks.tcp_clients import CLIENTS, TURNS, Taken, Write, compare, send
 from drivers.controller.chunks import page_starts, spans
 from drivers.controller.mailbox import (
@@ -234,7 +234,7 @@ def at_rest() -> list[Row]:
         try:
             cell.ready()
             cell.service.stop()
-            link, bare = link_and_bare(cell.port, REST_S, REST_ROUNDS)
+            link, bare = medians_percent(["link", "bare"], cell.port, REST_S, REST_ROUNDS)
         finally:
             cell.stop()
     return [

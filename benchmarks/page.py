@@ -17,7 +17,8 @@ import tempfile
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median, stdev
@@ -170,8 +171,13 @@ def _jobs(cell: Cell) -> tuple[dict[str, float], float]:
 
 def figures(folder: Path, rounds: int) -> tuple[list[Figure], str]:
     """All of them, and what belongs to them in words."""
-    paced, loaded = _at_pace(folder / "paced", PACE_S, rounds)
-    pressed, _ = _at_pace(folder / "pressed", 0.02, rounds)
+    with _jobs_each(folder / "paced", PACE_S) as (cell, port):
+        paced = viewers_cost(cell, port, rounds)
+        cell.controller.stop()
+        time.sleep(2)
+        loaded = loading(f"http://127.0.0.1:{port}/")
+    with _jobs_each(folder / "pressed", 0.02) as (cell, port):
+        pressed = viewers_cost(cell, port, rounds)
     shown = [
         Figure(f"first paint, empty cache, median of {LOADS}", median(loaded.paints), "ms", PAINT_MS),
         Figure("all that is loaded, without the frame", loaded.weight_kb, "kB", WEIGHT_KB),
@@ -187,18 +193,16 @@ def figures(folder: Path, rounds: int) -> tuple[list[Figure], str]:
     return shown, fill(told, PAGE_WIDTH)
 
 
-def _at_pace(folder: Path, every_s: float, rounds: int) -> tuple[Cost, Loading]:
-    """A viewer's cost with a trigger each `every_s`, and how the page loads when there are none."""
+@contextmanager
+def _jobs_each(folder: Path, every_s: float) -> Iterator[tuple[Cell, int]]:
+    """A service with a page that has a trigger each `every_s`, and the page's port."""
     folder.mkdir()
     port = free_port()
     cell = Cell(folder, trigger_every_s=every_s, more=f"page: {{port: {port}}}\n")
     try:
         cell.ready()
         cell.goes_on(2)
-        cost = viewers_cost(cell, port, rounds)
-        cell.controller.stop()
-        time.sleep(2)
-        return cost, loading(f"http://127.0.0.1:{port}/")
+        yield cell, port
     finally:
         cell.service.kill()
         cell.stop()

@@ -40,15 +40,15 @@ def share_percent(process_id: int, seconds: float) -> float:
     return 100 * (processor_s(process_id) - before) / (time.monotonic() - begun)
 
 
-def link_and_bare(port: int, seconds: float, rounds: int) -> tuple[float, float]:
-    """Medians of `rounds` shares, percent of a core, taken in turn: of the link alone, and of the bare loop."""
-    shares: dict[str, list[float]] = {"link": [], "bare": []}
+def medians_percent(whats: Sequence[str], port: int, seconds: float, rounds: int) -> list[float]:
+    """Of each of `whats`, "link" or "bare", the median of `rounds` shares of a core, taken in turn."""
+    shares: dict[str, list[float]] = {what: [] for what in whats}
     for _ in range(rounds):
         for what, seen in shares.items():
             with _started(what, port) as process_id:
                 time.sleep(SETTLES_S)
                 seen.append(share_percent(process_id, seconds))
-    return median(shares["link"]), median(shares["bare"])
+    return [median(seen) for seen in shares.values()]
 
 
 @contextmanager

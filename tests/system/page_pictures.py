@@ -23,7 +23,7 @@ SIZE = {"width": 1280, "height": 800}
 QUALITY = 82
 # An image in SVG tells nothing of itself; the frame is there once its resource is.
 ALL_LOADED = """() => {
-  const frame = document.querySelector("#view image")?.href.baseVal;
+  const frame = document.querySelector("#view image:not([visibility])")?.href.baseVal;
   const come = performance.getEntriesByType("resource").some((e) => e.name.endsWith(frame) && e.responseEnd > 0);
   const strip = [...document.querySelectorAll("#strip img")];
   return come && strip.every((image) => image.complete && image.naturalWidth > 0);

@@ -21,6 +21,17 @@ from tests.system.page_client import TOKEN, Client, token_file
 from tests.system.processes import free_port, until
 
 expect.set_options(timeout=15_000)  # a job on a busy machine
+FRAME = "#view image:not([visibility])"  # not the one that is still to come
+# What was seen together at each change of the picture: numbers of jobs whose frames show, the contour.
+WATCH_PICTURE = """() => {
+  window.together = [];
+  const view = document.querySelector("#view");
+  const look = () => window.together.push([
+    [...view.querySelectorAll("image:not([visibility])")].map((image) => image.href.baseVal),
+    view.querySelector("path.exterior")?.getAttribute("d") ?? "",
+  ]);
+  new MutationObserver(look).observe(view, {childList: true, attributes: true, subtree: true});
+}"""
 PANEL = {"width": 1280, "height": 800}
 EXPECTED_NOISE = (
     "ERR_CONNECTION_REFUSED",
@@ -169,12 +180,11 @@ def test_a_job_appears_by_itself_with_its_contour_and_values(panel: Panel) -> No
         if panel.client.get(f"/api/v1/jobs/{number}/drawing").json["holes"]:
             break
     expect(page.locator("#outcome")).to_have_text(f"job {number}: accepted")
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{number}\?width=1600"))
     job = panel.client.get(f"/api/v1/jobs/{number}").json
     drawn = page.locator("#view path.exterior").get_attribute("d") or ""
     holes = [hole.get_attribute("d") or "" for hole in page.locator("#view path.hole").all()]
     assert sum(len(re.findall(r"[ML]", path)) for path in (drawn, *holes)) == job["report"]["vertices"]
-    image = page.locator("#view image")
-    expect(image).to_have_attribute("href", re.compile(rf"/frames/{number}\?width=1600"))
     expect(page.locator("#values")).to_contain_text(f"{job['report']['area_mm2']:,.0f}")
     expect(page.locator("#values")).to_contain_text("±")
     expect(page.locator("#stages")).to_contain_text("contour")
@@ -182,10 +192,45 @@ def test_a_job_appears_by_itself_with_its_contour_and_values(panel: Panel) -> No
     assert page.evaluate("window.sameDocument") is True
 
 
+def frames_of(panel: Panel, contour: str) -> set[str]:
+    """Addresses of the frames that one contour was seen with since `WATCH_PICTURE`."""
+    together: list[tuple[list[str], str]] = panel.page.evaluate("window.together")
+    assert all(len(frames) < 2 for frames, _ in together)
+    return {frame for frames, drawn in together for frame in frames if drawn == contour}
+
+
+def test_a_contour_is_never_seen_over_another_jobs_frame(panel: Panel) -> None:
+    page = panel.page
+    first = panel.ordered()
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{first}\?"))
+    page.evaluate(WATCH_PICTURE)
+    numbers = [panel.ordered() for _ in range(2)]
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{numbers[-1]}\?"))
+    contour = page.locator("#view path.exterior").get_attribute("d") or ""
+    assert {re.search(r"/frames/(\d+)", frame)[1] for frame in frames_of(panel, contour)} == {str(numbers[-1])}  # type: ignore[index]
+
+
+@pytest.mark.parametrize("how", ["never comes", "is not there"])
+def test_a_contour_whose_frame_does_not_come_is_shown_without_one(panel: Panel, how: str) -> None:
+    page = panel.page
+    first = panel.ordered()
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{first}\?"))
+    before = page.locator("#view path.exterior").get_attribute("d") or ""
+    held: list[Route] = []
+    page.route("**/frames/*width=1600*", lambda route: held.append(route) if how == "never comes" else route.abort())
+    number = panel.ordered()
+    expect(page.locator("#outcome")).to_have_text(f"job {number}: accepted")
+    expect(page.locator("#view path.exterior")).not_to_have_attribute("d", before)
+    expect(page.locator(FRAME)).to_have_count(1)
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{number}\?"))
+    for route in held:
+        route.abort()
+
+
 def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:
     page = panel.page
     number = panel.ordered()
-    expect(page.locator("#view image")).to_have_attribute("href", re.compile(rf"/frames/{number}\?"))
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{number}\?"))
     document = panel.client.get(f"/api/v1/jobs/{number}/files/document.json").json["measurement"]
     (x, y), (x_mm, y_mm) = document["pixels"]["exterior"][0], document["millimetres"]["exterior"][0]
     to_screen = "([x, y]) => { const p = new DOMPoint(x, y).matrixTransform(view.getScreenCTM()); return [p.x, p.y]; }"

@@ -7,6 +7,7 @@ const STEP = 1.25;
 const MOST = 40;
 const MOST_MARKS = 400; // more vertices than this are a line of dots
 const TEXT_PX = 13;
+const MOST_WAIT_MS = 300;
 
 const view = at("view");
 const frame = at("frame");
@@ -15,21 +16,34 @@ let box = null; // what is seen of the frame: x, y, width, height in its pixels
 let withAxes = true;
 const pointers = new Map();
 
-/** Show a job's frame and its drawing; null shows that there is none. */
+let settle = () => {}; // shows at once what waits for its frame
+
+/** Show a job's frame and its drawing; null shows that there is none. Until the frame has come, the job before stays. */
 export function show(next, address) {
-  const same = drawing && next && drawing.width === next.width && drawing.height === next.height;
-  drawing = next;
-  at("no-picture").hidden = drawing !== null;
-  if (!drawing) {
+  settle();
+  at("no-picture").hidden = next !== null;
+  if (!next) {
+    drawing = null;
     view.replaceChildren();
     return;
   }
-  const image = draw("image", { href: address, x: -0.5, y: -0.5, width: drawing.width, height: drawing.height, preserveAspectRatio: "none" });
-  const old = view.querySelector("image");
-  if (old && same) image.addEventListener("load", () => old.remove(), { once: true }); // no flicker between two
-  view.replaceChildren(...(old && same ? [old] : []), image, axes(), contour());
-  if (same) look();
-  else fit();
+  const same = drawing && drawing.width === next.width && drawing.height === next.height;
+  const image = draw("image", { href: address, x: -0.5, y: -0.5, width: next.width, height: next.height, preserveAspectRatio: "none", visibility: "hidden" });
+  const swap = () => {
+    if (settle !== swap) return;
+    settle = () => {};
+    drawing = next;
+    for (const other of [...view.children]) if (other !== image) other.remove(); // a contour over another job's frame would lie
+    image.removeAttribute("visibility");
+    view.append(axes(), contour());
+    if (same) look();
+    else fit();
+  };
+  settle = swap;
+  view.append(image);
+  if (!same) swap();
+  for (const end of ["load", "error"]) image.addEventListener(end, swap, { once: true });
+  setTimeout(swap, MOST_WAIT_MS);
 }
 
 function path(points) {

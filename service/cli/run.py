@@ -9,6 +9,7 @@ import logging
 import os
 import signal
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("combtrace.daemon")
 
+FILE_THREADS = 4  # at most: for the journal and other files. They begin as they are needed and stay
 LAST_RESORT_S = 15.0  # after a stop was asked for; the parts of a stop have their own bounds, together less
 
 HELP = "run the daemon"
@@ -86,6 +88,7 @@ async def serve(parts: Parts, ready_timeout_s: float, *, once: bool) -> int:
     from service.reasons import Outcome
     from service.trigger_queue import TriggerRefused
 
+    asyncio.get_running_loop().set_default_executor(ThreadPoolExecutor(FILE_THREADS, "file"))
     daemon = Daemon(parts, on_stop=_end_within_bound)
     signals = (signal.SIGTERM, signal.SIGINT)
     if not once:

@@ -12,6 +12,7 @@ import argparse
 import http.client
 import json
 import os
+import random
 import sys
 import tempfile
 import threading
@@ -38,8 +39,9 @@ PAINT_MS, WEIGHT_KB, COST_PERCENT = 300.0, 150.0, 2.0
 LOADS = 9
 LOOKS_AT_ONCE, LOOK_S = 2.0, 0.5  # then one each LOOK_S, as static/page.js has it
 PACE_S = 1.0  # from trigger to trigger; faster than any cell cuts
-JOBS_A_ROUND = 8  # two of each picture
+JOBS_A_ROUND = 12  # three of each picture
 JOBS_BEFORE = 4  # which do not count: a viewer who has just come looks at all at once
+DRAWN = 400
 PAGE_WIDTH = 120
 PAGE = Path(__file__).parents[1] / "docs" / "page-speed.md"
 
@@ -131,19 +133,28 @@ class Cost:
 
 
 def viewers_cost(cell: Cell, port: int, rounds: int) -> Cost:
-    """From jobs of the same picture, in rounds with a viewer and in those without beside them, each first in turn."""
-    ratios, used = list[float](), list[float]()
+    """From jobs of the same picture, in rounds with a viewer and in those without beside them, each first in turn.
+
+    The median of the ratios of every such two jobs; its standard error by drawing rounds anew.
+    """
+    ratios, used = list[list[float]](), list[float]()
     for number in range(rounds):
         with_viewer = [number % 2 == 1, number % 2 == 0]
         found = {watched: _round(cell, port if watched else None) for watched in with_viewer}
         (seen, seen_ms), (alone, alone_ms) = found[True], found[False]
-        ratios += [seen[name] / alone[name] for name in seen if name in alone]
+        ratios.append([one / other for name in seen for one in seen[name] for other in alone.get(name, ())])
         used.append(seen_ms - alone_ms)
-    return Cost(100 * (median(ratios) - 1), 125 * stdev(ratios) / len(ratios) ** 0.5, median(used))
+    draw = random.Random(1)
+    drawn = [_cost(draw.choices(ratios, k=rounds)) for _ in range(DRAWN)]
+    return Cost(_cost(ratios), stdev(drawn), median(used))
 
 
-def _round(cell: Cell, watched_at: int | None) -> tuple[dict[str, float], float]:
-    """Median total times of jobs by picture, ms, and processor that the daemon took for one.
+def _cost(ratios: list[list[float]]) -> float:
+    return 100 * (median(ratio for of_round in ratios for ratio in of_round) - 1)
+
+
+def _round(cell: Cell, watched_at: int | None) -> tuple[dict[str, list[float]], float]:
+    """Total times of jobs by picture, ms, and processor that the daemon took for one.
 
     watched_at: the page's port, where somebody watches.
     """
@@ -156,7 +167,7 @@ def _round(cell: Cell, watched_at: int | None) -> tuple[dict[str, float], float]
             viewer.close()
 
 
-def _jobs(cell: Cell) -> tuple[dict[str, float], float]:
+def _jobs(cell: Cell) -> tuple[dict[str, list[float]], float]:
     before, begun = len(cell.settled()), processor_s(cell.service.process_id)
     until(lambda: len(cell.settled()) > before + JOBS_A_ROUND, 120, "jobs")
     processor_ms = (processor_s(cell.service.process_id) - begun) * 1000 / (len(cell.settled()) - before)
@@ -166,7 +177,7 @@ def _jobs(cell: Cell) -> tuple[dict[str, float], float]:
     for job in ended:
         if "frame" in job.report:
             took[job.report["frame"]].append(job.report["total_ms"])
-    return {frame: median(times) for frame, times in took.items()}, processor_ms
+    return took, processor_ms
 
 
 def figures(folder: Path, rounds: int) -> tuple[list[Figure], str]:

@@ -5,7 +5,10 @@ All in pixels of the full frame, (0, 0) the centre of the top-left one.
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -34,8 +37,8 @@ def drawing(archived: ArchivedJob) -> Drawing:
     measured = document["measurement"]
     pixels = archived.contour("pixels") if measured else None
     millimetres = archived.contour("millimetres") if measured else None
-    record = _record(archived)
-    grid = None if record is None else _grid(record.calibration, width, height, document["thickness_mm"])
+    kept = document["calibration"]
+    backdrop = _backdrop(json.dumps(kept and kept["content"]), width, height, document["thickness_mm"])
     return Drawing(
         job_id=archived.job_id,
         width=width,
@@ -45,20 +48,34 @@ def drawing(archived: ArchivedJob) -> Drawing:
         holes=[_pairs(hole) for hole in pixels.holes] if pixels else [],
         band_px=_band_px(measured["uncertainty_mm"] if measured else None, pixels, millimetres),
         size_mm=None if millimetres is None else _size(millimetres),
-        sentinels=_marks(record),
-        grid=grid,
-        axes=[] if record is None or grid is None else _axes(record.calibration, grid, document["thickness_mm"]),
+        sentinels=list(backdrop.sentinels),
+        grid=backdrop.grid,
+        axes=list(backdrop.axes),
     )
 
 
-def _record(archived: ArchivedJob) -> CalibrationRecord | None:
-    kept = archived.document["calibration"]
-    if kept is None:
-        return None
+@dataclass(frozen=True)
+class Backdrop:
+    """What follows from the calibration: the same for one job after another."""
+
+    sentinels: tuple[SentinelMark, ...] = ()
+    grid: Grid | None = None
+    axes: tuple[Axis, ...] = ()
+
+
+@lru_cache(8)
+def _backdrop(calibration: str, width: int, height: int, thickness_mm: float) -> Backdrop:
+    """calibration: the file's content, JSON, null where there was none."""
+    content = json.loads(calibration)
+    if content is None:
+        return Backdrop()
     try:
-        return record_of(kept["content"], str(archived.path))
+        record = record_of(content, "the archived calibration")
     except CalibrationFileError:  # of a form that this version does not know: then without millimetres
-        return None
+        return Backdrop()
+    grid = _grid(record.calibration, width, height, thickness_mm)
+    axes = [] if grid is None else _axes(record.calibration, grid, thickness_mm)
+    return Backdrop(tuple(_marks(record)), grid, tuple(axes))
 
 
 def _pairs(points: Floats) -> list[tuple[float, float]]:
@@ -78,8 +95,8 @@ def _band_px(uncertainty_mm: float | None, pixels: Contour | None, millimetres: 
     return round(uncertainty_mm * math.sqrt(seen / true), 2) if true > 0 else None
 
 
-def _marks(record: CalibrationRecord | None) -> list[SentinelMark]:
-    if record is None or record.sentinels is None:
+def _marks(record: CalibrationRecord) -> list[SentinelMark]:
+    if record.sentinels is None:
         return []
     return [SentinelMark(id=mark.id, corners=_pairs(mark.corners_px)) for mark in record.sentinels.marks]
 

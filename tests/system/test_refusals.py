@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 from pymodbus.client import ModbusTcpClient
 
+from contour.sentinels import see_sentinels
+from service.calibration_file import load_record, save_record
 from service.reasons import Reason
 from tests.system.cell import SAMPLES, Cell
 from tests.system.processes import combtrace, until
@@ -180,23 +183,61 @@ def test_a_table_that_was_taught_tells_a_moved_camera_and_other_light(tmp_path: 
     cv2.imwrite(str(pictures / "3.png"), table)
     taught = combtrace("teach-table", tmp_path / "empty.png", "--output", tmp_path / "table.npz")
     assert taught.returncode == 0, taught.stderr
+    text = text_after(
+        tmp_path,
+        [(1, 103, "scene_moved"), (2, 102, "image_quality"), (3, 110, "no_block_found")],
+        more="table: {file: table.npz}\n",
+    )
+    assert "pattern has moved by 8." in text
+
+
+def test_fixed_marks_tell_a_moved_camera(tmp_path: Path) -> None:
+    marks = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+    picture = SAMPLE.copy()
+    for number, (left, top) in enumerate(((20, 20), (1490, 1090))):
+        picture[top : top + 90, left : left + 90] = 200
+        picture[top + 15 : top + 75, left + 15 : left + 75] = cv2.aruco.generateImageMarker(marks, number, 60)
+    sentinels = see_sentinels(picture, "DICT_4X4_50")
+    assert sentinels is not None
+    assert len(sentinels.marks) == 2
+    calibration = load_record(SAMPLES / "calibration.yaml")
+    save_record(tmp_path / "marked.yaml", replace(calibration, sentinels=sentinels))
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    cv2.imwrite(str(pictures / "1.png"), picture)
+    cv2.imwrite(str(pictures / "2.png"), np.roll(picture, 3, axis=1))
+    cv2.imwrite(str(pictures / "3.png"), SAMPLE)
+    text = text_after(
+        tmp_path,
+        [(1, 0, ""), (2, 142, "sentinel_moved"), (3, 142, "sentinel_moved")],
+        calibration=tmp_path / "marked.yaml",
+    )
+    assert "The camera or a mark was moved: " in text
+    assert "None of the fixed marks (0, 1) is seen." in text
+
+
+def text_after(folder: Path, ends: list[tuple[int, int, str]], **options: Any) -> str:
+    """The daemon's log after a job for each of the folder's pictures, whose end is told everywhere.
+
+    ends: job, code, name; code 0 is an accepted one.
+    """
     terminal = Terminal()  # a line of its own: the other daemon listens on the other one
     started = Cell(
-        tmp_path,
+        folder,
         triggers=f"[{{kind: serial, port: {terminal.name}}}]",
         trigger_every_s=None,
-        camera=f"{{kind: files, path: {pictures}, loop: true}}",
-        more="table: {file: table.npz}\n",
+        camera=f"{{kind: files, path: {folder / 'pictures'}, loop: true}}",
+        **options,
     )
     try:
         started.ready()
-        for job, code, name in ((1, 103, "scene_moved"), (2, 102, "image_quality"), (3, 110, "no_block_found")):
+        for job, code, name in ends:
             terminal.type(b"TRIG\n")
             assert terminal.line(30) == f"ACK {job}"
-            assert terminal.line(60) == f"FAIL {job} {code} {name}"
+            assert terminal.line(60).startswith(f"FAIL {job} {code} {name}" if code else f"DONE {job} ")
             until(lambda code=code, job=job: registers(started) == (code, job), what=f"reject_reason {code}")
-            assert f"job {job} refused: {code} {name}: " in started.service.text
-        assert "pattern has moved by 8." in started.service.text
+            assert code == 0 or f"job {job} refused: {code} {name}: " in started.service.text
+        return started.service.text
     finally:
         started.stop()
         terminal.close()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import FrameUnusable
+from drivers.camera.folder import shown
 from drivers.camera.headers import Header, HeaderError, read_header
 
 # The largest industrial sensors have 151 million pixels. In colour this many are 600 MB.
@@ -29,7 +30,7 @@ cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 def read_picture(path: str | Path) -> NDArray[np.uint8]:
     """The picture in a file: (H, W) grey or (H, W, 3) BGR, uint8; raise FrameUnusable, naming the file."""
-    return decode_picture(_read_bytes(Path(path)), str(path))
+    return decode_picture(_read_bytes(Path(path)), shown(path))
 
 
 def decode_picture(data: bytes, source: str) -> NDArray[np.uint8]:
@@ -61,13 +62,13 @@ def _read_bytes(path: Path) -> bytes:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-            raise _unusable(str(path), kind, "Name a picture file.")
+            raise _unusable(shown(path), kind, "Name a picture file.")
         if status.st_size > MAX_BYTES:
-            raise _unusable(str(path), f"{status.st_size} bytes", f"At most {MAX_BYTES} bytes are read.")
+            raise _unusable(shown(path), f"{status.st_size} bytes", f"At most {MAX_BYTES} bytes are read.")
         return path.read_bytes()
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise _unusable(str(path), f"cannot be read ({reason})", "Check path and permissions.") from error
+        raise _unusable(shown(path), f"cannot be read ({reason})", "Check path and permissions.") from error
 
 
 def _checked_header(data: bytes, source: str) -> Header:

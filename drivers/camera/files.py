@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections import deque
 from collections.abc import Callable
@@ -12,7 +13,16 @@ from numpy.typing import NDArray
 
 from drivers.camera import CameraRefused, CameraTimeout, CameraUnavailable, Frame, FrameUnusable
 from drivers.camera.decode import read_picture
-from drivers.camera.folder import SUFFIXES, FileVersion, Settling, is_video, list_versions, move_aside
+from drivers.camera.folder import (
+    SUFFIXES,
+    FileVersion,
+    Settling,
+    is_video,
+    list_versions,
+    move_aside,
+    natural_order,
+    shown,
+)
 from drivers.camera.pacing import wait_until
 from drivers.camera.video import VideoFile
 
@@ -74,15 +84,15 @@ class FileCamera:
         next call goes on after it.
         """
         if not self._is_open:
-            raise CameraUnavailable(f"{self._path}: not open; expected open() before grab().")
+            raise CameraUnavailable(f"{shown(self._path)}: not open; expected open() before grab().")
         give_up_at = self._now() + timeout_s
-        wait_until(exposed_after_s, timeout_s, now=self._now, sleep=self._sleep, source=str(self._path))
+        wait_until(exposed_after_s, timeout_s, now=self._now, sleep=self._sleep, source=shown(self._path))
         while True:
             pixels = self._next_of_video() if self._video is not None else self._next_file(give_up_at)
             if pixels is not None:
                 break
         assert self._current is not None
-        source = str(self._current.path) + (f" frame {self._video.position}" if self._video is not None else "")
+        source = shown(self._current.path) + (f" frame {self._video.position}" if self._video is not None else "")
         if self._video is None:
             self._end_file()
         self._sequence += 1
@@ -91,12 +101,12 @@ class FileCamera:
     def check(self) -> None:
         """Raise CameraUnavailable where file or folder have gone."""
         if not self._is_open:
-            raise CameraUnavailable(f"{self._path}: not open; expected open() before check().")
+            raise CameraUnavailable(f"{shown(self._path)}: not open; expected open() before check().")
         try:
             self._path.stat()
         except OSError as error:
             raise CameraUnavailable(
-                f"{self._path}: has gone ({error.strerror}); expected a picture file or a folder of them. "
+                f"{shown(self._path)}: has gone ({error.strerror}); expected a picture file or a folder of them. "
                 "Check camera.path, and that what it lies on is mounted."
             ) from error
 
@@ -113,7 +123,7 @@ class FileCamera:
     def _next_file(self, give_up_at: float) -> NDArray[np.uint8] | None:
         """The next file's picture; None where it is a video, which is open then."""
         if not self._pending:
-            self._pending = deque(self._waited_for(give_up_at) if self._watch else self._listed())
+            self._pending = deque([self._waited_for(give_up_at)] if self._watch else self._listed())
         self._current = self._pending.popleft()
         path = self._current.path
         self._read_at_s = self._now()
@@ -150,25 +160,30 @@ class FileCamera:
                 move_aside(self._current.path, self._move_to)
             except OSError as error:
                 raise CameraUnavailable(
-                    f"{self._current.path}: cannot be moved to {self._move_to} ({error.strerror or error}); it stays "
-                    "where it is and is taken again. Check space and permissions."
+                    f"{shown(self._current.path)}: cannot be moved to {shown(self._move_to)} "
+                    f"({error.strerror or error}); it stays where it is and is taken again. "
+                    "Check space and permissions."
                 ) from error
         elif not self._loop:
             self._handed_out.add(self._current)
 
     # --- the list -----------------------------------------------------------------------------------------------
 
-    def _waited_for(self, give_up_at: float) -> list[FileVersion]:
-        """Files that are new and done, at least one; raise CameraTimeout, CameraUnavailable."""
+    def _waited_for(self, give_up_at: float) -> FileVersion:
+        """The first file that is new and done; raise CameraTimeout, CameraUnavailable.
+
+        Only that one: until the next is asked for, others may be written anew or taken away.
+        """
         while True:
-            files = self._settling.settled(self._new())
-            if files:
-                return files
+            new = self._new()
+            done = self._settling.settled(new)
+            if done:
+                return natural_order(done)[0]
             if self._now() >= give_up_at:
-                unfinished = len(self._new())
+                unfinished = len(new)
                 seen = f"{unfinished} files are still being written" if unfinished else "no new picture came"
                 raise CameraTimeout(
-                    f"{self._path}: {seen} in time; expected one. Check the program that writes them, or raise "
+                    f"{shown(self._path)}: {seen} in time; expected one. Check the program that writes them, or raise "
                     "camera.timeout_s."
                 )
             self._sleep(LOOK_PERIOD_S)
@@ -177,14 +192,14 @@ class FileCamera:
         """The files to hand out, sorted, at least one unless they are watched for; raise CameraUnavailable."""
         files = self._new()
         if files or self._watch:
-            return files
+            return natural_order(files)
         if not self._handed_out:
             raise CameraUnavailable(
-                f"{self._path}: no pictures in this folder; expected files that end in {', '.join(SUFFIXES)}. "
+                f"{shown(self._path)}: no pictures in this folder; expected files that end in {', '.join(SUFFIXES)}. "
                 "Check camera.path."
             )
         raise CameraUnavailable(
-            f"{self._path}: all pictures ({len(self._handed_out)}) were handed out; expected one that is left. "
+            f"{shown(self._path)}: all pictures ({len(self._handed_out)}) were handed out; expected one that is left. "
             "Add pictures, or set camera.loop to true."
         )
 
@@ -195,7 +210,7 @@ class FileCamera:
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise CameraUnavailable(
-                f"{self._path}: cannot be read ({reason}); expected a picture file or a folder of them. "
+                f"{shown(self._path)}: cannot be read ({reason}); expected a picture file or a folder of them. "
                 "Check camera.path."
             ) from error
         if self._loop:
@@ -206,10 +221,19 @@ class FileCamera:
 
     def _check_target(self, folder: Path) -> None:
         """Raise CameraRefused, CameraUnavailable where read files cannot be moved to `folder`."""
-        if folder.resolve() == self._path.resolve():
-            raise CameraRefused(f"{folder}: files are read from here; expected another folder in camera.move_to.")
+        source = self._path if self._path.is_dir() else self._path.parent
+        if folder.resolve() == source.resolve():
+            raise CameraRefused(
+                f"{shown(folder)}: files are read from here; expected another folder in camera.move_to."
+            )
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             reason = error.strerror or error
-            raise CameraUnavailable(f"{folder}: cannot be made ({reason}). Check camera.move_to.") from error
+            raise CameraUnavailable(f"{shown(folder)}: cannot be made ({reason}). Check camera.move_to.") from error
+        for place in (folder, source):
+            if place.exists() and not os.access(place, os.W_OK | os.X_OK):
+                raise CameraUnavailable(
+                    f"{shown(place)}: files cannot be moved from {shown(source)} to {shown(folder)}, as this folder "
+                    "cannot be written. Check permissions and how it is mounted, or take camera.move_to out."
+                )

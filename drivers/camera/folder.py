@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Callable
+import stat
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,17 +24,34 @@ SETTLED_S = 0.3
 
 
 class FileVersion(NamedTuple):
-    """One content of one file: a file that is written anew under its old name is another one."""
+    """One content of one file: a file that is written anew under its old name is another one.
 
-    path: Path
+    size: -1 where the file is there and cannot be looked at; reading it tells why.
+    """
+
+    name: str
     modified_ns: int
     size: int
 
+    @property
+    def path(self) -> Path:
+        """Where it is."""
+        return Path(self.name)
 
-def natural_key(path: Path) -> tuple[list[tuple[int, str]], str]:
-    """A key that sorts names as people do: frame2 before frame10, capitals beside small letters."""
-    parts = re.split(r"([0-9]+)", path.name.casefold())
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], path.name
+
+def shown(path: str | Path) -> str:
+    """The path as text that can be written anywhere: names from other systems may hold bytes that are no UTF-8."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
+
+
+def natural_order(versions: Iterable[FileVersion]) -> list[FileVersion]:
+    """The files of one folder as people sort them: frame2 before frame10, capitals beside small letters."""
+    return sorted(versions, key=lambda version: _natural_key(version.name))
+
+
+def _natural_key(name: str) -> tuple[list[tuple[int, str]], str]:
+    parts = re.split(r"([0-9]+)", name.casefold())
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], name
 
 
 def is_video(path: Path) -> bool:
@@ -42,23 +60,28 @@ def is_video(path: Path) -> bool:
 
 
 def list_versions(path: Path) -> list[FileVersion]:
-    """The file itself, or the pictures and videos of the folder, by name; raise OSError, ValueError."""
-    if not path.is_dir():
-        return [_version(path)]
-    found = []
-    for entry in sorted(path.iterdir(), key=natural_key):
-        if entry.name.startswith(".") or entry.suffix.lower() not in SUFFIXES or entry.is_dir():
-            continue
-        try:
-            found.append(_version(entry))
-        except FileNotFoundError:
-            continue  # taken away since the folder was listed
-    return found
-
-
-def _version(path: Path) -> FileVersion:
+    """The file itself, or the pictures and videos of the folder, in no order; raise OSError, ValueError."""
+    if path.is_dir():
+        return list(_entries(path))
     status = path.stat()
-    return FileVersion(path, status.st_mtime_ns, status.st_size)
+    return [FileVersion(str(path), status.st_mtime_ns, status.st_size)]
+
+
+def _entries(folder: Path) -> Iterator[FileVersion]:
+    """What counts as a picture. There may be tens of thousands, looked at many times a second while one is awaited."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.startswith(".") or not entry.name.lower().endswith(SUFFIXES):
+                continue
+            try:
+                status = entry.stat()
+            except FileNotFoundError:
+                continue  # taken away since the folder was listed, or a link to nowhere
+            except OSError:
+                yield FileVersion(entry.path, 0, -1)  # one file's trouble must not hide all others
+                continue
+            if not stat.S_ISDIR(status.st_mode):
+                yield FileVersion(entry.path, status.st_mtime_ns, status.st_size)
 
 
 class Settling:
@@ -87,6 +110,8 @@ def move_aside(path: Path, folder: Path) -> Path:
         except FileExistsError:
             target, count = folder / f"{path.stem}-{count}{path.suffix}", count + 1
     try:
+        if path.is_symlink():
+            target.unlink()  # to another file system a link is made anew, which takes no name that is there
         shutil.move(path, target)
     except OSError:
         target.unlink(missing_ok=True)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import FrameUnusable
+from drivers.camera.folder import shown
 
 # What FFmpeg says of a broken file is said by the error that follows; on standard error it would only be noise.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -25,7 +26,7 @@ class VideoFile:
         self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():
             raise FrameUnusable(
-                f"{path}: no video that can be read; expected one with a codec that FFmpeg knows. "
+                f"{shown(path)}: no video that can be read; expected one with a codec that FFmpeg knows. "
                 "Record it anew, or convert it to pictures."
             )
         self._promised = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
@@ -44,8 +45,8 @@ class VideoFile:
             return pixels
         if self._handed_out == 0 or self._handed_out < self._promised:
             raise FrameUnusable(
-                f"{self._path}: the video is cut off after {self._handed_out} frames; expected {self._promised}. "
-                "Copy or record it anew; what follows goes on with the next file."
+                f"{shown(self._path)}: the video is cut off after {self._handed_out} frames; "
+                f"expected {self._promised}. Copy or record it anew; what follows goes on with the next file."
             )
         return None
 

@@ -224,9 +224,11 @@ def _sentence(measurement: Measurement, language: str) -> str:
 
 def _record(image: Path, measurement: Measurement) -> dict[str, Any]:
     """The contract's object for a picture that could be read."""
+    from drivers.camera.folder import shown
+
     reasons = [reason.label for reason in measurement.reasons]
     return {
-        "image": str(image),
+        "image": shown(image),
         "status": "refused" if reasons else "ok",
         "reason": reasons[0] if reasons else None,
         "reasons": reasons,

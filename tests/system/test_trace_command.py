@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
 import zlib
 from pathlib import Path
@@ -153,6 +154,14 @@ def test_json_to_a_file_leaves_the_text_on_standard_output(tmp_path: Path) -> No
     done = combtrace("trace", RECTANGLE, "--json", tmp_path / "out.jsonl")
     assert "wall-tips" in done.stdout
     assert json.loads((tmp_path / "out.jsonl").read_text())["status"] == "ok"
+
+
+def test_a_picture_whose_name_is_no_utf_8_is_told_in_json_all_the_same(tmp_path: Path) -> None:
+    picture, told = tmp_path / os.fsdecode(b"bild-\xe4.jpg"), tmp_path / "told.json"
+    picture.write_bytes(RECTANGLE.read_bytes())
+    done = combtrace("trace", picture, "--json", told)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(told.read_text())["image"].endswith("bild-\\udce4.jpg")
 
 
 def test_text_goes_to_standard_error_when_json_goes_to_standard_output() -> None:

@@ -215,6 +215,59 @@ def test_a_watched_folder_that_vanishes_makes_the_camera_unavailable(tmp_path):
         camera.grab(clock.now(), 2.0)
 
 
+def test_a_file_that_is_written_anew_while_another_is_taken_is_waited_for_again(tmp_path):
+    clock = Clock()
+    for name, grey in (("a.png", 1), ("b.png", 2)):
+        write_picture(tmp_path / name, grey)
+    camera = watching(tmp_path, clock)
+    assert camera.grab(clock.now(), 2.0).pixels[0, 0] == 1
+    write_picture(tmp_path / "whole.png", 3)
+    whole = (tmp_path / "whole.png").read_bytes()
+    (tmp_path / "whole.png").unlink()
+    (tmp_path / "b.png").write_bytes(whole[:30])
+    clock.events = [(clock.now() + 0.2, lambda: (tmp_path / "b.png").write_bytes(whole))]
+    assert camera.grab(clock.now(), 2.0).pixels[0, 0] == 3
+
+
+def test_a_file_that_is_taken_away_while_another_is_taken_is_no_bad_picture(tmp_path):
+    clock = Clock()
+    for name, grey in (("a.png", 1), ("b.png", 2), ("c.png", 3)):
+        write_picture(tmp_path / name, grey)
+    camera = watching(tmp_path, clock)
+    assert camera.grab(clock.now(), 2.0).pixels[0, 0] == 1
+    (tmp_path / "b.png").unlink()
+    assert camera.grab(clock.now(), 2.0).pixels[0, 0] == 3
+
+
+def test_a_name_that_is_no_utf_8_is_told_as_text_that_can_be_written_anywhere(tmp_path):
+    bad, good = (tmp_path / os.fsdecode(name) for name in (b"bad-\xe4.png", b"good-\xe4.png"))
+    bad.write_bytes(b"no picture")
+    write_picture(tmp_path / "good.png", 4)
+    (tmp_path / "good.png").rename(good)
+    camera = FileCamera(tmp_path, loop=True)
+    camera.open()
+    with pytest.raises(FrameUnusable) as raised:
+        camera.grab(0.0, 1.0)
+    assert "bad-\\udce4.png: no picture" in str(raised.value)
+    str(raised.value).encode()
+    frame = camera.grab(0.0, 1.0)
+    assert frame.pixels[0, 0] == 4
+    assert frame.source.endswith("good-\\udce4.png")
+
+
+@pytest.mark.parametrize("watch", [False, True])
+def test_a_link_in_a_circle_is_one_bad_file_and_hides_no_other(tmp_path, watch):
+    clock = Clock()
+    (tmp_path / "a.png").symlink_to("a.png")
+    (tmp_path / "b.png").symlink_to("nowhere.png")
+    write_picture(tmp_path / "c.png", 3)
+    camera = FileCamera(tmp_path, loop=False, watch=watch, now=clock.now, sleep=clock.sleep)
+    camera.open()
+    with pytest.raises(FrameUnusable, match=r"a\.png: cannot be read \(Too many levels of symbolic links\)"):
+        camera.grab(clock.now(), 2.0)
+    assert camera.grab(clock.now(), 2.0).pixels[0, 0] == 3
+
+
 def test_files_are_moved_aside_once_read_also_bad_ones_and_none_is_overwritten(tmp_path):
     write_picture(tmp_path / "in" / "a.png", 1)
     (tmp_path / "in" / "b.png").write_bytes(b"no picture")
@@ -245,6 +298,23 @@ def test_a_file_that_cannot_be_moved_stays_and_is_told(tmp_path, monkeypatch):
 def test_a_folder_is_not_moved_into_itself(tmp_path):
     with pytest.raises(CameraUnavailable, match="expected another folder"):
         FileCamera(tmp_path, loop=False, move_to=tmp_path / ".").open()
+
+
+def test_a_file_of_its_own_is_not_moved_into_its_own_folder(tmp_path):
+    write_picture(tmp_path / "a.png", 1)
+    with pytest.raises(CameraUnavailable, match="expected another folder"):
+        FileCamera(tmp_path / "a.png", loop=False, move_to=tmp_path).open()
+
+
+@pytest.mark.parametrize("closed", ["in", "done"])
+def test_a_folder_that_cannot_be_written_is_told_at_opening_where_files_are_to_be_moved(tmp_path, monkeypatch, closed):
+    for name in ("in", "done"):
+        write_picture(tmp_path / name / "a.png", 1)
+    readable = os.access  # root, who may run the tests, may write everywhere
+    monkeypatch.setattr(os, "access", lambda path, mode: readable(path, mode) and path.name != closed)
+    with pytest.raises(CameraUnavailable, match=rf"{closed}: files cannot be moved .* cannot be written"):
+        FileCamera(tmp_path / "in", loop=False, move_to=tmp_path / "done").open()
+    FileCamera(tmp_path / "in", loop=False).open()
 
 
 # --- videos ----------------------------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
 import sys
 from collections.abc import Sequence
 
@@ -88,6 +89,8 @@ def _module(name: str):  # type: ignore[no-untyped-def]  # a command module: HEL
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; its exit status."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a file's name may hold what the terminal's encoding cannot
+        sys.stdout.reconfigure(errors="backslashreplace")
     parser = build_parser()
     args = parser.parse_args(argv)
     if args.version:

@@ -174,6 +174,7 @@ def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
     from contour.errors import ContourError
     from drivers.camera import CameraError
     from drivers.camera.decode import read_picture
+    from drivers.camera.folder import shown
 
     started = time.perf_counter()
     try:
@@ -181,7 +182,7 @@ def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
         read_ms = (time.perf_counter() - started) * 1000
         measurement = setup.measurer.measure(picture, setup.recipe, setup.thickness_mm)
     except (CameraError, ContourError) as error:
-        line = f"{image}: {str(error).removeprefix(f'{image}: ')}"  # drivers name the file, the tracing does not
+        line = f"{image}: {str(error).removeprefix(f'{shown(image)}: ')}"  # drivers name the file, the tracing does not
         return _error_record(image, setup, str(error)), line, EXIT_UNUSABLE
     times = {"read": read_ms, **measurement.timings_ms}
     times["total"] = sum(value for name, value in times.items() if name != "total")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
@@ -20,7 +18,9 @@ from contour.sentinels import Sentinels
 from service.calibration_models import MODELS, calibration_of, data_of, sentinels_of
 from service.config_file import ConfigError, line_of, read_yaml
 from service.config_mistakes import describe
+from service.whole_file import write_whole
 
+FILE_MODE = 0o644  # the service has another user than who calibrates
 HASH_PREFIX = "sha256:"
 
 
@@ -110,7 +110,7 @@ def save_record(path: Path, record: CalibrationRecord) -> None:
     data["hash"] = content_hash(data)
     text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, width=100)
     try:
-        _replace(path, text)
+        write_whole(path, text.encode(), FILE_MODE)
     except OSError as error:
         raise CalibrationFileError(f"{path}: cannot be written: {error.strerror}. The old file is unchanged") from error
 
@@ -135,24 +135,3 @@ def _read(path: Path) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise CalibrationFileError(f"{path}: holds no keys, expected version, kind, image_width, …")
     return data
-
-
-def _replace(path: Path, text: str) -> None:
-    """Put `text` into `path` in one step: whoever reads, and whatever fails, finds the old file or the new one."""
-    path = path.resolve()  # a link stays a link
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from contour.errors import PictureError
 from contour.taught_table import TaughtTable
 from contour.tracing import check_picture
+from service.whole_file import write_whole
 
 VERSION = 1
 
@@ -44,16 +44,9 @@ def table_bytes(record: TableRecord) -> bytes:
 
 def save_table(path: Path, record: TableRecord) -> None:
     """Write the file whole or not at all. Raises TableFileError."""
-    data = table_bytes(record)
-    beside = path.with_name(f".{path.name}.new")
     try:
-        with beside.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(beside, path)
+        write_whole(path, table_bytes(record))
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise TableFileError(f"{path}: cannot be written: {error.strerror}. Name another file") from error
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.errors import UserError
+from service.cli.file_names import distinct_stems, output_path
 from service.export.forms import ENDINGS
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
     for form, ending in ENDINGS.items():
         parser.add_argument(
             f"--{form}",
-            type=Path,
+            type=output_path,
             metavar="FILE",
             help=f"accepted contour in mm, .{ending}; a folder for several images",
         )
@@ -29,9 +30,9 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True)
 class Exports:
-    """Where the contours of accepted pictures go. paths: form and file, or folder of files."""
+    """Where the contours of accepted pictures go. paths: form, and the file of each picture."""
 
-    paths: tuple[tuple[str, Path, bool], ...]
+    paths: tuple[tuple[str, dict[Path, Path]], ...]
     gcode: GcodeSettings
 
     @classmethod
@@ -43,22 +44,24 @@ class Exports:
         given = [(form, getattr(args, form)) for form in ENDINGS if getattr(args, form) is not None]
         if given and not calibrated:
             raise UserError(f"--{given[0][0]}: exports are in mm; name the calibration by --calibration or --config")
-        names = [path for _, path in given]
-        if len(set(names)) < len(names):
-            raise UserError("two exports have the same file; name one for each")
         paths = []
         for form, path in given:
             folder = len(args.images) > 1 or path.is_dir()
-            stems = [image.stem for image in args.images]
-            if folder and len(set(stems)) < len(stems):
-                raise UserError(f"--{form} {path}: two pictures, and so their exports, have the same name. Rename one")
             if folder:
                 _make_folder(form, path)
-            paths.append((form, path, folder))
+                files = {image: path / f"{stem}.{ENDINGS[form]}" for image, stem in distinct_stems(args.images).items()}
+            else:
+                files = {args.images[0]: path}
+            paths.append((form, files))
         try:
             return cls(tuple(paths), gcode_settings(recipe))
         except ExportError as error:
             raise UserError(str(error)) from error
+
+    @property
+    def outputs(self) -> list[tuple[str, Path]]:
+        """Each file, by its option."""
+        return [(f"--{form}", file) for form, files in self.paths for file in files.values()]
 
     def write(self, image: Path, measurement: Measurement) -> list[str]:
         """Write what is asked for, and say where; a refused contour is not written, and an older file stays."""
@@ -73,8 +76,8 @@ class Exports:
             measurement.millimetres, image.name, measurement.thickness_mm, measurement.uncertainty_mm
         )
         told = []
-        for form, path, folder in self.paths:
-            file = path / f"{image.stem}.{ENDINGS[form]}" if folder else path
+        for form, files in self.paths:
+            file = files[image]
             try:
                 write_export(file, exported(form, document, lambda: self.gcode))
             except ExportError as error:

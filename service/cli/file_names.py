@@ -1,10 +1,59 @@
-"""Names for files that are made of pictures, one each, though pictures of several folders be called alike."""
+"""Names for files that are made of pictures, one each, and never a picture's own."""
 
 from __future__ import annotations
 
+import argparse
+import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+from service.cli.errors import UserError
+
+PICTURE_ENDINGS = (
+    *(".png", ".jpg", ".jpeg", ".jpe", ".jp2", ".bmp", ".tif", ".tiff", ".webp", ".gif", ".avif"),
+    *(".pgm", ".ppm", ".pbm", ".pnm", ".pam"),
+)
+
+
+def output_path(text: str) -> Path:
+    """A file or folder by its name; one that ends in / is a folder, and made. For argparse."""
+    path = Path(text)
+    if text.endswith("/"):
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise argparse.ArgumentTypeError(
+                f"{text}: cannot make the folder: {error.strerror}. Name another"
+            ) from None
+    return path
+
+
+def check_outputs(images: Iterable[Path], outputs: Sequence[tuple[str, Path]], *, drawn: str = "--overlay") -> None:
+    """Raise UserError where an output, of an option, would replace a picture that is read, or another option's output.
+
+    Only the option `drawn` makes pictures: `--json *.jpg` names the first picture of a folder as the output.
+    """
+    pictures = {_identity(image) for image in images if os.path.exists(image)}
+    options: dict[Path, str] = {}
+    for option, path in outputs:
+        if path.is_file() and _identity(path) in pictures:
+            raise UserError(f"{option} {path}: is a picture that is read. Name another file")
+        if option != drawn and path.suffix.lower() in PICTURE_ENDINGS:
+            raise UserError(f"{option} {path}: is called as a picture is, and holds none. Name another file")
+        other = options.setdefault(path.resolve(), option)
+        if other != option and not _is_device(path):
+            raise UserError(f"{option} {path}: {other} has the same file. Name one for each")
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """The same for all names of one file."""
+    status = path.stat()
+    return status.st_dev, status.st_ino
+
+
+def _is_device(path: Path) -> bool:
+    return path.exists() and not path.is_file()
 
 
 def distinct_stems(images: Sequence[Path]) -> dict[Path, str]:

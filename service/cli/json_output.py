@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from service.cli.errors import UserError
+from service.whole_file import file_mode
 
 
 @contextmanager
@@ -55,22 +56,13 @@ def _replaced(path: Path, option: str) -> Iterator[Callable[[str], None]]:
             try:
                 file.flush()
                 os.fsync(number)
-                os.fchmod(number, _mode(target))
+                os.fchmod(number, file_mode(target))
             except OSError as error:
                 raise _cannot(option, path, error) from error
         os.replace(beside, target)
     finally:
         with suppress(FileNotFoundError):
             os.unlink(beside)
-
-
-def _mode(target: Path) -> int:
-    """The mode of the file that is there, or what a new one would get."""
-    if target.exists():
-        return target.stat().st_mode & 0o777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
 
 
 def _cannot(option: str, path: Path, error: OSError) -> UserError:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from service.cli.errors import EXIT_OK, UserError
+from service.whole_file import write_whole
 
 if TYPE_CHECKING:
     from drivers.controller.simulated import AcceptedContour, SimulatedController
@@ -221,10 +222,8 @@ def _last_logged(path: Path | None) -> int | None:
 
 def _write_verdict(path: Path, controller: SimulatedController) -> None:
     """Replace the verdict's file as a whole: who reads it never sees half of one."""
-    beside = path.with_name(path.name + ".new")
     try:
-        beside.write_text(json.dumps(controller.verdict.as_json(), indent=2) + "\n", encoding="utf-8")
-        os.replace(beside, path)
+        write_whole(path, (json.dumps(controller.verdict.as_json(), indent=2) + "\n").encode())
     except OSError as error:
         raise UserError(f"--verdict {path}: cannot be written: {error.strerror}. Name another file") from error
 

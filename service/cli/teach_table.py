@@ -47,6 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from contour.errors import NoBlockFound, PictureError
     from contour.taught_table import teach
     from contour.tracing import TraceSettings, trace
+    from service.cli.file_names import check_outputs
     from service.cli.measuring import load_config_or_default
     from service.table_file import TableFileError, TableRecord, save_table
 
@@ -58,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     path = args.output or (config.table.file if config.table is not None else None)
     if path is None:
         raise UserError("the configuration names no table.file: add `table: {file: table.npz}`, or give --output FILE")
+    check_outputs(args.images, [("--output" if args.output else "table.file", path)])
     pictures, camera = _read(args.images) if args.images else _taken(config, args.frames)
     try:
         table = teach(pictures)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.export_options import Exports, add_export_arguments
-from service.cli.file_names import distinct_stems
+from service.cli.file_names import check_outputs, distinct_stems, output_path
 from service.cli.json_output import json_output
 from service.cli.measuring import find_recipe, guard_of, load_config_or_default, thickness_of
 
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--thickness-mm", type=float, metavar="H", help="height of the traced plane above the table")
     parser.add_argument("--json", metavar="FILE", help="JSON Lines, one object a picture; - is standard output")
     parser.add_argument(
-        "--overlay", type=Path, metavar="FILE", help="picture with contour; a folder for several images"
+        "--overlay", type=output_path, metavar="FILE", help="picture with contour; a folder for several images"
     )
     add_export_arguments(parser)
     parser.add_argument(
@@ -103,6 +103,10 @@ class _Setup:
                 "in pixels. Name one by --calibration or --config",
                 file=sys.stderr,
             )
+        overlays = {} if args.overlay is None else _overlays(args.overlay, args.images)
+        exports = Exports.of(args, recipe, calibrated=guard is not None)
+        told = [] if args.json in (None, "-") else [("--json", Path(args.json))]
+        check_outputs(args.images, [*told, *(("--overlay", file) for file in overlays.values()), *exports.outputs])
         work_area = np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
         return cls(
             Measurer(
@@ -110,9 +114,9 @@ class _Setup:
             ),
             recipe,
             thickness_mm,
-            {} if args.overlay is None else _overlays(args.overlay, args.images),
+            overlays,
             args.language,
-            Exports.of(args, recipe, calibrated=guard is not None),
+            exports,
         )
 
 
@@ -123,17 +127,7 @@ def _overlays(overlay: Path, images: list[Path]) -> dict[Path, Path]:
     else:
         _make_folder(overlay)
         files = {image: overlay / f"{stem}-contour.png" for image, stem in distinct_stems(images).items()}
-    pictures = {_identity(image) for image in images if image.exists()}
-    for file in files.values():
-        if file.exists() and _identity(file) in pictures:
-            raise UserError(f"--overlay {file}: is the picture being traced. Name another file")
     return files
-
-
-def _identity(path: Path) -> tuple[int, int]:
-    """The same for all names of one file."""
-    status = path.stat()
-    return status.st_dev, status.st_ino
 
 
 def _recipe(config: Config, args: argparse.Namespace) -> Recipe:

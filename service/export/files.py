@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from service.export.dxf import to_dxf
 from service.export.gcode import GcodeSettings, to_gcode
 from service.export.geojson import to_geojson
 from service.export.svg import to_svg
+from service.whole_file import write_whole
 
 
 def exported(form: str, document: ExportDocument, gcode: Callable[[], GcodeSettings]) -> bytes:
@@ -26,15 +26,9 @@ def exported(form: str, document: ExportDocument, gcode: Callable[[], GcodeSetti
 
 def write_export(path: Path, data: bytes) -> None:
     """Write the file whole or leave what was there: another program may read it at any time. Raise ExportError."""
-    beside = path.with_name(f".{path.name}.new")
     try:
-        with open(beside, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(beside, path)
+        write_whole(path, data)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise ExportError(f"{path}: cannot be written: {error.strerror}. Name another file") from error
 
 

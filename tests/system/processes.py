@@ -19,7 +19,9 @@ ROOT = Path(__file__).parents[2]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
 
 
-def combtrace(*arguments: str | Path, cwd: Path | None = None, bound_s: float = 60) -> subprocess.CompletedProcess[str]:
+def combtrace(
+    *arguments: str | Path, cwd: Path | None = None, bound_s: float = 60, variables: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run a command to its end."""
     return subprocess.run(
         [*COMBTRACE, *map(str, arguments)],
@@ -28,7 +30,7 @@ def combtrace(*arguments: str | Path, cwd: Path | None = None, bound_s: float = 
         timeout=bound_s,
         check=False,
         cwd=cwd,
-        env=ENVIRONMENT,
+        env={**ENVIRONMENT, **(variables or {})},
     )
 
 

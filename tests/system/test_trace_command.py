@@ -118,7 +118,7 @@ def test_an_overlay_never_replaces_the_picture_it_is_of(tmp_path: Path) -> None:
     picture.write_bytes(RECTANGLE.read_bytes())
     done = combtrace("trace", picture, "--overlay", picture)
     assert done.returncode == 2
-    assert "is the picture being traced" in done.stderr
+    assert "is a picture that is read" in done.stderr
     assert picture.read_bytes() == RECTANGLE.read_bytes()
 
 
@@ -136,7 +136,7 @@ def test_pictures_of_one_name_from_several_folders_get_an_overlay_each(tmp_path:
     (tmp_path / "left" / "b-contour.png").write_bytes(RECTANGLE.read_bytes())
     done = combtrace("trace", pictures[2], tmp_path / "left" / "b-contour.png", "--overlay", tmp_path / "left")
     assert done.returncode == 2
-    assert "is the picture being traced" in done.stderr
+    assert "is a picture that is read" in done.stderr
 
 
 def test_a_json_file_stays_as_it_was_where_the_command_cannot_go_on(tmp_path: Path) -> None:
@@ -148,6 +148,43 @@ def test_a_json_file_stays_as_it_was_where_the_command_cannot_go_on(tmp_path: Pa
     assert done.returncode == 2
     assert out.read_text() == "old\n"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.jsonl", "seen"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["a.jpg", "--json", "a.jpg"], "--json a.jpg: is a picture that is read"),
+        (["--json", "a.jpg", "b.jpg"], "--json a.jpg: is called as a picture is"),  # what a shell makes of --json *.jpg
+        (["a.jpg", "--calibration", CALIBRATION, "--svg", "link.svg"], "--svg link.svg: is a picture that is read"),
+        (["a.jpg", "--overlay", "o.png", "--json", "o.png"], "--json o.png: is called as a picture is"),
+        (["a.jpg", "--calibration", CALIBRATION, "--json", "o", "--svg", "./o"], "--svg o: --json has the same file"),
+    ],
+)
+def test_no_output_takes_the_place_of_a_picture_or_of_another_output(
+    tmp_path: Path, arguments: list[str | Path], told: str
+) -> None:
+    for name in ("a.jpg", "b.jpg"):
+        (tmp_path / name).write_bytes(RECTANGLE.read_bytes())
+    (tmp_path / "link.svg").symlink_to("a.jpg")
+    done = combtrace("trace", *arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert told in done.stderr
+    assert (tmp_path / "a.jpg").read_bytes() == (tmp_path / "b.jpg").read_bytes() == RECTANGLE.read_bytes()
+
+
+def test_a_name_that_ends_in_a_slash_is_a_folder_of_one_picture_too(tmp_path: Path) -> None:
+    done = combtrace(
+        "trace", RECTANGLE, "--calibration", CALIBRATION, "--overlay", f"{tmp_path}/seen/", "--svg", f"{tmp_path}/out/"
+    )
+    assert done.returncode == 0, done.stderr
+    assert [path.name for path in (tmp_path / "seen").iterdir()] == ["1-rectangle-contour.png"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["1-rectangle.svg"]
+
+
+def test_a_sign_that_the_terminal_does_not_have_is_told_as_an_escape() -> None:
+    done = combtrace("trace", RECTANGLE, variables={"PYTHONIOENCODING": "ascii"})
+    assert done.returncode == 0, done.stderr
+    assert "px\\xb2" in done.stdout
 
 
 def test_json_to_a_file_leaves_the_text_on_standard_output(tmp_path: Path) -> None:

@@ -160,7 +160,7 @@ def test_a_refused_picture_is_not_exported_and_says_so(tmp_path, capsys):
     ("words", "text"),
     [
         (["--dxf", "x.dxf"], "exports are in mm; name the calibration"),
-        (["--dxf", "x", "--svg", "x", "--calibration", "CALIBRATION"], "two exports have the same file"),
+        (["--dxf", "x", "--svg", "x", "--calibration", "CALIBRATION"], "--dxf has the same file"),
         (["--svg", "no/such/folder/x.svg", "--calibration", "CALIBRATION"], "cannot be written: No such file"),
     ],
 )

@@ -1,0 +1,46 @@
+"""A file that is whole or as it was before, whoever reads it meanwhile and whatever fails."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+
+def write_whole(path: Path, data: bytes, mode: int | None = None) -> None:
+    """Put the data there in one step, durable; raise OSError. mode: else the old file's, or what a new one would get.
+
+    A link stays a link. A device or pipe is written to and never replaced: whoever may write to /dev/null may not mean
+    to take it away from all others.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        path.write_bytes(data)
+        return
+    target = path.resolve()
+    mode = file_mode(target) if mode is None else mode
+    number, beside = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+    try:
+        with open(number, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(number)
+            os.fchmod(number, mode)
+        os.replace(beside, target)
+    finally:
+        with suppress(FileNotFoundError):
+            os.unlink(beside)
+    folder = os.open(target.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def file_mode(target: Path) -> int:
+    """The mode of the file that is there, or what a new one would get."""
+    if target.exists():
+        return target.stat().st_mode & 0o777
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

@@ -23,6 +23,7 @@ log = logging.getLogger("combtrace.control")
 SOCKET_NAME = "control.sock"
 MODE = 0o660
 LONGEST_LINE = 4096
+LONGEST_REASON = 200
 IDLE_S = 10.0
 MOST_CLIENTS = 16
 PEER_CREDENTIALS = struct.Struct("3i")  # process, user, group: unix(7), SO_PEERCRED
@@ -97,6 +98,12 @@ class ControlServer:
             return {"ok": True, **await handler(request, who)}
         except CommandRefused as refused:
             return {"ok": False, "error": str(refused)}
+
+
+def reason_text(given: str) -> str:
+    """What a person gave as a reason, as one line that can be written anywhere, at most LONGEST_REASON characters."""
+    line = " ".join(given.encode("utf-8", "backslashreplace").decode().split())
+    return "".join(character if character.isprintable() else "?" for character in line)[:LONGEST_REASON]
 
 
 def ask(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:

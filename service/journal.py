@@ -293,7 +293,8 @@ class Journal:
             (
                 str(outcome),
                 None if reason is None else int(reason),
-                detail,
+                # Whatever a text holds, a job that was taken ends.
+                None if detail is None else detail.encode("utf-8", "backslashreplace").decode(),
                 self._stamp(),
                 json.dumps(report or {}),
                 json.dumps(transfer) if transfer else None,

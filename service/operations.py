@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from service.control import CommandRefused, Handler
+from service.control import CommandRefused, Handler, reason_text
 from service.executor import Executor
 from service.health import Fault, Health
 from service.journal import Job
@@ -26,7 +26,6 @@ from service.trigger_queue import TriggerRefused
 log = logging.getLogger("combtrace.control")
 
 HALT_FILE = "halted.json"
-LONGEST_REASON = 200
 CONTROL_PART = "control"  # of the supervisor's parts the one that serves these commands
 
 
@@ -123,7 +122,7 @@ class Operations:
     async def halt(self, request: Mapping[str, Any], who: str) -> dict[str, Any]:
         """Take no trigger until `resume`, over restarts too; the running job comes to its own end."""
         given = request.get("reason")
-        reason = given.strip()[:LONGEST_REASON] if isinstance(given, str) and given.strip() else "by hand"
+        reason = (reason_text(given) if isinstance(given, str) else "") or "by hand"
         self._health.halt(f"halted: {reason} ({who})")
         self._executor.refuse_all_queued(TriggerRefused(Reason.ABORTED, f"halted: {reason}"))
         log.warning("halted by %s: %s", who, reason)

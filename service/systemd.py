@@ -32,7 +32,7 @@ class Notifier:
         text = "\n".join(f"{name}={' '.join(str(value).splitlines())}" for name, value in fields.items())
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK) as sender:
-                sender.sendto(text.encode(), self._address)
+                sender.sendto(text.encode("utf-8", "backslashreplace"), self._address)
         except OSError as error:
             log.log(logging.DEBUG if self._failed else logging.WARNING, "systemd cannot be told: %s", error)
             self._failed = True

@@ -22,4 +22,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Halt."""
-    return commanded(args, command="halt", reason=args.reason)
+    from service.control import reason_text
+
+    return commanded(args, command="halt", reason=reason_text(args.reason))

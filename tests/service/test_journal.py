@@ -31,6 +31,11 @@ def test_job_ids_rise_above_the_journal_and_above_what_the_controller_knows(jour
     assert journal.take(TriggerStamp("interval"), above=7).job_id == 402
 
 
+def test_a_job_ends_whatever_characters_its_detail_holds(journal: Journal) -> None:
+    job = journal.take(TriggerStamp("interval"))
+    assert journal.settle(job.job_id, Outcome.FAILED, Reason.NO_FRAME, "bild-\udce4.png").detail == "bild-\\udce4.png"
+
+
 def test_a_taken_job_is_unsettled_until_it_is_settled(journal: Journal) -> None:
     job = journal.take(TriggerStamp("serial", recipe=3))
     assert [found.job_id for found in journal.unsettled()] == [job.job_id]

@@ -65,6 +65,26 @@ def test_a_halt_holds_over_a_restart_until_it_is_resumed(cell: Cell, terminal: T
     assert {"kind": "serial", "what": "taken", "count": 1} in told["triggers"]
 
 
+def test_a_halt_is_done_whatever_its_reason_holds(cell: Cell) -> None:
+    config = ("--config", cell.folder / "config.yaml")
+    for given, told in (
+        (b"Messer gewechselt \xfc", "Messer gewechselt \\udcfc"),
+        ("нож\n\tменяют\x1b[31m".encode(), "нож меняют?[31m"),
+        (b"x" * 5000, "x" * 200),
+    ):
+        halted = combtrace("halt", *config, "--reason", os.fsdecode(given))
+        assert (halted.returncode, halted.stdout) == (0, "state Halted\n"), halted.stderr
+        status = json.loads(combtrace("status", *config, "--json").stdout)
+        assert status["reason"].startswith(f"halted: {told} (")
+        assert combtrace("resume", *config).returncode == 0
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(10)
+        client.connect(str(cell.folder / "state" / "control.sock"))
+        client.sendall(b'{"command": "halt", "reason": "\\udce4"}\n')
+        assert json.loads(client.makefile("rb").readline()) == {"ok": True, "state": "Halted"}
+    assert "udce4" in combtrace("status", *config).stdout
+
+
 def test_a_reset_opens_everything_anew(cell: Cell, terminal: Terminal) -> None:
     reset = combtrace("reset", "--config", cell.folder / "config.yaml")
     assert reset.returncode == 0, reset.stderr

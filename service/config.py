@@ -5,6 +5,8 @@ Unknown keys are refused everywhere. Paths are resolved by `service.config_file`
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -31,20 +33,42 @@ Port = Annotated[int, Field(ge=1, le=65_535)]
 Register = Annotated[int, Field(ge=0, lt=REGISTERS)]
 
 
+@dataclass(frozen=True)
+class TruthValue:
+    """What stands where no truth value can: of no type that a key takes, so that each key says what it expects."""
+
+    value: bool
+
+    def __str__(self) -> str:
+        return "true, as yes and on are read" if self.value else "false, as no and off are read"
+
+
 def no_truth_value(value: Any) -> Any:
     """The value, refused where YAML read yes, no, on or off."""
     if isinstance(value, bool):
-        raise ValueError(f"is a truth value ({value}), expected a number")
+        raise ValueError(f"is {TruthValue(value)}, expected a number")
     return value
 
 
 def _a_path(value: Any) -> Any:
-    """An empty path would be the file's own folder, and a NUL ends a name for the system."""
+    """An empty path would be the file's own folder, a NUL ends a name for the system, and only shells know ~."""
+    if isinstance(value, str) and value.startswith("~"):
+        raise ValueError(f"is {value!r}, and ~ is no folder here. Write the whole path")
     if isinstance(value, str) and (not value.strip() or "\0" in value):
         raise ValueError(f"is {value!r}, expected the path of a file or folder")
     return value
 
 
+def _a_host(value: Any) -> Any:
+    """Only a name or address: what stands around it elsewhere would be looked up with it, in vain, for ever."""
+    if isinstance(value, str) and value and not _HOST.fullmatch(value):
+        raise ValueError(f"is {value[:60]!r}, expected a host name or address and nothing else; a port has its own key")
+    return value
+
+
+_HOST = re.compile(r"(?=.*\w)[\w.-]{1,253}|[0-9A-Fa-f]*(:[0-9A-Fa-f.]*){2,7}(%[\w.-]+)?")
+
+Host = Annotated[str, Field(min_length=1), BeforeValidator(_a_host)]
 Number = Annotated[float, BeforeValidator(no_truth_value)]
 Point = tuple[Number, Number]
 FilePath = Annotated[Path, BeforeValidator(_a_path)]
@@ -59,12 +83,15 @@ class Model(BaseModel):
     @classmethod
     def _truth_values_are_no_numbers(cls, data: Any) -> Any:
         """YAML's yes, no, on and off are truth values; pydantic would take them for 1 and 0."""
-        if isinstance(data, dict):
-            for name, value in data.items():
-                field = cls.model_fields.get(name)
-                if isinstance(value, bool) and field is not None and field.annotation is not bool:
-                    raise ValueError(f"{name} is a truth value ({value}). Write a number, or a word in quotes")
-        return data
+        if not isinstance(data, dict):
+            return data
+        fields = cls.model_fields
+        return {
+            name: TruthValue(value)
+            if isinstance(value, bool) and name in fields and fields[name].annotation is not bool
+            else value
+            for name, value in data.items()
+        }
 
 
 class FilesCamera(Model):
@@ -221,7 +248,7 @@ class ModbusTcp(ModbusController):
     """A controller over Modbus TCP."""
 
     kind: Literal["modbus-tcp"]
-    host: str = Field("127.0.0.1", min_length=1, description="Host name or address of the controller.")
+    host: Host = Field("127.0.0.1", description="Host name or address of the controller.")
     port: Port = Field(502, description="TCP port.")
 
 
@@ -252,7 +279,7 @@ class ModbusRtuOverTcp(ModbusController):
     """A controller over Modbus RTU frames in a TCP connection (a serial server)."""
 
     kind: Literal["modbus-rtu-over-tcp"]
-    host: str = Field("127.0.0.1", min_length=1, description="Host name or address of the serial server.")
+    host: Host = Field("127.0.0.1", description="Host name or address of the serial server.")
     port: Port = Field(4001, description="TCP port.")
     baudrate: int = Field(
         9600, ge=300, le=4_000_000, description="Baud rate of the line behind the serial server: silence and time-outs."
@@ -491,18 +518,14 @@ class ArchiveSettings(Model):
 class Metrics(Model):
     """Figures for Prometheus over HTTP; needs the extra combtrace[metrics]."""
 
-    host: str = Field(
-        "127.0.0.1", min_length=1, description="Address to listen on; anything but loopback is open to the network."
-    )
+    host: Host = Field("127.0.0.1", description="Address to listen on; anything but loopback is open to the network.")
     port: Port = Field(9771, description="TCP port.")
 
 
 class Page(Model):
     """The operator's page and its REST interface over HTTP; needs the extra combtrace[page]."""
 
-    host: str = Field(
-        "127.0.0.1", min_length=1, description="Address to listen on; anything but loopback is open to the network."
-    )
+    host: Host = Field("127.0.0.1", description="Address to listen on; anything but loopback is open to the network.")
     port: Port = Field(9770, description="TCP port.")
     names: tuple[str, ...] = Field(
         (), description="Host names by which browsers may call it, besides its own address and localhost."
@@ -561,7 +584,8 @@ class Config(Model):
             if twice:
                 raise ValueError(f"recipes: {name} {', '.join(twice)} is there more than once")
         if self.default_recipe not in {recipe.number for recipe in self.recipes}:
-            raise ValueError(f"default_recipe is {self.default_recipe}, but no recipe has that number")
+            numbers = ", ".join(str(recipe.number) for recipe in self.recipes)
+            raise ValueError(f"default_recipe is {self.default_recipe}, but recipes have only the numbers {numbers}")
         needs = next((recipe.needs_millimetres for recipe in self.recipes if recipe.needs_millimetres), None)
         if self.calibration is None and needs:
             raise ValueError(f"calibration is missing: a recipe's {needs} needs millimetres. Set calibration.file")

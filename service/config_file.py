@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from service.config import Config, Recipe, Service
 from service.config_mistakes import Location, describe
+from service.yaml_mistakes import FileLoader, in_words, unreadable
 
 LARGEST_FILE = 1_000_000
 SAMPLES = Path(__file__).parent / "samples"
@@ -32,41 +33,6 @@ class ConfigError(Exception):
     """The configuration cannot be used; one line for each mistake: where, what was seen, what is expected."""
 
 
-class _Loader(yaml.SafeLoader):
-    """YAML as usual, but a key that stands twice is an error: the first would be lost without a word."""
-
-
-def _unique_mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
-    seen: dict[Any, int] = {}
-    for key_node, _ in node.value:
-        key = loader.construct_object(key_node)
-        line = key_node.start_mark.line + 1
-        if not isinstance(key, str | int | float | bool | None):
-            raise yaml.constructor.ConstructorError(None, None, "a key is not a plain word", key_node.start_mark)
-        if key in seen:
-            raise yaml.constructor.ConstructorError(
-                None, None, f"key {key!r} stands twice, first in line {seen[key]}", key_node.start_mark
-            )
-        seen[key] = line
-    return loader.construct_mapping(node, deep=True)
-
-
-_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _unique_mapping)
-
-
-def _decimal_integer(loader: _Loader, node: yaml.ScalarNode) -> int:
-    """An integer; YAML 1.1 would read 05020 as octal 2576."""
-    digits = node.value.lstrip("+-")
-    if len(digits) > 1 and digits[0] == "0" and digits[1].isdigit():
-        raise yaml.constructor.ConstructorError(
-            None, None, f"{node.value} begins with 0; write {digits.lstrip('0') or '0'}", node.start_mark
-        )
-    return loader.construct_yaml_int(node)
-
-
-_Loader.add_constructor("tag:yaml.org,2002:int", _decimal_integer)
-
-
 def read_yaml(path: Path, option: str = "--config") -> Any:
     """What a YAML file holds; raise ConfigError that names file, line and column."""
     try:
@@ -78,19 +44,17 @@ def read_yaml(path: Path, option: str = "--config") -> Any:
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is no UTF-8 text (byte {error.start}). Save it as UTF-8") from error
     try:
-        return yaml.load(text, Loader=_Loader)
+        return yaml.load(text, Loader=FileLoader)
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        raise ConfigError(f"{path}: {where}{error.problem or error.context}") from error
-    except (yaml.YAMLError, RecursionError, ValueError) as error:  # a date or number that is none is a ValueError
-        raise ConfigError(f"{path}: is no YAML: {' '.join(str(error).split())}") from error
+        raise ConfigError(f"{path}: {in_words(error)}") from error
+    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:
+        raise ConfigError(f"{path}: {unreadable(error, text)}") from error
 
 
 def line_of(path: Path, location: Location) -> int | None:
     """The line where a key or entry stands in a YAML file, or the nearest one around it; None where none is known."""
     try:
-        node = yaml.compose(path.read_text(encoding="utf-8-sig"), Loader=_Loader)
+        node = yaml.compose(path.read_text(encoding="utf-8-sig"), Loader=FileLoader)
     except (OSError, UnicodeDecodeError, yaml.YAMLError):
         return None
     line = None
@@ -109,12 +73,18 @@ def line_of(path: Path, location: Location) -> int | None:
     return line
 
 
+def seen_instead_of_keys(data: Any) -> str:
+    """What a file holds whose content is no mapping."""
+    if data is None:
+        return "is empty"
+    return "holds a list" if isinstance(data, list) else f"holds {str(data)[:40]!r} and no keys"
+
+
 def load_config(path: Path) -> Config:
     """The configuration of a file; raise ConfigError."""
     data = read_yaml(path)
     if not isinstance(data, dict):
-        seen = "is empty" if data is None else f"holds a {type(data).__name__}"
-        raise ConfigError(f"{path}: {seen}, expected keys such as camera, controller, recipes")
+        raise ConfigError(f"{path}: {seen_instead_of_keys(data)}, expected keys such as camera: and controller:")
     try:
         config = Config.model_validate(data)
     except ValidationError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterator
+from datetime import date
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -29,7 +30,7 @@ _EXPECTED = {
     "float_type": "a number",
     "float_parsing": "a number",
     "string_type": "text; put it in quotes",
-    "string_too_short": "{min_length} characters or more",
+    "string_too_short": "{min_length} or more characters",
     "string_too_long": "{max_length} characters at most",
     "bool_type": "true or false",
     "bool_parsing": "true or false",
@@ -98,7 +99,9 @@ def _sentence(where: str, mistakes: list[ErrorDetails], model: type[BaseModel]) 
             return f"{where}: is missing. Add it{_purpose(model, location)}"
         case "union_tag_invalid":
             assert isinstance(seen, dict)
-            return f"{where}.kind: seen {seen.get('kind')!r}, expected {_choices(mistake['ctx']['expected_tags'])}"
+            return (
+                f"{where}.kind: seen {_shown(seen.get('kind'))}, expected {_choices(mistake['ctx']['expected_tags'])}"
+            )
         case "union_tag_not_found":
             kinds = ", ".join(str(kind) for there in _models_at(model, location) for kind in _kinds_of(there))
             return f"{where}.kind: is missing. Add it: one of {kinds}"
@@ -130,6 +133,10 @@ def _choices(quoted: str) -> str:
 def _shown(seen: Any) -> str:
     if isinstance(seen, dict):
         return "keys with values"
+    if isinstance(seen, models.TruthValue):
+        return str(seen)
+    if isinstance(seen, date):
+        return f"the date {seen}"
     text = "nothing" if seen is None else repr(seen)
     return text if len(text) <= _LONGEST_SEEN else f"{text[:_LONGEST_SEEN]}..."
 
@@ -173,6 +180,8 @@ def _is_kind(part: str, before: int | str) -> bool:
 def _did_you_mean(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
     """The nearest of the keys that may stand there, or else the keys themselves."""
     known = sorted({name for there in _models_at(model, location[:-1]) for name in there.model_fields})
+    if ":" in str(location[-1]):
+        return ", and a space is missing after its colon"
     near = difflib.get_close_matches(str(location[-1]), known, n=1)
     return f"; did you mean {near[0]}?" if near else f", expected one of {', '.join(known)}"
 

@@ -12,7 +12,7 @@ from drivers.controller.simulated_faults import Fault as FaultRule
 from drivers.controller.simulated_scenario import EVENT_KINDS, EventKind, MachineSettings, Scenario
 from drivers.controller.simulated_scenario import Event as MachineEvent
 from service.config import Model
-from service.config_file import SCHEMA_DIALECT, ConfigError, line_of, read_yaml
+from service.config_file import SCHEMA_DIALECT, ConfigError, line_of, read_yaml, seen_instead_of_keys
 from service.config_mistakes import describe
 
 Word = Annotated[int, Field(ge=1, le=65_535)]
@@ -95,8 +95,7 @@ def load_scenario(path: Path) -> Scenario:
     """The scenario of a file; raise ConfigError, a line for each mistake."""
     data = read_yaml(path, option="--scenario")
     if not isinstance(data, dict):
-        seen = "is empty" if data is None else f"holds a {type(data).__name__}"
-        raise ConfigError(f"{path}: {seen}, expected keys such as machine, events, faults")
+        raise ConfigError(f"{path}: {seen_instead_of_keys(data)}, expected keys such as machine, events, faults")
     try:
         found = ScenarioFile.model_validate(data)
     except ValidationError as error:

@@ -72,7 +72,7 @@ def test_what_stands_in_the_file_is_what_is_played(tmp_path: Path) -> None:
         ("machine: {scan_ms: 0}", "machine.scan_ms: seen 0"),
         ("machine: {clock: 1.5}", "machine.clock"),
         ("machine: {sessions: [0]}", r"machine.sessions\[0\]: seen 0"),
-        ("seed: yes", "seed is a truth value"),
+        ("seed: yes", "seed: seen true, as yes and on are read, expected a whole number"),
         ("a: [", "line 1"),
     ],
 )

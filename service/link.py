@@ -16,7 +16,7 @@ from typing import Any
 
 from drivers.controller import Controller, ControllerError, ControllerUnavailable
 from drivers.controller.mailbox import LinkBlock, ServiceBlock
-from service.beat import until_beat
+from service.beat import off_beat, until_beat
 from service.ownership import Ownership
 from service.reasons import Reason
 
@@ -25,6 +25,7 @@ log = logging.getLogger("combtrace.link")
 # The last one again and again: with 1 s for an attempt that meets nobody, back within 2 s of the controller's return.
 RETRY_PAUSES_S = (0.1, 0.2, 0.5)
 HEARTBEAT_PERIOD_S = 0.5  # the protocol wants a change at least once a second
+BEAT_DUE_S = 1.0  # within which the protocol wants the controller's heartbeat to change
 REMINDER_S = 60.0  # how often a loss that lasts is told again
 CLOCK_TOLERANCE_MS = 1000  # protocol: a clock reading counts only if it fits the one before within 1 s
 READS_FOR_TWO_ALIKE = 20
@@ -113,6 +114,7 @@ class Link:
         self._zero: tuple[int, float] = (0, 0.0)  # session, and when its clock was first seen at 0
         self._well_or_failed = False
         self._since: float | None = None
+        self._turn = 0
         self._forget()
 
     def _forget(self) -> None:
@@ -162,16 +164,18 @@ class Link:
         return Reason.OTHER_SERVICE if other else Reason.CONTROLLER_LOST
 
     def _beat_fault(self) -> str | None:
-        now = self._now()
-        silent_s = now - (self._connected_at if self._beat_at is None else self._beat_at)
-        if silent_s > self.settings.heartbeat_timeout_s:
-            if now - self._heard_at > self.settings.heartbeat_timeout_s:
+        if self._silent_s() > self.settings.heartbeat_timeout_s:
+            if self._now() - self._heard_at > self.settings.heartbeat_timeout_s:
                 return f"the controller has not answered for {self.settings.heartbeat_timeout_s:g} s. Check its cable"
             return (
                 f"the controller's heartbeat has not changed for {self.settings.heartbeat_timeout_s:g} s: "
                 "its program does not run"
             )
         return "the controller's heartbeat has not changed yet" if self._beat_at is None else None
+
+    def _silent_s(self) -> float:
+        """How long the controller's heartbeat has not changed."""
+        return self._now() - (self._connected_at if self._beat_at is None else self._beat_at)
 
     def _clock_fault(self) -> str | None:
         undecided = self._clock is not None and self._clock_runs(self._clock) is None
@@ -429,7 +433,13 @@ class Link:
 
     def _set_timer(self) -> None:
         loop = asyncio.get_running_loop()
-        self._timer = loop.call_later(until_beat(loop.time(), self.settings.poll_period_s), self._beat_of_poll)
+        period_s = self.settings.poll_period_s
+        pause_s = until_beat(loop.time(), period_s)
+        if self.settings.handshake and self._silent_s() > min(BEAT_DUE_S, self.settings.heartbeat_timeout_s / 2):
+            # A heartbeat of one bit that changes an even number of times from look to look seems to stand still.
+            self._turn += 1
+            pause_s = off_beat(self._turn) * period_s
+        self._timer = loop.call_later(pause_s, self._beat_of_poll)
 
     def _beat_of_poll(self) -> None:
         """Poll in place where the controller lets us: at rest, waking the task each time costs more than the poll."""

@@ -75,8 +75,8 @@ RULES = (
         "Link block: the controller's heartbeat changes while its program runs",
         f"{LINK}::Link._beat_fault",
         f"{IN_LINK}::test_a_heartbeat_that_stands_still_is_a_fault_though_the_server_answers",
-        "if silent_s > self.settings.heartbeat_timeout_s:",
-        "if silent_s > 1e9:",
+        "if self._silent_s() > self.settings.heartbeat_timeout_s:",
+        "if self._silent_s() > 1e9:",
     ),
     # --- service block ---
     Rule(

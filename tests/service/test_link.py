@@ -198,6 +198,21 @@ async def test_a_heartbeat_that_stands_still_is_a_fault_though_the_server_answer
         assert controller.connects == 1
 
 
+async def test_a_heartbeat_of_one_bit_in_step_with_our_looks_does_not_seem_to_stand_still() -> None:
+    looks = 0
+
+    class InStep(ScriptedController):
+        def shown(self) -> LinkBlock:
+            nonlocal looks
+            looks += 1
+            scans = int(2 * asyncio.get_running_loop().time() / settings.poll_period_s + 0.5)
+            return replace(super().shown(), controller_heartbeat=scans % 2)
+
+    settings = LinkSettings(poll_period_s=0.05, heartbeat_timeout_s=0.3)
+    async with linked(InStep(), settings) as link:
+        await until(lambda: looks > 20 and link.fault() is None)
+
+
 async def test_a_controller_that_never_beat_is_not_trusted() -> None:
     controller = ScriptedController()
     controller.beating = False

@@ -28,6 +28,7 @@ from drivers.controller.requests import (
     write_register,
     write_registers,
 )
+from service.beat import off_beat
 from service.link_signature import Registers, Signature, from_echo, from_movement
 
 ROUND_TRIPS = 20
@@ -36,6 +37,7 @@ MOVEMENT_WATCH_S = 2.5  # a heartbeat changes at least once a second
 ECHO_WAIT_S = 3.0
 LOOK_PERIOD_S = 0.25
 HEADER = 1 + HEADER_REGISTERS
+NO_SUCH_REGISTER = 2  # exception code
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class Probe:
     changes: dict[str, object] = field(default_factory=dict)
     sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
     now: Callable[[], float] = time.monotonic
+    _trouble: ControllerError | None = None  # of the last read that failed
 
     @property
     def layout(self) -> MailboxLayout:
@@ -68,11 +71,13 @@ class Probe:
     async def findings(self, *, write: bool) -> AsyncIterator[Finding]:
         """All that can be found out, as it is found out; raise ControllerUnavailable where nothing can be."""
         await self.controller.connect()
-        yield Finding("connection", True, f"{self.controller}: it answers")
+        yield Finding("connection", True, f"{self.controller}: it is open")
         linked = await self._reads(read_registers(self.layout.link_address, BLOCK_REGISTERS))
         yield self._block("link block", self.layout.link_address, linked)
         served = await self._reads(read_registers(self.layout.service_address, BLOCK_REGISTERS))
         yield self._block("service block", self.layout.service_address, served)
+        if not linked and not served and not self._lacks_registers:
+            raise ControllerUnavailable("it answers nothing as it should; what else it can do was not tried")
         if linked:
             yield await self._round_trip()
         longest_read = await self._longest_read()
@@ -96,9 +101,15 @@ class Probe:
         """The registers, () where the controller refuses them or does not answer."""
         try:
             (reply,) = await self._run(request)
-        except ControllerError:
+        except ControllerError as error:
+            self._trouble = error
             return ()
         return registers_of(reply)
+
+    @property
+    def _lacks_registers(self) -> bool:
+        """True where the last read failed because the registers are not there."""
+        return isinstance(self._trouble, ControllerRefused) and self._trouble.code == NO_SUCH_REGISTER
 
     async def _run(self, *requests: Request) -> list[bytes]:
         """The replies; after a request that was not answered the connection is opened anew."""
@@ -110,6 +121,8 @@ class Probe:
         span = people(address, BLOCK_REGISTERS)
         if registers:
             return Finding(name, True, f"registers {span} can be read")
+        if not self._lacks_registers:
+            return Finding(name, False, f"registers {span} cannot be read: {self._trouble}")
         key = name.replace(" block", "_address")
         return Finding(name, False, f"registers {span} cannot be read. Set {key} to where the controller has them")
 
@@ -152,7 +165,7 @@ class Probe:
         if count >= most:
             return Finding(f"longest {kind}", True, text)
         if count < SHORTEST_LIMIT:
-            text += f", expected {SHORTEST_LIMIT} or more. Check contour_address"
+            text += f", expected {SHORTEST_LIMIT} or more. Check contour_address, and what limits a request on its way"
             return Finding(f"longest {kind}", False, text)
         self.changes[f"longest_{kind}"] = count
         return Finding(f"longest {kind}", False, f"{text}, the standard's limit is {most}")
@@ -174,7 +187,11 @@ class Probe:
         usable = (count - HEADER) // 2 * 2
         if usable < 8:
             text = f"{count} registers from {people(address, 1)} on, expected {window}"
-            return Finding(kind, False, f"{text}. Set contour_address to where the controller has them")
+            if kind == "writable":
+                step = "Nothing written reads back: let the controller's program and settings leave them to the service"
+            else:
+                step = "Set contour_address to where the controller has them"
+            return Finding(kind, False, f"{text}. {step}")
         self.changes["payload_capacity"] = min(usable, int(str(self.changes.get("payload_capacity", usable))))
         return Finding(kind, False, f"the contour block up to register {people(address + count - 1, 1)}, not all of it")
 
@@ -188,11 +205,12 @@ class Probe:
         return {}
 
     async def _movement(self) -> list[Signature]:
-        looks = []
+        looks: list[Registers] = []
         until = self.now() + MOVEMENT_WATCH_S
         while self.now() < until:
             looks.append(await self._look())
-            await self.sleep(LOOK_PERIOD_S)
+            # A heartbeat of one bit that changes in step with looks at equal distances seems to stand still.
+            await self.sleep(off_beat(len(looks)) * LOOK_PERIOD_S)
         return from_movement(looks, self.layout)
 
     def _moving(self, ways: list[Signature]) -> Finding:
@@ -242,7 +260,12 @@ class Probe:
         layout = self.layout
         held = await self._held(longest_read, readable)
         served = await self._reads(read_registers(layout.service_address, BLOCK_REGISTERS))
-        longest_write, as_before = 1, False
+        longest_write, as_before = 1, True
+        try:
+            await self._write_test_value()
+        except ControllerRefused as error:
+            yield Finding("writing", False, f"the service block cannot be written: {error}")
+            return
         try:
             yield await self._echo()
             if not self._renumbered:
@@ -250,6 +273,9 @@ class Probe:
                 longest_write = await self._longest_write(longest_read, readable)
                 yield self._longest("write", longest_write, LONGEST_WRITE)
                 yield self._window("writable", await self._writable(longest_write, longest_read, readable))
+        except ControllerRefused as error:
+            held = ()  # nothing but `transfer` was written
+            yield Finding("writing", False, f"the contour block cannot be written: {error}")
         finally:
             as_before = await self._put_back(held, served, min(longest_write, longest_read))
         if not as_before:
@@ -307,14 +333,21 @@ class Probe:
             read += await self._reads(read_registers(first + start, count))
         return read == registers
 
-    async def _echo(self) -> Finding:
-        """Let the controller compute `test_echo`, and see how it did."""
-        layout = self.layout
+    async def _write_test_value(self) -> None:
         before = await self.controller.read_service()
         preoperational = 1  # so that the controller asks for nothing
         await self.controller.write_service(
             replace(before, protocol_version=1, service_state=preoperational, test_value=TEST_VALUE)
         )
+
+    async def _echo(self) -> Finding:
+        """How the controller computed `test_echo` from the value written."""
+        layout = self.layout
+        value = (await self.controller.read_service()).test_value
+        if value != TEST_VALUE:
+            text = f"test_value reads back as 0x{value:08X}, written was 0x{TEST_VALUE:08X}"
+            step = "Let the controller's program and settings leave the service block to the service"
+            return Finding("test_echo", False, f"{text}. {step}")
         until = self.now() + ECHO_WAIT_S
         ways: list[Signature] = []
         while not ways and self.now() < until:
@@ -330,7 +363,7 @@ class Probe:
     async def _put_back(self, held: tuple[int, ...], served: tuple[int, ...], longest: int) -> bool:
         """Write what stood there before, `transfer` stays 0; True where it reads back so."""
         alike = True
-        if not self._renumbered:
+        if held and not self._renumbered:
             await self._run(write_register(self.layout.contour_address, 0))
             for start, count in _pieces(len(held), longest):
                 alike = await self._writes(1 + start, held[start : start + count], longest) and alike

@@ -70,7 +70,7 @@ class TcpWire:
 
     serial = False
     missing = "Check cable and power, device_id, whether the controller runs, and timeout_s"
-    mismatch = "Check what listens there, and for a second client"
+    mismatch = "Check device_id, what listens there, and for a second client"
 
     @property
     def name(self) -> str:

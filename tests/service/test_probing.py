@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import pytest
 
-from drivers.controller import ServiceBlock
+from drivers.controller import ControllerUnavailable, ServiceBlock
 from drivers.controller.mailbox import MailboxLayout
 from drivers.controller.modbus import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
 from drivers.controller.requests import read_registers, registers_of, stream_of, write_register, write_registers
-from drivers.controller.simulated import SimulatedController
-from service.probing import Finding, Probe
-from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply
+from drivers.controller.simulated import FaultPlan, SimulatedController
+from drivers.controller.simulated_faults import Fault, Target
+from service.probing import LOOK_PERIOD_S, Finding, Probe
+from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 from tests.interop.programs import libmodbus_tcp
 from tests.interop.shifted_program import program
 from tests.pty_line import PtyLine
@@ -195,7 +196,7 @@ async def test_a_dead_services_block_does_not_hinder(client: ModbusTcpController
     assert findings["writable"].well
 
 
-@pytest.mark.parametrize("longest", [100, 40])
+@pytest.mark.parametrize("longest", [100, 40, 20])
 async def test_shorter_requests_than_the_standards_are_found(longest: int) -> None:
     async with MisbehavingServer() as server:
         right = server.behave
@@ -209,5 +210,79 @@ async def test_shorter_requests_than_the_standards_are_found(longest: int) -> No
 
         server.behave = short
         findings, probe = await probed(server.port, write=False)
-    assert probe.changes == {"longest_read": longest}
-    assert f"{longest} registers in one request, the standard's limit is 125" in findings["longest read"].text
+    assert probe.changes == ({"longest_read": longest} if longest > 20 else {})
+    said = (
+        "the standard's limit is 125" if longest > 20 else "expected 32 or more. Check contour_address, and what limits"
+    )
+    assert f"{longest} registers in one request, {said}" in findings["longest read"].text
+
+
+def _with_another_unit(request: bytes) -> bytes:
+    reply = right_reply(request)
+    return reply[:6] + b"\x07" + reply[7:]
+
+
+@pytest.mark.parametrize(
+    ("reply", "said"),
+    [
+        (_with_another_unit, "the reply's device id is 7, expected 1"),
+        (lambda _request: b"SSH-2.0-OpenSSH_9.2\r\n", "the reply's protocol identifier is"),
+        (lambda request: exception_reply(request, 1), "must know function codes 3, 6 and 16"),
+        (lambda request: exception_reply(request, 6), "server device busy"),
+    ],
+)
+async def test_one_that_answers_nothing_rightly_is_told_what_it_answers_and_no_address_is_blamed(
+    reply: Callable[[bytes], bytes], said: str
+) -> None:
+    findings: list[Finding] = []
+
+    async def look(probe: Probe) -> None:
+        async for finding in probe.findings(write=True):
+            findings.append(finding)
+
+    async with MisbehavingServer() as server:
+        server.reply_with(reply)
+        probe = Probe(ModbusTcpController("127.0.0.1", server.port, timeout_s=5), 5)
+        with pytest.raises(ControllerUnavailable, match="answers nothing as it should"):
+            await look(probe)
+        await probe.controller.close()
+        assert len(server.requests) == 2
+    assert [finding.part for finding in findings] == ["connection", "link block", "service block"]
+    assert all(said in finding.text and "_address" not in finding.text for finding in findings[1:])
+
+
+@pytest.mark.parametrize(
+    ("block", "said"), [("service", "the service block cannot"), ("clear", "the contour block cannot")]
+)
+async def test_a_block_that_cannot_be_written_is_told_with_the_controllers_word(block: Target, said: str) -> None:
+    faults = FaultPlan([Fault("exception", block, every=1)])
+    async with SimulatedController(scan_s=0.001, faults=faults) as simulated:
+        findings, probe = await probed(simulated.port)
+    assert findings["writing"].text.startswith(f"{said} be written: ")
+    assert "exception 4" in findings["writing"].text
+    assert "put back" not in findings
+    assert probe.changes == {}
+
+
+async def test_writes_that_are_confirmed_and_not_done_are_told() -> None:
+    async with MisbehavingServer() as server:
+        findings, _ = await probed(server.port)
+    assert "test_value reads back as 0x00000000, written was 0x01020304" in findings["test_echo"].text
+    assert "Nothing written reads back" in findings["writable"].text
+
+
+async def test_a_heartbeat_of_one_bit_in_step_with_the_looks_is_seen_to_move() -> None:
+    def in_step(request: bytes) -> bytes | None:
+        if request[7] != 3:
+            return None
+        first, count = int.from_bytes(request[8:10], "big"), int.from_bytes(request[10:12], "big")
+        scans = int(2 * FASTER * time.monotonic() / LOOK_PERIOD_S)
+        registers = [scans % 2 if address == 1 else 0 for address in range(first, first + count)]
+        return (
+            request[:4] + (3 + 2 * count).to_bytes(2, "big") + bytes((request[6], 3, 2 * count)) + stream_of(registers)
+        )
+
+    async with MisbehavingServer() as server:
+        server.reply_with(lambda request: in_step(request) or right_reply(request))
+        findings, _ = await probed(server.port, write=False)
+    assert findings["heartbeat"].well, findings["heartbeat"].text

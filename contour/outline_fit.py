@@ -57,7 +57,7 @@ class FittedRing:
 def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None) -> FittedRing:
     """The outline through a ring's witnesses, fitted in the rectified plane where `rectifier` is given.
 
-    Raises NoBlockFound where there are fewer than six witnesses.
+    Raises NoBlockFound where there are fewer than six witnesses, or no few of them lie on any line or arc.
     """
     if len(evidence.points) < _FEWEST:
         raise NoBlockFound(
@@ -70,7 +70,10 @@ def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifi
         if not len(bounds):
             break
         more, own = with_bounds(evidence, bounds)
-        again = _fitted(more, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
+        try:
+            again = _fitted(more, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
+        except NoBlockFound:  # so many walls are left out that no line goes past all of them: nothing gets better
+            break
         others, still = overlooked(evidence, again.ring, pitch_px, rectifier)
         if still < left_out:
             fitted, left_out = replace(again, inlier=again.inlier[own], residual=again.residual[own]), still
@@ -113,9 +116,15 @@ def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complex:
 def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
     """The ring as lines and arcs: label, refit, propose anew around what was found, until nothing changes.
 
-    The noise is measured again twice on the way; the witnesses come back with it.
+    The noise is measured again twice on the way; the witnesses come back with it. Raises NoBlockFound where nothing is
+    proposed.
     """
     proposals = propose(witnesses)
+    if not len(proposals):
+        raise NoBlockFound(
+            f"no outline: the {len(witnesses)} wall ends along a ring lie on no line and no arc; "
+            "check that the block is in view, and that nothing else with an edge is"
+        )
     segments = runs(label(witnesses, proposals), proposals)
     least = _LEAST_NOISE
     for round_ in range(_ROUNDS):

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.refusal_scenes import refusal_scenes
+from contour.errors import NoBlockFound
 from contour.outline_fit import fit_ring
 from contour.outline_overlooked import overlooked, with_bounds
+from contour.tracing import TraceSettings, trace
 from contour.wall_evidence import RingEvidence, WallPoints, WitnessKind
-from tests.contour.outline_scenes import PITCH, along, errors, perimeter, rectangle, witnesses
+from tests.contour.outline_scenes import PITCH, along, circle, errors, perimeter, rectangle, witnesses
 
 BLOCK = rectangle(900.0, 600.0, angle=0.0)
 STEP = PITCH / 8
@@ -123,3 +126,17 @@ def cut_corner(evidence: RingEvidence) -> RingEvidence:
         np.concatenate([evidence.sigma, np.full(6, 0.3)])[order],
         np.concatenate([evidence.kind, np.full(6, WitnessKind.CLEAN, np.int8)])[order],
     )
+
+
+def test_an_outline_stays_as_it_was_where_no_line_goes_past_all_that_it_leaves_out() -> None:
+    """Squares of a printed code: 16 witnesses, and 85 places that the outline should not leave outside."""
+    code = next(scene for scene in refusal_scenes(1, 10) if scene.name == "code-squares-10").make()
+    found = trace(code, TraceSettings()).contour.exterior
+    assert len(found) >= 3
+
+
+def test_places_that_only_bound_an_outline_make_none() -> None:
+    evidence = witnesses(circle(700.0), seed=1)
+    bounds = replace(evidence, kind=np.full_like(evidence.kind, WitnessKind.BOUND))
+    with pytest.raises(NoBlockFound, match="lie on no line and no arc"):
+        fit_ring(bounds, pitch_px=PITCH, wall_px=3.0, rectifier=None)

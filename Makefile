@@ -64,7 +64,7 @@ soak-daemon: install
 # The protocol's suite on a real controller. Whole contours, which may make it move, only with MOVE=yes.
 hil: install
 	@test -n "$(CONTROLLER)" || { echo "which controller? make hil CONTROLLER=tcp://HOST:PORT [MOVE=yes]"; exit 2; }
-	$(BIN)/python -m pytest tests/hil -p no:cacheprovider -v --hil-controller='$(CONTROLLER)' $(if $(filter yes,$(MOVE)),--hil-move)
+	$(BIN)/python -m pytest tests/hil/test_controller.py -p no:cacheprovider -vv -rs --hil-controller='$(CONTROLLER)' $(if $(filter yes,$(MOVE)),--hil-move)
 
 # Pictures without a block, which must be refused by name, and traceable ones, which must not.
 refusals: install

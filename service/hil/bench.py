@@ -21,8 +21,24 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from drivers.controller import Controller, ControllerError, LinkBlock, Page, ServiceBlock
-from drivers.controller.mailbox import ContourMessage, MailboxLayout, crc32_of, encode_pages, withdrawal
+from drivers.controller import (
+    Controller,
+    ControllerError,
+    ControllerRefused,
+    ControllerUnavailable,
+    LinkBlock,
+    Page,
+    ServiceBlock,
+)
+from drivers.controller.mailbox import (
+    ContourMessage,
+    MailboxError,
+    MailboxLayout,
+    crc32_of,
+    encode_pages,
+    encode_service,
+    withdrawal,
+)
 from drivers.controller.simulated import SimulatedController
 from service.config import Config
 from service.config_file import ConfigError, load_config
@@ -33,6 +49,8 @@ from service.wiring import mailbox_layout, make_controller
 HEARTBEAT_S = 0.4
 ANSWER_S = 5.0
 STARTED_S = 5.0
+BACK_S = 30.0
+RETRY_S = 0.2
 LOOK_S = 0.02
 READY, HALTED = 5, 2
 SQUARE_UM = ((0, 0), (100_000, 0), (100_000, 100_000), (0, 100_000))
@@ -65,7 +83,7 @@ class Bench:
         self._thread = threading.Thread(target=self._loop.run_forever, name="hil", daemon=True)
         self._block = ServiceBlock(service_state=READY, owner=1 + secrets.randbelow(0xFFFF))
         self._beating: asyncio.Task[None] | None = None
-        self._trouble: ControllerError | None = None
+        self._trouble: ControllerUnavailable | None = None
         self._transfer = 0
 
     def __enter__(self) -> Bench:
@@ -115,8 +133,13 @@ class Bench:
         return block
 
     def publish(self, **changes: int) -> None:
-        """Change the service block, and write it at once."""
-        self._block = replace(self._block, **changes)
+        """Change the service block, and write it at once; raise HilError where a value does not fit its register."""
+        changed = replace(self._block, **changes)
+        try:
+            encode_service(changed, self.layout.word_order)
+        except MailboxError as error:
+            raise HilError(str(error)) from error
+        self._block = changed
         self._do(self._beat())
 
     def new_job(self) -> int:
@@ -198,6 +221,15 @@ class Bench:
         """Take a job back; the answer."""
         return self.send(withdrawal(job_id, self.link().session, self.layout.word_order))
 
+    def reconnect(self, timeout_s: float = BACK_S) -> LinkBlock:
+        """The link block on a new connection, once the controller is back from a restart or a cut line; raise HilError.
+
+        The service block is as it was published last; `transfer` is left as it stands there.
+        """
+        self._trouble = None
+        self._do(self._again(timeout_s))
+        return self.link()
+
     # --- inside -----------------------------------------------------------------------------------------------------
 
     async def _start(self) -> None:
@@ -206,6 +238,27 @@ class Bench:
             self._controller = _over_tcp(self._server.port, self.layout)
         await self._controller.connect()
         await self._watch_owner()
+        await self._serve()
+
+    async def _again(self, timeout_s: float) -> None:
+        await self._stop_beating()
+        give_up_at = time.monotonic() + timeout_s
+        while True:
+            try:
+                await self._controller.connect()
+                found = await self._controller.read_service()
+                if found.owner not in (0, self._block.owner):
+                    raise HilError(f"another service (owner {found.owner}) came meanwhile. Stop it before the test")
+                await self._serve()
+                return
+            except ControllerError:
+                await self._stop_beating()
+                if time.monotonic() >= give_up_at:
+                    raise
+            await asyncio.sleep(RETRY_S)
+
+    async def _serve(self) -> None:
+        """Write the service block from now on; return when the controller's program runs."""
         await self._controller.write_service(self._block)
         self._beating = asyncio.create_task(self._beat_for_ever())
         give_up_at = time.monotonic() + STARTED_S
@@ -232,10 +285,17 @@ class Bench:
     async def _beat_for_ever(self) -> None:
         try:
             while True:
-                await self._beat()
+                with suppress(ControllerRefused):  # busy for once; one that always refuses is told by `publish`
+                    await self._beat()
                 await asyncio.sleep(HEARTBEAT_S)
-        except ControllerError as error:
+        except ControllerUnavailable as error:
             self._trouble = error
+
+    async def _stop_beating(self) -> None:
+        if self._beating is not None:
+            self._beating.cancel()
+            with suppress(asyncio.CancelledError):
+                await self._beating
 
     def _read(self) -> LinkBlock:
         return self._do(self._controller.read_link())
@@ -243,7 +303,7 @@ class Bench:
     def _do(self, step: Coroutine[Any, Any, T]) -> T:
         if self._trouble is not None:
             step.close()
-            raise HilError(f"the controller was lost: {self._trouble}")
+            raise HilError(f"the controller was lost: {self._trouble}. `reconnect` where that was meant to be")
         try:
             return asyncio.run_coroutine_threadsafe(step, self._loop).result()
         except ControllerError as error:
@@ -256,10 +316,7 @@ class Bench:
         self._loop.close()
 
     async def _end(self) -> None:
-        if self._beating is not None:
-            self._beating.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._beating
+        await self._stop_beating()
         await self._controller.close()
         if self._server is not None:
             await self._server.stop()

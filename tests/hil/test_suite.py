@@ -7,9 +7,11 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +19,7 @@ from drivers.controller.simulated import SimulatedController
 from drivers.controller.simulated_contour import PageCopy
 from service.hil.bench import HilError, open_bench
 
+SERVICE_HEARTBEAT = 18
 ROOT = Path(__file__).parents[2]
 
 
@@ -34,6 +37,7 @@ def controller() -> Iterator[SimulatedController]:
     def run() -> None:
         task = loop.create_task(serve())
         made.end = task.cancel  # type: ignore[attr-defined]
+        made.loop = loop  # type: ignore[attr-defined]
         with suppress(asyncio.CancelledError):
             loop.run_until_complete(task)
         loop.close()
@@ -89,6 +93,40 @@ def test_a_second_service_that_lives_is_left_alone() -> None:
             pytest.fail("two benches on one controller")
         assert shared.verdict.clean or set(shared.verdict.counts) <= {"heartbeat-stalled"}
         assert not first.simulated
+
+
+def test_a_value_that_does_not_fit_is_told_and_the_heartbeat_goes_on_without_it() -> None:
+    with open_bench(None, None) as bench:
+        with pytest.raises(HilError, match="trigger_ack is 70000, expected 0 to 65535"):
+            bench.publish(trigger_ack=70_000)
+        bench.publish(trigger_ack=7)
+
+
+def test_a_controller_that_was_switched_off_and_on_is_taken_up_again_when_asked() -> None:
+    with controller() as restarted:
+        loop = restarted.loop  # type: ignore[attr-defined]
+
+        def switch(what: Coroutine[Any, Any, None]) -> None:
+            asyncio.run_coroutine_threadsafe(what, loop).result(10)
+
+        with open_bench(f"tcp://127.0.0.1:{restarted.port}", None) as bench:
+            before = bench.link().session
+            job = bench.new_job()
+            page = bench.first_of_two(job)
+            switch(restarted.switch_off())
+            with pytest.raises(HilError, match=r"127\.0\.0\.1"):
+                bench.link()
+            switch(restarted.switch_on())
+            assert bench.reconnect().session not in (0, before)
+            assert bench.send(page).result == 8, "of the session before"
+            assert bench.withdraw(job).result == 11
+            beat = restarted.registers(SERVICE_HEARTBEAT, 1)
+            for _ in range(1000):
+                if restarted.registers(SERVICE_HEARTBEAT, 1) != beat:
+                    break
+                time.sleep(0.01)
+            else:
+                pytest.fail("the heartbeat does not go on")
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import os
 import re
 import signal
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,8 @@ EXPECTED_NOISE = (
     "ERR_FAILED",
     "ERR_INCOMPLETE_CHUNKED_ENCODING",
     "401",
+    "429",
+    "503",
     "ERR_EMPTY_RESPONSE",
     "409",
 )
@@ -135,11 +137,7 @@ def test_the_server_says_the_state_before_any_script_runs(panel: Panel, browser:
 def test_no_control_can_be_pressed_before_the_script_hears_it(panel: Panel) -> None:
     page = panel.page
     held: list[Route] = []
-
-    def hold(route: Route) -> None:
-        held.append(route)
-
-    page.route("**/static/page.js", hold)
+    page.route("**/static/page.js", holding(held))
     page.reload()
     expect(page.locator("#state")).to_have_text("Ready")
     assert (
@@ -293,21 +291,126 @@ def test_a_wrong_token_is_told_and_a_right_one_measures_halts_and_resumes(panel:
     page.locator("#trigger").click()
     page.locator("#token").fill("guessed")
     page.keyboard.press("Enter")
-    expect(page.locator("#token-told")).to_have_text("the token is not known")
+    expect(page.locator("#token-told")).to_have_text("The token is not known.")
     assert panel.client.get("/api/v1/state").json["settled_job"] == before
     page.locator("#token").fill(TOKEN)
     page.locator("#token-ok").click()
-    expect(page.locator("#told")).to_have_text(f"Job {before + 1} is being measured.")
+    expect(page.locator("#told")).to_have_text(f"job {before + 1}: accepted")
     expect(page.locator("#outcome")).to_have_text(f"job {before + 1}: accepted")
     page.locator("#halt").click()
     settled_state(panel, "halted")
     expect(page.locator("#whys")).to_contain_text("anna from 127.0.0.1")
+    expect(page.locator("#told")).to_have_text("Halted. Nothing is measured until you resume.")
     page.locator("#trigger").click()
     expect(page.locator("#told")).to_contain_text(Reason.NOT_READY.explained().sentence)
     page.locator("#resume").click()
     settled_state(panel, "ready")
     stored = page.evaluate("[document.cookie, JSON.stringify(localStorage), JSON.stringify(sessionStorage)].join()")
     assert TOKEN not in stored
+
+
+def holding(routes: list[Route]) -> Callable[[Route], None]:
+    """Requests wait in the list."""
+
+    def hold(route: Route) -> None:
+        routes.append(route)
+
+    return hold
+
+
+def given_token(page: Page) -> None:
+    """The page knows who gives orders."""
+    page.locator("#trigger").click()
+    page.locator("#token").fill(TOKEN)
+    page.keyboard.press("Enter")
+    expect(page.locator("#told")).to_have_text(re.compile(r"job \d+: accepted"))
+
+
+def test_a_key_held_down_and_a_double_tap_are_one_order_each(panel: Panel) -> None:
+    page = panel.page
+    settled_state(panel, "ready")
+    given_token(page)
+    orders: list[Route] = []
+    page.route("**/api/v1/trigger", holding(orders))
+    for _ in range(5):  # the browser repeats a key that is down
+        page.keyboard.down("m")
+    page.locator("#trigger").dblclick()
+    expect(page.locator("#told")).to_have_text("Sending the order…")
+    assert len(orders) == 1
+    orders.pop().continue_()
+    expect(page.locator("#told")).to_have_text(re.compile(r"job \d+: accepted"))
+    for _ in range(5):  # still held, and nothing under way
+        page.keyboard.down("m")
+    page.wait_for_timeout(100)
+    page.keyboard.up("m")
+    assert orders == []
+    page.locator("#trigger").dblclick()
+    page.wait_for_timeout(100)
+    assert len(orders) == 1
+    orders.pop().continue_()
+    expect(page.locator("#told")).to_have_text(re.compile(r"job \d+: accepted"))
+
+
+@pytest.mark.parametrize(
+    ("status", "place", "text"),
+    [
+        (401, "#token-told", "Такого ключа нет."),
+        (429, "#told", "Подождите минуту."),
+        (503, "#told", "Служба сейчас не может"),
+    ],
+)
+def test_an_order_that_is_refused_is_told_in_the_readers_language(
+    panel: Panel, status: int, place: str, text: str
+) -> None:
+    page = panel.page
+    page.route(
+        "**/api/v1/trigger",
+        lambda route: route.fulfill(status=status, json={"error": "no", "code": None, "name": None}),
+    )
+    expect(page.locator("#trigger")).to_be_enabled()
+    page.locator("#language").click()
+    page.locator("#trigger").click()
+    page.locator("#token").fill("whatever")
+    page.keyboard.press("Enter")
+    expect(page.locator(place)).to_contain_text(text)
+
+
+def test_a_job_that_comes_late_is_not_shown_in_place_of_the_one_opened_since(panel: Panel) -> None:
+    page = panel.page
+    slow, quick, newest = panel.ordered(), panel.ordered(), panel.ordered()
+    expect(page.locator("#outcome")).to_have_text(f"job {newest}: accepted")
+    held: list[Route] = []
+    page.route(f"**/jobs/{slow}/drawing", holding(held))
+    with page.expect_request(f"**/jobs/{slow}/drawing"):
+        page.locator(f'#strip button[data-job="{slow}"]').click()
+    page.locator(f'#strip button[data-job="{quick}"]').click()
+    expect(page.locator("#outcome")).to_have_text(f"job {quick}: accepted")
+    with page.expect_response(f"**/jobs/{slow}/drawing"):
+        held.pop().continue_()
+    page.wait_for_timeout(200)
+    expect(page.locator("#outcome")).to_have_text(f"job {quick}: accepted")
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{quick}\?"))
+
+
+def test_older_jobs_are_shown_and_where_there_are_none_nothing_changes(panel: Panel) -> None:
+    page = panel.page
+    while len(panel.client.get("/api/v1/jobs?limit=17").json["jobs"]) < 17:
+        panel.ordered(recipe=77)
+    jobs = [job["job_id"] for job in panel.client.get("/api/v1/jobs?limit=200").json["jobs"]]
+    expect(page.locator("#strip button").first).to_have_attribute("data-job", str(jobs[0]))
+    page.locator("#older").click()
+    expect(page.locator("#strip button").first).to_have_attribute("data-job", str(jobs[16]))
+    expect(page.locator("#outcome")).to_contain_text(f"job {jobs[16]}:")
+    page.locator("#newest").click()
+    expect(page.locator("#strip button").first).to_have_attribute("data-job", str(jobs[0]))
+    page.route("**/jobs?limit=16&before=*", lambda route: route.fulfill(json={"jobs": []}))
+    with page.expect_response("**/jobs?limit=16&before=*"):
+        page.locator("#older").click()
+    page.wait_for_timeout(200)
+    expect(page.locator("#strip button")).to_have_count(16)
+    expect(page.locator("#outcome")).to_contain_text(f"job {jobs[0]}:")
+    later = panel.ordered()
+    expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
 
 
 def test_the_language_is_switched_without_a_reload_and_kept(panel: Panel) -> None:

@@ -17,6 +17,7 @@ let onlyRefused = false;
 let before = null;
 let shownAs = "";
 let loading = false;
+let turn = 0; // of what is to be shown: what comes for an older one comes too late
 let again = false;
 let awaited = { job: 0, tries: 0 };
 
@@ -42,18 +43,25 @@ export async function refresh() {
 
 async function load() {
   if (isFrozen) return;
-  const query = `limit=${SHOWN}${onlyRefused ? "&only_refused=true" : ""}${before ? `&before=${before}` : ""}`;
+  const query = queryOf(before);
+  let found;
   try {
-    jobs = (await get(`/jobs?${query}`)).jobs;
+    found = (await get(query)).jobs;
   } catch {
     return; // the connection is lost, and the banner says so
   }
+  if (isFrozen || query !== queryOf(before)) return; // meanwhile something else is wanted
+  jobs = found;
   strip();
   await display();
   if (jobs.length && isAwaited(jobs[0])) {
     awaited.tries += 1;
     setTimeout(refresh, EVIDENCE_PAUSE_MS);
   }
+}
+
+function queryOf(below) {
+  return `/jobs?limit=${SHOWN}${onlyRefused ? "&only_refused=true" : ""}${below ? `&before=${below}` : ""}`;
 }
 
 /** True while pictures of a job may still come: they are kept after its end. Counted, for clocks may differ. */
@@ -65,7 +73,10 @@ function isAwaited(one) {
 
 /** The job looked at, or the newest that has come to an end. */
 async function display() {
+  turn += 1;
+  const mine = turn;
   const one = opened === null ? jobs.find((entry) => entry.outcome) ?? jobs[0] : jobs.find((entry) => entry.job_id === opened) ?? (await fetched(opened));
+  if (mine !== turn) return;
   if (!one) {
     picture.show(null);
     return;
@@ -82,6 +93,7 @@ async function display() {
   } else if (opened === null && shownAs && isAwaited(one)) {
     return; // its picture follows in a moment: all of it is shown at once
   }
+  if (mine !== turn) return;
   shownAs = state;
   job.show(one, drawing);
   picture.show(drawing, frameOf(one, 1600));
@@ -149,6 +161,7 @@ export function freeze() {
     return;
   }
   isFrozen = true;
+  turn += 1;
   mark();
 }
 
@@ -166,12 +179,21 @@ export function go(step) {
   at("strip").children[place].scrollIntoView({ block: "nearest", inline: "nearest" });
 }
 
-function older() {
+async function older() {
   if (jobs.length < SHOWN) return;
-  before = jobs.at(-1).job_id;
+  const below = jobs.at(-1).job_id;
+  let found;
+  try {
+    found = (await get(queryOf(below))).jobs;
+  } catch {
+    return;
+  }
+  if (!found.length || below !== jobs.at(-1)?.job_id) return; // there are no older ones, or others are wanted
+  before = below;
   isFrozen = false;
-  opened = before - 1 || null;
-  refresh().then(() => jobs.length && open(jobs[0].job_id));
+  jobs = found;
+  strip();
+  open(jobs[0].job_id);
 }
 
 at("freeze").addEventListener("click", freeze);

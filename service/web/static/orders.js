@@ -8,11 +8,16 @@ import { current, reasonOf } from "./now.js";
 let recipes = "";
 let pending = null;
 let told = () => "";
+let isUnderWay = false; // an order that is not answered yet
+let measured = null; // the job that was ordered here, as long as it runs
+
+const REFUSALS = { 401: "wrong_token", 403: "no_orders", 409: "not_now", 429: "too_often", 503: "cannot" };
 
 /** Follow the state: which orders make sense now. */
 export function show(state) {
   at("halt").hidden = state.state === "Halted";
   at("resume").hidden = state.state !== "Halted";
+  if (measured !== null && state.settled_job >= measured) ended(state.last_job);
   const key = JSON.stringify(state.recipes) + document.documentElement.lang;
   if (key === recipes) return;
   recipes = key;
@@ -22,8 +27,15 @@ export function show(state) {
   if (chosen) at("recipe").value = chosen;
 }
 
-/** Have it done, after asking who orders it where that is not known. */
+function ended(last) {
+  const isLast = last?.job === measured;
+  measured = null;
+  tell(() => (isLast ? `${words("job_runs", { job: last.job })}: ${words(last.outcome)}` : ""), isLast && last.code !== 0);
+}
+
+/** Have it done, one order at a time, after asking who orders it where that is not known. */
 export function ask(path, body, done) {
+  if (isUnderWay || at("trigger").disabled) return; // a key finds the service lost as the button does
   pending = { path, body, done };
   if (hasToken()) carryOut();
   else openDialog("");
@@ -38,19 +50,25 @@ function openDialog(text) {
 
 async function carryOut() {
   const { path, body, done } = pending;
+  isUnderWay = true;
+  measured = null;
+  tell(() => words("sending"), false);
   try {
     const answer = await order(path, body);
-    tell(() => done(answer), false);
+    tell(done(answer), false);
   } catch (error) {
-    if (!(error instanceof Refused)) tell(() => words(hasToken() ? "transfer_unknown" : "not_reached"), true);
-    else if (error.status === 401) openDialog(error.message);
+    if (!(error instanceof Refused)) tell(() => words("transfer_unknown"), true);
     else tell(() => refusal(error), true);
+    if (error.status === 401) openDialog(words("wrong_token"));
+  } finally {
+    isUnderWay = false;
   }
 }
 
 function refusal(error) {
   const reason = error.code ? reasonOf(error.code) : null;
-  return reason ? `${reason.sentence} ${reason.next_action} (${error.message})` : error.message;
+  const text = reason ? `${reason.sentence} ${reason.next_action}` : words(REFUSALS[error.status] ?? "cannot");
+  return `${text} (${error.message})`;
 }
 
 function tell(text, isBad) {
@@ -60,11 +78,14 @@ function tell(text, isBad) {
 }
 
 export const measure = () =>
-  ask("/trigger", { recipe: Number(at("recipe").value) }, ({ job }) => (job === null ? words("queued") : words("ordered", { job })));
+  ask("/trigger", { recipe: Number(at("recipe").value) }, ({ job }) => {
+    measured = job;
+    return () => (job === null ? words("queued") : words("ordered", { job }));
+  });
 
 at("trigger").addEventListener("click", measure);
-at("halt").addEventListener("click", () => ask("/halt", {}, () => words("halted_now")));
-at("resume").addEventListener("click", () => ask("/resume", {}, () => words("resumed_now")));
+at("halt").addEventListener("click", () => ask("/halt", {}, () => () => words("halted_now")));
+at("resume").addEventListener("click", () => ask("/resume", {}, () => () => words("resumed_now")));
 at("token-cancel").addEventListener("click", () => at("token-dialog").close());
 at("token-dialog").querySelector("form").addEventListener("submit", () => {
   const given = at("token").value.trim();

@@ -66,7 +66,8 @@ const KEYS = {
 
 document.addEventListener("keydown", (event) => {
   const busy = event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]");
-  if (busy || /^(INPUT|SELECT)$/.test(event.target.tagName) || !KEYS[event.code]) return;
+  const held = event.repeat && !event.code.startsWith("Arrow"); // a key that is held down is one order, not thirty a second
+  if (busy || held || /^(INPUT|SELECT)$/.test(event.target.tagName) || !KEYS[event.code]) return;
   event.preventDefault();
   KEYS[event.code]();
 });

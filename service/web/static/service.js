@@ -4,6 +4,7 @@ const BASE = "/api/v1";
 const FORGOTTEN_MS = 600_000;
 const SILENT_MS = 3_500;
 const AGAIN_MS = 2_000;
+const ORDER_MS = 15_000; // the service answers within 10 s, if at all
 
 let token = null;
 let forgetting = null;
@@ -38,7 +39,7 @@ export function forget() {
 
 export async function order(path, body) {
   const headers = { "Content-Type": "application/json", Authorization: `Bearer ${token}` };
-  const answer = await fetch(BASE + path, { method: "POST", headers, body: JSON.stringify(body) });
+  const answer = await fetch(BASE + path, { method: "POST", headers, body: JSON.stringify(body), signal: AbortSignal.timeout(ORDER_MS) });
   const told = await answer.json();
   if (answer.status === 401) forget();
   if (!answer.ok) throw new Refused(answer.status, told);

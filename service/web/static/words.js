@@ -60,8 +60,8 @@ export function bytes(value) {
 /** A moment in local time; its day only where it is not today. */
 export function moment(text) {
   const when = new Date(text);
-  const time = when.toLocaleTimeString(language, { hour12: false });
-  return when.toDateString() === new Date().toDateString() ? time : `${when.toLocaleDateString(language)} ${time}`;
+  const time = when.toLocaleTimeString(language, { hourCycle: "h23" });
+  return when.toDateString() === new Date().toDateString() ? time : `${when.toLocaleDateString(language, { dateStyle: "medium" })} ${time}`;
 }
 
 /** Seconds as people say them: the two largest units. */

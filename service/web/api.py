@@ -24,7 +24,7 @@ from service.reasons import Language, Reason
 from service.web import answers
 from service.web.drawing import drawing
 from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept, tag_of
-from service.web.guard import BodyTooLarge
+from service.web.guard import BodyTooLarge, plain_address
 from service.web.live import MOST_VIEWERS, PERIOD_S, EventStream, Live
 from service.web.openapi import PREFIX, document
 from service.web.operations_table import MOST_JOBS, MOST_NOTES, OPERATIONS
@@ -249,7 +249,7 @@ def _encoded(model: BaseModel) -> bytes:
 
 
 def _address(request: Request) -> str:
-    return "unknown" if request.client is None else request.client.host
+    return "unknown" if request.client is None else plain_address(request.client.host)
 
 
 def _job_number(request: Request) -> int:

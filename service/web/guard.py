@@ -7,11 +7,12 @@ Sec-Fetch-Site: another site's page cannot ask in a visitor's name.
 from __future__ import annotations
 
 import ipaddress
-import json
 from collections.abc import Iterable
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.web.answers import Problem
 
 LARGEST_BODY = 4096
 READING = ("GET", "HEAD")
@@ -75,10 +76,16 @@ class Guard:
 
     def _ours(self, host: str, scope: Scope) -> bool:
         name = _without_port(host)
-        called = (scope.get("server") or ("", 0))[0]
-        if name in self._names or name == called.lower():
+        called = plain_address((scope.get("server") or ("", 0))[0]).lower()
+        if name in self._names or name == called:
             return True
         return name == "localhost" and _is_loopback(called)
+
+
+def plain_address(address: str) -> str:
+    """The address; an IPv4 one as such, also where a socket for both tells it as `::ffff:10.0.0.20`."""
+    prefix, _, rest = address.lower().rpartition(":")
+    return rest if prefix == "::ffff" and "." in rest else address
 
 
 def _unfit_body(headers: Headers) -> tuple[int, str] | None:
@@ -124,7 +131,7 @@ def _bounded(receive: Receive) -> Receive:
 
 
 async def _answer(send: Send, status: int, text: str) -> None:
-    body = json.dumps({"error": text}).encode()
+    body = Problem(error=text).model_dump_json().encode()
     headers = [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": body})

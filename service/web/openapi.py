@@ -13,6 +13,11 @@ from service.web.answers import Problem
 
 REFERENCES = "#/components/schemas/{model}"
 PREFIX = "/api/v1"
+EVERYWHERE = {
+    403: "Another site's page asks.",
+    421: "Called by a name that is not the service's: see page.names.",
+}
+WITH_BODY = {413: "The body is larger than 4096 bytes.", 415: "The body is not application/json."}
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,8 @@ def _told(operation: Operation, schemas: dict[Any, Any]) -> dict[str, Any]:
     content = {answer: {}} if isinstance(answer, str) else {"application/json": {"schema": schemas[answer]}}
     responses: dict[str, Any] = {str(operation.status): {"description": operation.text, "content": content}}
     problem = {"application/json": {"schema": schemas[Problem]}}
-    for status, text in operation.problems.items():
+    problems = {**EVERYWHERE, **({} if operation.request is None else WITH_BODY), **operation.problems}
+    for status, text in sorted(problems.items()):
         responses[str(status)] = {"description": text, "content": problem}
     told: dict[str, Any] = {"summary": operation.text, "responses": responses}
     if operation.parameters:

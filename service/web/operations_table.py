@@ -10,6 +10,7 @@ MOST_JOBS = 200
 MOST_NOTES = 1000
 
 _SILENT = {503: "The service does not answer, or its journal cannot be read."}
+_PARAMETER = "A parameter is not as expected."
 _NO_JOB = {404: "There is no such job, or nothing is kept of it.", **_SILENT}
 _ORDER = {
     401: "No token, or a wrong one.",
@@ -28,7 +29,7 @@ OPERATIONS = (
         "/jobs",
         "The newest jobs, newest first",
         answers.Jobs,
-        {400: "A parameter is not as expected.", **_SILENT},
+        {400: _PARAMETER, **_SILENT},
         (
             Parameter("limit", {"type": "integer", "minimum": 1, "maximum": MOST_JOBS, "default": 24}, "Most of them."),
             Parameter("before", {"type": "integer", "minimum": 1}, "Only jobs with numbers below."),
@@ -49,7 +50,7 @@ OPERATIONS = (
         "/frames/{job}",
         "A job's frame, made small",
         "image/jpeg",
-        {400: "A parameter is not as expected.", **_NO_JOB},
+        {400: _PARAMETER, **_NO_JOB},
         (_JOB, Parameter("width", {"type": "integer", "enum": list(WIDTHS_PX)}, "At most so wide, px.")),
     ),
     Operation("GET", "/jobs/{job}/drawing", "What is drawn over its frame", answers.Drawing, _NO_JOB, (_JOB,)),
@@ -62,7 +63,7 @@ OPERATIONS = (
         "/audit",
         "Who asked for what, newest first",
         answers.Notes,
-        {code: text for code, text in _ORDER.items() if code not in (409, 422)},
+        {400: _PARAMETER, **{code: text for code, text in _ORDER.items() if code not in (409, 422)}},
         (Parameter("limit", {"type": "integer", "minimum": 1, "maximum": MOST_NOTES, "default": 100}, "Most."),),
         token=True,
     ),

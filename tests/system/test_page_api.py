@@ -233,6 +233,8 @@ def test_nothing_can_be_uploaded(served: Served) -> None:
     [
         ({"recipe": -1}, "recipe"),
         ({"recipe": "1; DROP"}, "recipe"),
+        ({"recipe": True}, "recipe"),
+        ({"thickness_mm": "20"}, "thickness_mm"),
         ({"thickness_mm": 1e9}, "thickness_mm"),
         ({"x": 1}, "x"),
     ],
@@ -297,6 +299,32 @@ def test_the_openapi_document_tells_every_operation_and_no_other(served: Served)
             assert (reply.status, str(expected) in operation["responses"]) == (expected, True), (method, path)
             assert served.client.ask(method.upper(), concrete + "/x").status in (404, 415)
     assert told["paths"]["/api/v1/trigger"]["post"]["security"] == [{"token": []}]
+
+
+def test_every_error_is_told_by_the_openapi_document_and_has_its_form(served: Served) -> None:
+    told = served.client.get("/api/v1/openapi.json").json
+    form = set(told["components"]["schemas"]["Problem"]["properties"])
+    json_body = {"body": b"{}", "Content_Type": "application/json"}
+    tried: list[tuple[str, dict[str, Any], int]] = [
+        ("", {"Host": "evil.example"}, 421),
+        ("", {"Origin": "http://evil.example"}, 403),
+    ]
+    posted: list[tuple[str, dict[str, Any], int]] = [
+        ("", {"Content_Type": "text/plain"}, 415),
+        ("", {"body": b" " * 5000}, 413),
+        ("", {"body": b'{"recipe": true, "reason": 1, "x": 1}', "Authorization": f"Bearer {OTHER_TOKEN}"}, 422),
+    ]
+    asked = {"/api/v1/audit": "?limit=abc", "/api/v1/jobs": "?limit=0"}
+    for path, operations in told["paths"].items():
+        for method, operation in operations.items():
+            ways = tried + (posted if method == "post" else [])
+            if path in asked:
+                ways = [*ways, (asked[path], {"Authorization": f"Bearer {OTHER_TOKEN}"}, 400)]
+            for query, headers, status in ways:
+                sent = {**(json_body if method == "post" else {}), **headers}
+                reply = served.client.ask(method.upper(), path.replace("{job}", "1") + query, **sent)
+                assert (reply.status, str(status) in operation["responses"]) == (status, True), (method, path, headers)
+                assert reply.json.keys() == form
 
 
 def test_the_reasons_are_told_in_both_languages(served: Served) -> None:

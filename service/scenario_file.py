@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from drivers.controller.simulated_faults import FAULT_KINDS, TARGETS, FaultKind, Target
 from drivers.controller.simulated_faults import Fault as FaultRule
-from drivers.controller.simulated_scenario import EVENT_KINDS, EventKind, MachineSettings, Scenario
+from drivers.controller.simulated_scenario import EVENT_KINDS, KINDS_OF, EventKind, MachineSettings, Scenario
 from drivers.controller.simulated_scenario import Event as MachineEvent
 from service.config import Model
 from service.config_file import SCHEMA_DIALECT, ConfigError, line_of, read_yaml, seen_instead_of_keys
@@ -54,6 +54,9 @@ class Event(Model):
     def _some_time(self) -> Event:
         if not self.at_s and not self.every_s:
             raise ValueError(f"{self.do} never happens, expected at_s or every_s")
+        for key in sorted(self.model_fields_set & KINDS_OF.keys()):
+            if self.do not in KINDS_OF[key]:
+                raise ValueError(f"{key} is of do: {', '.join(KINDS_OF[key])}, seen with {self.do}")
         return self
 
 

@@ -60,8 +60,13 @@ class RetainedMemory:
             "undelivered": None if self.undelivered is None else self.undelivered.as_json(),
         }
         beside = self._path.with_name(self._path.name + ".new")
-        beside.write_text(json.dumps(content), encoding="utf-8")
-        os.replace(beside, self._path)
+        try:
+            beside.write_text(json.dumps(content), encoding="utf-8")
+            os.replace(beside, self._path)
+        except OSError as error:
+            raise ControllerError(
+                f"memory {self._path}: cannot be written: {error.strerror}. Name another file"
+            ) from error
 
     def _load(self, path: Path) -> None:
         try:
@@ -71,6 +76,8 @@ class RetainedMemory:
                 int(content[name]) for name in ("session", "last_job", "last_result")
             )
             self.undelivered = None if undelivered is None else AcceptedContour.from_json(undelivered)
+        except OSError as error:
+            raise ControllerError(f"memory {path}: cannot be read: {error.strerror}. Name another file") from error
         except (ValueError, TypeError, KeyError) as error:
             raise ControllerError(
                 f"{path} is no memory of a simulated controller ({error!r}). Delete it to start with lost memory"

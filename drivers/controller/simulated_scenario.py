@@ -41,6 +41,14 @@ EVENT_KINDS: dict[EventKind, str] = {
     "foreign-service": "for `for_s` another service writes the service block too: its `owner`, its heartbeat moving",
 }
 assert set(EVENT_KINDS) == set(get_args(EventKind))
+KINDS_OF: dict[str, tuple[EventKind, ...]] = {
+    "for_s": ("busy", "not-ready", "machine-fault", "slow-scan", "halt", "switch-off", "unplug", "foreign-service"),
+    **dict.fromkeys(("burst", "recipe", "thickness_mm", "force"), ("trigger",)),
+    **dict.fromkeys(("answer", "count"), ("refuse",)),
+    "scan_ms": ("slow-scan",),
+    **dict.fromkeys(("keep_registers", "keep_memory"), ("restart",)),
+}
+"""Which events a key says anything of; those that are not named here say something of all."""
 STATES = {"busy": 2, "not-ready": 0, "machine-fault": 3}
 JITTER = 0.2  # of every_s, so that what is periodic does not keep step with the client
 LOOK_S = 0.002
@@ -117,8 +125,11 @@ class Play:
         self._scenario = scenario
         self._chance = random.Random(scenario.seed)
         self._judge: Judge = controller.judge
+        self._usual_scan_s = controller.scan_s
         self._refusals: list[int] = []
         self._off = asyncio.Lock()
+        self._states: list[int] = []
+        self._scans_s: list[float] = []
         controller.judge = self._judged
 
     async def play_for_ever(self) -> None:
@@ -167,9 +178,11 @@ class Play:
         return self._refusals.pop(0) if verdict == Reply.ACCEPTED and self._refusals else verdict
 
     async def _in_state(self, state: int, seconds: float) -> None:
+        self._states.append(state)
         self._controller.set_state(state)
         await asyncio.sleep(seconds)
-        self._controller.set_state(1)
+        self._states.remove(state)  # spells may overlap, and end in another order than they began
+        self._controller.set_state(self._states[-1] if self._states else 1)
 
     async def _trigger(self, event: Event) -> None:
         for _ in range(event.burst):
@@ -182,9 +195,12 @@ class Play:
             await asyncio.sleep(self._controller.scan_s)
 
     async def _slow_scan(self, event: Event) -> None:
-        before, self._controller.scan_s = self._controller.scan_s, event.scan_ms / 1000
+        scan_s = event.scan_ms / 1000
+        self._scans_s.append(scan_s)
+        self._controller.scan_s = scan_s
         await asyncio.sleep(event.for_s)
-        self._controller.scan_s = before
+        self._scans_s.remove(scan_s)
+        self._controller.scan_s = self._scans_s[-1] if self._scans_s else self._usual_scan_s
 
     async def _halt(self, event: Event) -> None:
         self._controller.halt()

@@ -69,6 +69,8 @@ def test_what_stands_in_the_file_is_what_is_played(tmp_path: Path) -> None:
         ("events: [{do: trigger}]", "trigger never happens, expected at_s or every_s"),
         ("events: [{do: dance, every_s: 1}]", r"events\[0\].do: seen 'dance'"),
         ("events: [{do: refuse, every_s: 1, answer: 5}]", r"events\[0\].answer: seen 5"),
+        ("events: [{do: busy, every_s: 9, answer: 7}]", "answer is of do: refuse, seen with busy"),
+        ("events: [{do: restart, at_s: [1], for_s: 2}]", "for_s is of do: busy, .*, seen with restart"),
         ("machine: {scan_ms: 0}", "machine.scan_ms: seen 0"),
         ("machine: {clock: 1.5}", "machine.clock"),
         ("machine: {sessions: [0]}", r"machine.sessions\[0\]: seen 0"),

@@ -40,11 +40,11 @@ def test_a_service_keeps_the_protocol_while_commits_are_in_doubt(tmp_path: Path)
     assert told >= {"session", "event", "trigger", "acknowledged", "answer", "fault"}
 
 
-@pytest.mark.parametrize("option", ["--verdict", "--log", "--events"])
+@pytest.mark.parametrize("option", ["--verdict", "--log", "--events", "--memory"])
 def test_a_path_that_cannot_be_written_is_told_at_the_start(tmp_path: Path, option: str) -> None:
     done = simulate(option, tmp_path / "nowhere" / "file.json")
     assert done.returncode == 2
-    assert f"{option} {tmp_path}/nowhere/file.json: cannot be written" in done.stderr
+    assert f"{option.removeprefix('--')} {tmp_path}/nowhere/file.json: cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
 
 

@@ -73,6 +73,21 @@ async def test_a_spell_shows_in_the_state_and_passes(do: str, state: int) -> Non
         await until(lambda: controller.registers(0, 1) == (1,))
 
 
+async def test_the_end_of_one_spell_does_not_end_another_that_goes_on() -> None:
+    busy, fault = Event("busy", at_s=(0.0,), for_s=0.1), Event("machine-fault", at_s=(0.05,), for_s=60)
+    async with played(busy, fault, Event("trigger", at_s=(0.2,), force=True)) as controller:
+        await until(lambda: controller.registers(2, 1) == (1,))
+        assert controller.registers(0, 1) == (3,)
+
+
+async def test_scans_are_as_they_were_when_the_last_of_two_slow_spells_has_ended() -> None:
+    first = Event("slow-scan", at_s=(0.0,), for_s=0.1, scan_ms=20)
+    second = Event("slow-scan", at_s=(0.05,), for_s=0.1, scan_ms=30)
+    async with played(first, second, Event("trigger", at_s=(0.3,), force=True)) as controller:
+        await until(lambda: controller.registers(2, 1) == (1,))
+        assert controller.scan_s == 0.001
+
+
 @pytest.mark.parametrize("answer", [4, 7])
 async def test_the_operator_refuses_as_often_as_told(answer: int) -> None:
     event = Event("refuse", at_s=(0.0,), answer=answer, count=2)  # type: ignore[arg-type]

@@ -133,8 +133,8 @@ def _choices(quoted: str) -> str:
 def _shown(seen: Any) -> str:
     if isinstance(seen, dict):
         return "keys with values"
-    if isinstance(seen, models.TruthValue):
-        return str(seen)
+    if isinstance(seen, bool | models.TruthValue):
+        return str(models.TruthValue(seen) if isinstance(seen, bool) else seen)
     if isinstance(seen, date):
         return f"the date {seen}"
     text = "nothing" if seen is None else repr(seen)

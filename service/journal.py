@@ -27,6 +27,7 @@ from service.reasons import Outcome, Reason
 HEADER_REGISTERS = 31
 PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
 LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
+LARGEST_OWNER = 0xFFFF
 RESTORED = (
     "job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
     " withdraw_reason"
@@ -120,6 +121,8 @@ class Journal:
         self._begin = (above, otherwise_from)
         self._now = now
         self._lock = threading.Lock()
+        if path.exists() and not path.is_file():  # opening a pipe would wait for ever
+            raise JournalError(f"{path}: is no file, expected a journal or nothing. Name another journal.path.")
         with self._translated():
             path.parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
@@ -131,14 +134,18 @@ class Journal:
             raise
 
     def _prepare(self) -> None:
+        self._db.text_factory = _text
+        version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        if version == 0:
+            self._refuse_tables()
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = FULL")
         self._db.execute(f"PRAGMA journal_size_limit = {LARGEST_LOG_BYTES}")
         self._db.execute(f"PRAGMA cache_size = -{PAGE_CACHE_KIB}")
-        version = self._db.execute("PRAGMA user_version").fetchone()[0]
         if version == 0:
             self._db.executescript(
-                f"BEGIN IMMEDIATE; {TABLES} INSERT INTO meta VALUES ('owner', '{1 + secrets.randbelow(0xFFFF)}');"
+                f"BEGIN IMMEDIATE; {TABLES}"
+                f" INSERT INTO meta VALUES ('owner', '{1 + secrets.randbelow(LARGEST_OWNER)}');"
                 f" INSERT INTO meta VALUES ('above', '{self._begin[0]}'), ('otherwise_from', '{self._begin[1]}');"
                 f" PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;"
             )
@@ -146,7 +153,40 @@ class Journal:
             self._migrate(version)
         check = self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
         if check != "ok":
-            raise JournalDamaged(f"{self._path}: the journal is damaged ({check}). Move it away and start again.")
+            raise self._damaged(check)
+        self._look_through()
+
+    def _refuse_tables(self) -> None:
+        """Raise where a file without a version has tables: it is another program's, or has lost its version."""
+        tables = {str(row[0]) for row in self._db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        if {"meta", "jobs"} <= tables:
+            raise self._damaged("it has lost its version")
+        if tables:
+            names = ", ".join(sorted(tables)[:3])
+            raise JournalError(
+                f"{self._path}: a database of another program (tables {names}), expected a journal or nothing. "
+                "Name another journal.path."
+            )
+
+    def _look_through(self) -> None:
+        """Raise JournalDamaged where what the service goes on from cannot be read: SQLite looks at no content."""
+        try:
+            owner = self.owner
+            self.last_controller_trigger(), self.last_settled(), self.last_taken(), self.unsettled()
+        except (ValueError, TypeError) as error:
+            raise self._damaged("its notes of itself") from error
+        except JournalDamaged as error:
+            raise self._damaged(str(error)) from error
+        except JournalError as error:
+            cause = error.__cause__
+            if getattr(cause, "sqlite_errorcode", None) == sqlite3.SQLITE_ERROR:  # a table or column is missing
+                raise self._damaged(str(cause)) from cause
+            raise
+        if not 1 <= owner <= LARGEST_OWNER:
+            raise self._damaged(f"owner {owner}")
+
+    def _damaged(self, seen: str) -> JournalDamaged:
+        return JournalDamaged(f"{self._path}: the journal is damaged ({seen}). Move it away and start again.")
 
     def _migrate(self, version: int) -> None:
         """All steps from an earlier version, or none of them."""
@@ -168,7 +208,7 @@ class Journal:
         try:
             yield
         except sqlite3.OperationalError as error:
-            if error.sqlite_errorcode == sqlite3.SQLITE_FULL:
+            if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL:
                 raise JournalFull(
                     f"{self._path}: the disk is full. Free space; no trigger is taken until then."
                 ) from error
@@ -390,10 +430,24 @@ class Journal:
         return self._now().isoformat(timespec="milliseconds")
 
 
+def _text(stored: bytes) -> str:
+    """Text of the journal, also where its bytes were damaged: a job is more than its detail."""
+    return stored.decode("utf-8", "replace")
+
+
 def job_of(row: tuple[Any, ...]) -> Job:
-    """The job of a row that holds `COLUMNS`."""
+    """The job of a row that holds `COLUMNS`; raise JournalDamaged where it cannot be one."""
+    try:
+        return _job_of(row)
+    except (ValueError, TypeError) as error:
+        raise JournalDamaged(f"job {row[0]} in it cannot be read: {error}") from error
+
+
+def _job_of(row: tuple[Any, ...]) -> Job:
     job_id, taken_at, kind, recipe, thickness_um, trigger_session, counter, session, pages = row[:9]
     withdraw_reason, outcome, reason, detail, settled_at, report, settings, calibration, transfer = row[9:]
+    for moment in (taken_at, settled_at or taken_at):
+        datetime.fromisoformat(moment)
     return Job(
         job_id=job_id,
         taken_at=taken_at,
@@ -405,10 +459,17 @@ def job_of(row: tuple[Any, ...]) -> Job:
         reason=None if reason is None else Reason(reason),
         detail=detail,
         settled_at=settled_at,
-        report=json.loads(report or "{}"),
-        terms=None if settings is None else Terms(json.loads(settings), calibration),
-        transfer=json.loads(transfer or "{}"),
+        report=_fields(report),
+        terms=None if settings is None else Terms(_fields(settings), calibration),
+        transfer=_fields(transfer),
     )
+
+
+def _fields(text: str | None) -> dict[str, Any]:
+    found = json.loads(text or "{}")
+    if not isinstance(found, dict):
+        raise ValueError(f"{text!r} has no fields")
+    return found
 
 
 def pages_to_text(pages: tuple[Page, ...]) -> str:

@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from service.journal import Job, job_of
+from service.journal import Job, JournalDamaged, job_of
 from service.journal_schema import SCHEMA_VERSION, columns
 from service.reasons import Outcome, Reason
 
@@ -70,6 +70,7 @@ class JournalReader:
     def __init__(self, database: sqlite3.Connection, path: Path) -> None:
         self._database = database
         self._path = path
+        self.damaged: list[str] = []  # what is wrong with rows that were left out
         version = self._read("PRAGMA user_version")[0][0]
         if not 1 <= version <= SCHEMA_VERSION:
             raise JournalUnreadable(
@@ -83,12 +84,21 @@ class JournalReader:
         """The newest `limit` jobs of these, oldest first."""
         condition, values = wanted.condition()
         query = f"SELECT {self._columns} FROM jobs WHERE {condition} ORDER BY job_id DESC LIMIT ?"
-        return [job_of(row) for row in reversed(self._read(query, (*values, -1 if limit is None else limit)))]
+        found = []
+        for row in reversed(self._read(query, (*values, -1 if limit is None else limit))):
+            try:
+                found.append(job_of(row))
+            except JournalDamaged as error:
+                self.damaged.append(str(error))
+        return found
 
     def find(self, job_id: int) -> Job | None:
         """The job, or None."""
         rows = self._read(f"SELECT {self._columns} FROM jobs WHERE job_id = ?", (job_id,))
-        return job_of(rows[0]) if rows else None
+        try:
+            return job_of(rows[0]) if rows else None
+        except JournalDamaged as error:
+            raise JournalUnreadable(f"{self._path}: {error}") from error
 
     def notes(self, limit: int) -> list[Note]:
         """The newest `limit` notes of who asked for what, newest first; none in journals of before version 3."""
@@ -107,7 +117,9 @@ class JournalReader:
 @contextmanager
 def reading(path: Path) -> Iterator[JournalReader]:
     """The journal, open for reading; raise JournalUnreadable."""
-    if not path.exists():
+    if path.exists() and not path.is_file():
+        raise JournalUnreadable(f"{path}: is no file. Check journal.path")
+    if not path.exists() or not path.stat().st_size:
         raise JournalUnreadable(f"{path}: there is no journal yet. Check journal.path, or run the daemon first")
     database = _connected(path)
     try:
@@ -130,4 +142,5 @@ def _connected(path: Path) -> sqlite3.Connection:
             database = sqlite3.connect(f"{name}?mode=ro&immutable=1", uri=True)
     except sqlite3.Error as error:
         raise JournalUnreadable(f"{path}: cannot be opened: {error}. Check its permissions") from error
+    database.text_factory = lambda stored: stored.decode("utf-8", "replace")
     return database

@@ -12,8 +12,10 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from service.journal import LARGEST_JOB, RESTORED, UNSETTLED, Journal, JournalDamaged, JournalError
+from service.reasons import Reason
 
 log = logging.getLogger("combtrace.journal")
 
@@ -125,15 +127,28 @@ def _restore(kept: Path, journal: Journal) -> str:
             rows = old.execute(f"SELECT {RESTORED} FROM jobs WHERE {UNSETTLED}").fetchall()
             pairs = "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL"
             pair = old.execute(f"{pairs} ORDER BY job_id DESC LIMIT 1").fetchone() or (0, 0)
-        journal.restore(rows, pair)
+        journal.restore([_sound(row) for row in rows], pair)
     except (sqlite3.Error, JournalError) as error:
         log.info("%s: %s", kept, error)
         return "Which jobs had not ended cannot be read in it: look them up at the controller. "
     return f"Jobs in it that had not ended: {', '.join(str(row[0]) for row in rows) or 'none'}. "
 
 
+def _sound(row: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Columns as in RESTORED, with what no job can hold put right: this job is to be settled, not to be understood."""
+    *columns, pages, withdraw_reason = row
+    known = withdraw_reason is None or withdraw_reason in set(Reason)
+    try:
+        datetime.fromisoformat(str(columns[1]))
+    except ValueError:
+        columns[1] = datetime.fromtimestamp(0, UTC).isoformat(timespec="milliseconds")
+    return (*columns, pages, withdraw_reason if known else int(Reason.SERVICE_RESTARTED))
+
+
 def _reading(path: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
+    database = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
+    database.text_factory = lambda stored: stored.decode("utf-8", "replace")
+    return database
 
 
 def highest_archived(archive: Path) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import pwd
 import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
@@ -43,21 +44,30 @@ def _folders(config: Config) -> Iterator[Finding]:
     for part, (key, folder) in wanted.items():
         why = _not_writable(folder)
         if why:
-            yield fault(part, f"{folder}: {why}", f"Give it to the service's user, or set {key}")
+            yield fault(part, f"{folder}: {why[0]}", f"{why[1]}, or set {key}")
         else:
             yield ok(part, f"{folder}" + ("" if folder.exists() else ": not there yet, the service makes it"))
 
 
-def _not_writable(folder: Path) -> str | None:
-    """Why this user cannot write below the folder, or below the nearest one there is; None where he can."""
+def _not_writable(folder: Path) -> tuple[str, str] | None:
+    """Why this user cannot write in the folder, or in the nearest one above it, and what to do; None where he can."""
     there = folder
     while not there.exists() and there != there.parent:
         there = there.parent
     if not there.is_dir():
-        return f"{there} is no folder"
-    if not os.access(there, os.W_OK | os.X_OK):
-        return f"user {os.getuid()} may not write in {there}"
-    return None
+        return f"{there} is no folder", "Move it away"
+    if os.access(there, os.W_OK | os.X_OK):
+        return None
+    if os.statvfs(there).f_flag & os.ST_RDONLY:
+        return f"the disk of {there} is mounted read-only", "Look at `dmesg` and `mount`; a dying disk is mounted so"
+    return f"user {_user()} may not write in {there}", "Give the folder to the service's user"
+
+
+def _user() -> str:
+    try:
+        return pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return str(os.getuid())
 
 
 def _journal(config: Config, running: bool) -> tuple[Finding, Job | None]:
@@ -65,21 +75,25 @@ def _journal(config: Config, running: bool) -> tuple[Finding, Job | None]:
     if not path.exists():
         why = _not_writable(path.parent)
         if why:
-            return fault(
-                "journal", f"{path}: {why}", "Give the folder to the service's user, or set journal.path"
-            ), None
+            return fault("journal", f"{path}: {why[0]}", f"{why[1]}, or set journal.path"), None
         return ok("journal", f"{path}: no job yet"), None
     if not os.access(path, os.W_OK):
         next_step = "Give the file to the service's user, or set journal.path"
-        return fault("journal", f"{path}: user {os.getuid()} may not write it", next_step), None
+        return fault("journal", f"{path}: user {_user()} may not write it", next_step), None
     try:
         with reading(path) as reader:
             jobs = reader.jobs(JobFilter(), _LOOKED_AT)
+            damaged = reader.damaged
     except JournalUnreadable as error:
         next_step = "" if running else "A damaged journal is moved aside at the service's next start"
         return fault("journal", str(error), next_step), None
     ended = [job for job in jobs if job.outcome is not None]
     text = f"{path}: last job {ended[-1].job_id} {ended[-1].outcome}" if ended else f"{path}: no job yet"
+    if damaged:
+        next_step = "Copy the file, and look at its disk. If it cannot be gone on from, the next start moves it aside"
+        return warning("journal", f"{path}: {len(damaged)} damaged: {damaged[-1]}", next_step), jobs[
+            -1
+        ] if jobs else None
     open_ = len(jobs) - len(ended)
     return ok("journal", text + (f", {open_} in flight" if open_ else "")), jobs[-1] if jobs else None
 

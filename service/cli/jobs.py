@@ -56,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
                 found = [job]
             else:
                 found = journal.jobs(filter_of(args), args.limit or None)
+            for text in journal.damaged:
+                print(f"left out: {text}", file=sys.stderr)
     except JournalUnreadable as error:
         raise UserError(str(error)) from error
     if args.json:

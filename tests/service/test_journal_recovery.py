@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from drivers.controller.mailbox import Page
 from service.journal import Journal, JournalDamaged, JournalError, TriggerStamp
+from service.journal_reader import JobFilter, JournalUnreadable, reading
 from service.journal_recovery import _move_aside, highest_archived, highest_job, open_journal, set_aside
 from service.reasons import Outcome
 
@@ -191,6 +192,91 @@ def test_the_last_trigger_is_not_taken_again_after_a_journal_was_brought_over(tm
     assert journal.last_controller_trigger() == (9, 5)
     assert [job.job_id for job in journal.unsettled()] == [61]
     journal.close()
+
+
+def changed(path: Path, *statements: str) -> None:
+    database = sqlite3.connect(path)
+    for statement in statements:
+        database.execute(statement)
+    database.commit()
+    database.close()
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        "UPDATE jobs SET reason = 999 WHERE job_id = 3",
+        "UPDATE jobs SET report = '{broken' WHERE job_id = 3",
+        "UPDATE jobs SET report = '[1]' WHERE job_id = 3",
+        "UPDATE jobs SET settled_at = 'yesterday' WHERE job_id = 3",
+        "UPDATE jobs SET withdraw_reason = 5 WHERE job_id = 4",
+        "UPDATE jobs SET taken_at = 'yesterday' WHERE job_id = 4",
+        "ALTER TABLE jobs DROP COLUMN transfer",
+        "DELETE FROM meta",
+        "UPDATE meta SET value = 'nobody' WHERE key = 'owner'",
+        "UPDATE meta SET value = '99999999' WHERE key = 'owner'",
+        "PRAGMA user_version = 0",
+    ],
+)
+def test_content_that_no_journal_can_hold_is_damage_though_the_database_is_sound(
+    tmp_path: Path, damage: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 3)
+    changed(path, damage)
+    journal = reopened(path)
+    assert [(job.job_id, job.pages, job.session) for job in journal.unsettled()] == [(4, (PAGE,), 9)]
+    assert journal.last_controller_trigger() == (9, 5)
+    assert journal.take(TriggerStamp("serial")).job_id == 5
+    journal.close()
+    assert len(set_aside(path)) == 1
+    assert any(record.levelno == logging.CRITICAL and "is damaged (" in record.message for record in caplog.records)
+
+
+def test_a_detail_that_is_no_text_any_more_is_no_reason_to_begin_anew(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 3)
+    changed(path, "UPDATE jobs SET detail = CAST(x'e4' AS TEXT) WHERE job_id = 3")
+    journal = reopened(path)
+    last = journal.last_settled()
+    assert last is not None
+    assert last.detail == "�"
+    journal.close()
+    assert set_aside(path) == []
+
+
+def test_a_damaged_row_of_long_ago_is_left_out_of_lists_and_told(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    filled(path, 3)
+    changed(path, "UPDATE jobs SET reason = 999 WHERE job_id = 2")
+    reopened(path).close()
+    assert set_aside(path) == []
+    with reading(path) as reader:
+        assert [job.job_id for job in reader.jobs(JobFilter())] == [1, 3, 4]
+        assert reader.damaged == ["job 2 in it cannot be read: 999 is not a valid Reason"]
+        with pytest.raises(JournalUnreadable, match="job 2 in it cannot be read"):
+            reader.find(2)
+
+
+@pytest.mark.parametrize("table", ["customers", "jobs"])
+def test_another_programs_database_is_refused_and_stays_as_it_is(tmp_path: Path, table: str) -> None:
+    path = tmp_path / "journal.sqlite"
+    changed(path, f"CREATE TABLE {table} (name)", f"INSERT INTO {table} VALUES ('kept')")
+    before = path.read_bytes()
+    with pytest.raises(JournalError, match=rf"a database of another program \(tables {table}\)"):
+        reopened(path)
+    assert path.read_bytes() == before
+    assert set_aside(path) == []
+
+
+def test_a_pipe_or_folder_is_no_journal_and_holds_nobody_up(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "folder").mkdir()
+    for name in ("pipe", "folder"):
+        with pytest.raises(JournalError, match="is no file"):
+            reopened(tmp_path / name)
+        with pytest.raises(JournalUnreadable, match="is no file"), reading(tmp_path / name):
+            pass
 
 
 def test_a_damaged_journal_without_any_number_begins_at_the_unix_time(tmp_path: Path) -> None:

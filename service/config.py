@@ -601,6 +601,8 @@ class Config(Model):
             ports.append(self.controller.port)
         if len(set(ports)) != len(ports):
             raise ValueError("a serial port is named more than once")
+        if self.page is not None and self.metrics is not None and self.page.port == self.metrics.port:
+            raise ValueError(f"page.port and metrics.port are both {self.page.port}. Give each its own")
         return self
 
     @field_validator("work_area_mm")

@@ -68,6 +68,7 @@ def _findings(args: argparse.Namespace) -> Iterator[Finding]:
         return
     from service.checkup.devices import check_devices
     from service.checkup.files import check_files, summary
+    from service.checkup.listening import check_listening
     from service.checkup.running import running_service
     from service.checkup.storage import check_storage
 
@@ -75,6 +76,7 @@ def _findings(args: argparse.Namespace) -> Iterator[Finding]:
     running = running_service(config)
     yield ok("service", "does not run" if running is None else f"runs as process {running}")
     yield from check_files(config)
+    yield from check_listening(config, running)
     if not args.no_devices:
         yield from check_devices(config, running)
     yield from check_storage(config, running=running is not None)

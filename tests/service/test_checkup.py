@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import shutil
+import socket
 import subprocess
 import sys
 from datetime import UTC, datetime, timedelta
@@ -15,6 +17,7 @@ import pytest
 from service.checkup.devices import check_devices
 from service.checkup.files import check_files
 from service.checkup.finding import Finding, Level
+from service.checkup.listening import check_listening
 from service.checkup.page import check_page
 from service.checkup.running import holder
 from service.checkup.storage import check_storage
@@ -207,6 +210,29 @@ def test_exports_that_no_job_could_make_are_told_by_the_check(tmp_path: Path, gc
 
 def test_without_exports_there_is_nothing_to_say_of_them(tmp_path: Path) -> None:
     assert not [one for one in check_files(config(tmp_path)) if one.part == "exports"]
+
+
+# --- what listens -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("part", ["metrics", "page"])
+def test_a_port_that_another_program_has_is_a_fault_unless_the_service_runs(tmp_path: Path, part: str) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        settings = config(tmp_path, more=f"{part}: {{port: {port}}}\n")
+        (found,) = check_listening(settings, None)
+        assert (found.part, found.level) == (part, Level.FAULT)
+        assert f"127.0.0.1:{port} cannot be listened on: Address already in use" in found.text
+        assert all(one.level is Level.OK for one in check_listening(settings, 7))
+    assert all(one.level is Level.OK for one in check_listening(settings, None))
+
+
+def test_metrics_without_their_package_are_a_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    (found,) = check_listening(config(tmp_path, more="metrics: {}\n"), None)
+    assert (found.level, found.text) == (Level.FAULT, "prometheus_client is not installed")
 
 
 # --- the operator's page ------------------------------------------------------------------------------------------

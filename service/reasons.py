@@ -107,8 +107,10 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
             "Clean the lens, check focus, exposure and lamp; after a lasting change of light teach the table again.",
         ),
         Explanation(
-            "Снимок нерезкий, слишком тёмный, засвеченный или малоконтрастный, либо свет не тот, что при обучении.",
-            "Протрите объектив, проверьте фокус, выдержку и лампу; если свет изменили навсегда, обучите стол заново.",
+            "Снимок нерезкий, слишком тёмный, засвеченный или малоконтрастный, либо свет не тот, при котором снимали "
+            "пустой стол.",
+            "Протрите объектив, проверьте фокус, выдержку и лампу; если свет изменили насовсем, снимите пустой стол "
+            "заново (teach-table).",
         ),
     ),
     Reason.SCENE_MOVED: (
@@ -117,8 +119,10 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
             "Keep hands away and trigger again; if camera or table were moved, calibrate and teach the table again.",
         ),
         Explanation(
-            "Картина сместилась: во время измерения или после обучения сдвинули камеру либо стол.",
-            "Уберите руки и запустите снова; если сдвинули камеру или стол, откалибруйте и обучите стол заново.",
+            "Снимок сместился: что-то двигалось во время измерения, либо камеру или стол сдвинули после того, как "
+            "снимали пустой стол.",
+            "Уберите руки и запустите измерение снова; если сдвинули камеру или стол, откалибруйте камеру и снимите "
+            "пустой стол заново (teach-table).",
         ),
     ),
     Reason.NO_BLOCK_FOUND: (
@@ -135,7 +139,7 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
             "Move the block to the middle of the camera's view.",
         ),
         Explanation(
-            "Контур заготовки доходит до края снимка или рабочей области кадра.",
+            "Контур заготовки доходит до края снимка или заданной области кадра.",
             "Сдвиньте заготовку к середине поля зрения камеры.",
         ),
     ),
@@ -154,7 +158,7 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
             "Remove what lies against the block, check light and table, and look at the overlay.",
         ),
         Explanation(
-            "Независимая оценка контура слишком отличается.",
+            "Контур слишком расходится с независимой оценкой.",
             "Уберите посторонние предметы у заготовки, проверьте свет и стол, посмотрите контур на снимке.",
         ),
     ),
@@ -173,12 +177,12 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
         ),
         Explanation(
             "На столе больше одной заготовки.",
-            "Оставьте на столе одну заготовку или выберите рецепт с pieces: largest.",
+            "Оставьте на столе одну заготовку или выберите рецепт, который берёт наибольшую (pieces: largest).",
         ),
     ),
     Reason.BUSY: (
         Explanation("A job is being executed.", "Wait for it to end and trigger again."),
-        Explanation("Выполняется другое задание.", "Дождитесь его конца и запустите измерение снова."),
+        Explanation("Выполняется другое задание.", "Дождитесь его завершения и запустите измерение снова."),
     ),
     Reason.NOT_READY: (
         Explanation("The service or the controller is not ready.", "See the service's state and its reason."),
@@ -279,9 +283,7 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
     ),
     Reason.ABORTED: (
         Explanation("The job was ended by a halt or shutdown.", "Trigger again when the service is Ready."),
-        Explanation(
-            "Задание прервано остановкой службы.", "Запустите измерение, когда служба будет в состоянии Ready."
-        ),
+        Explanation("Задание прервано остановкой службы.", "Запустите измерение снова, когда служба будет готова."),
     ),
     Reason.INTERNAL_ERROR: (
         Explanation("The service met an error of its own.", "Keep the log and the picture, and report them."),

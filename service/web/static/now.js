@@ -13,6 +13,7 @@ let state = null;
 let heardAt = null;
 let isLost = false;
 let reasons = new Map();
+let byReason = { refused: [], failed: [] };
 
 export async function loadReasons() {
   const told = await get("/reasons");
@@ -76,17 +77,30 @@ function put(kind, word, line) {
 
 function counters() {
   const counts = { accepted: 0, refused: 0, failed: 0 };
-  const lines = { accepted: [], refused: [], failed: [] };
+  byReason = { accepted: [], refused: [], failed: [] };
   for (const { outcome, reason, count } of state.outcomes) {
     const name = outcome === "written" ? "accepted" : outcome;
     counts[name] += count;
-    if (reason) lines[name].push(`${reason}: ${count}`);
+    if (reason) byReason[name].push([sentenceOf(reason), number(count)]);
   }
   for (const name of Object.keys(counts)) {
     say(`count-${name}`, number(counts[name]));
-    at(`count-${name}`).title = lines[name].join("\n");
+    at(`count-${name}`).title = byReason[name].map((line) => line.join(" ")).join("\n");
   }
   say("count-missed", number(state.missed_triggers));
+}
+
+function sentenceOf(name) {
+  const entry = [...reasons.values()].find((one) => one.name === name);
+  return entry?.[chosen()]?.sentence ?? name;
+}
+
+/** What a counter counts, by reason: a finger cannot point at it without a touch. */
+function showCounts(name) {
+  say("counts-title", words(name));
+  const rows = byReason[name].flatMap(([sentence, count]) => [make("dt", {}, count), make("dd", {}, sentence)]);
+  at("counts").replaceChildren(...(rows.length ? rows : [make("dd", {}, words("no_jobs"))]));
+  at("counts-dialog").showModal();
 }
 
 function whys() {
@@ -134,4 +148,5 @@ function line(key, well, text) {
   return make("li", {}, mark, make("span", { class: "what" }, words(key)), make("span", {}, text));
 }
 
+for (const name of ["refused", "failed"]) at(`count-${name}`).addEventListener("click", () => showCounts(name));
 onLanguage(refresh);

@@ -3,10 +3,11 @@
 import { at, make, say } from "./dom.js";
 import { onLanguage, words } from "./words.js";
 import { Refused, hasToken, order, remember } from "./service.js";
-import { current, reasonOf } from "./now.js";
+import { reasonOf } from "./now.js";
 
 let recipes = "";
 let pending = null;
+let heard = null;
 let told = () => "";
 let isUnderWay = false; // an order that is not answered yet
 let measured = null; // the job that was ordered here, as long as it runs
@@ -15,6 +16,7 @@ const REFUSALS = { 401: "wrong_token", 403: "no_orders", 409: "not_now", 429: "t
 
 /** Follow the state: which orders make sense now. */
 export function show(state) {
+  heard = state;
   at("halt").hidden = state.state === "Halted";
   at("resume").hidden = state.state !== "Halted";
   if (measured !== null && state.settled_job >= measured) ended(state.last_job);
@@ -96,6 +98,5 @@ at("token-dialog").querySelector("form").addEventListener("submit", () => {
 });
 onLanguage(() => {
   say("told", told());
-  const state = current();
-  if (state) show(state);
+  if (heard) show(heard);
 });

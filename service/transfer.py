@@ -237,7 +237,7 @@ class Transfer:
                 await asyncio.sleep(self._settings.poll_period_s)  # its state may say ready all the while
             else:
                 if answer is Answer.ACCEPTED:
-                    self._told("answer 1 accepted, but last_job is another: it must be written before ack_transfer")
+                    self._told(self._unconfirmed("answer 1 accepted"))
                 page = 0 if answer is Answer.PAGE_MISSING else page
                 in_vain += 1
         reason = Reason.CONTROLLER_TIMEOUT if self._now() < self._expires_at_s else Reason.EXPIRED
@@ -344,10 +344,22 @@ class Transfer:
             if self._too_old():  # without a clock of the controller's, taking it back is all that keeps it from use
                 return None
             if self._now() >= give_up_at:
-                self._told(f"no answer within {self._settings.ack_timeout_s:g} s")
+                self._told(self._unanswered(view, transfer))
                 return None
             await asyncio.sleep(pause)
             pause = min(2 * pause, self._settings.poll_period_s)
+
+    def _unanswered(self, view: LinkBlock, transfer: int) -> str:
+        """Why no answer within ack_timeout counts: there was none, or one that says nothing of this job."""
+        if view.session != self._session or view.ack_transfer != transfer:
+            return f"no answer within {self._settings.ack_timeout_s:g} s"
+        answer = f"answer {view.ack_result} {_answer_name(view.ack_result)}"
+        if _as_answer(view.ack_result) is None:
+            return f"{answer}, which the protocol does not know"
+        return self._unconfirmed(answer)
+
+    def _unconfirmed(self, answer: str) -> str:
+        return f"{answer}, but last_job is not {self._job_id}: it must be written before ack_transfer"
 
     async def _reconnected(self) -> bool:
         """Wait for a new connection, at most until the job expires; a withdrawal waits for ever."""

@@ -160,7 +160,7 @@ RULES = (
     Rule(
         "Transfer 7: last_job alone settles, an acknowledgement does not",
         f"{TRANSFER}::Transfer._answer",
-        f"{IN_TRANSFER}::test_an_acceptance_that_last_job_does_not_confirm_is_none_and_no_defect",
+        f"{IN_TRANSFER}::test_an_answer_that_last_job_does_not_confirm_is_none_and_told_as_what_it_is",
         "if answer in CAN_BE_REPEATED or answer",
         "if answer is Answer.ACCEPTED:\n"
         "                    raise _Ended(Settlement(Outcome.ACCEPTED))\n"

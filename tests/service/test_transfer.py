@@ -321,12 +321,24 @@ async def test_without_handshake_repeats_carry_the_same_transfer_value() -> None
     assert len(set(values)) == 1
 
 
-async def test_an_acceptance_that_last_job_does_not_confirm_is_none_and_no_defect() -> None:
+@pytest.mark.parametrize(
+    ("result", "said"),
+    [
+        (1, "answer 1 accepted, but last_job is not 7"),
+        (7, "answer 7 operator_refused, but last_job is not 7"),
+        (99, "answer 99 unknown, which the protocol does not know"),
+        (None, "no answer within 0.1 s"),
+    ],
+)
+async def test_an_answer_that_last_job_does_not_confirm_is_none_and_told_as_what_it_is(
+    result: int | None, said: str
+) -> None:
     controller = ScriptedController([None])
 
     def acknowledge_only() -> None:
         if controller.count("commit") <= 3:
-            controller.link = replace(controller.link, ack_transfer=controller.transfer, ack_result=1)
+            if result is not None:
+                controller.link = replace(controller.link, ack_transfer=controller.transfer, ack_result=result)
         else:
             controller.answers = [Answer.WITHDRAWN]
 
@@ -334,7 +346,7 @@ async def test_an_acceptance_that_last_job_does_not_confirm_is_none_and_no_defec
     async with transferring(controller) as run:
         settlement = await run.end()
     assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.CONTROLLER_TIMEOUT)
-    assert "last_job" in (settlement.detail or "")
+    assert said in (settlement.detail or "")
 
 
 async def test_a_controller_that_says_ready_and_answers_not_ready_is_not_flooded() -> None:

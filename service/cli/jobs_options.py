@@ -70,7 +70,10 @@ def _moment(text: str) -> datetime:
     """A time, or a span before now."""
     ago = AGO.fullmatch(text)
     if ago:
-        return datetime.now(UTC) - timedelta(**{UNITS[ago[2]]: float(ago[1])})
+        try:
+            return datetime.now(UTC) - timedelta(**{UNITS[ago[2]]: float(ago[1])})
+        except OverflowError:  # before all time, so all of it
+            return datetime.min.replace(tzinfo=UTC)
     try:
         return datetime.fromisoformat(text).astimezone()  # without a zone it is this computer's
     except ValueError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import json
 import shutil
 import sys
@@ -12,7 +13,7 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
-from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
+from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.jobs import local
 from service.cli.jobs_options import add_config_argument, add_filter_arguments, config_of, filter_of, job_number
 
@@ -31,10 +32,11 @@ Settings: recipe.KEY, recipe.parameters.KEY, calibration.file,
 calibration.max_age_days, .sentinel_tolerance_px, .sentinels_required.
 
 Exit status: 0 all came out as they were (with --set: done), 3 something did not,
-2 nothing to replay, or wrong usage."""
+2 nothing to replay, a job named that cannot be, or wrong usage."""
 
 LIMITS = ("max_age_days", "sentinel_tolerance_px", "sentinels_required")
 BAR = 30
+SHOWN_JOBS = 5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,25 +60,35 @@ def run(args: argparse.Namespace) -> int:
     config = config_of(args)
     numbers = _numbers(args, config)
     done: list[Replayed] = []
-    left_out: list[str] = []
+    left_out: dict[str, list[int]] = {}
     for job_id in _with_bar(numbers):
         try:
             done.append(replay(load_archived(config.archive.path, job_id), settings))
         except EvidenceError as error:
-            left_out.append(str(error))
+            left_out.setdefault(str(error).removeprefix(f"job {job_id}: "), []).append(job_id)
             continue
         if args.json:
             print(json.dumps(_fields(done[-1]), ensure_ascii=False), flush=True)
     if not done:
-        raise UserError("; ".join(left_out[:3]) or "no jobs: nothing was taken then, or nothing of it ended so")
+        raise UserError("; ".join(_left_out(left_out)) or "no jobs: nothing was taken then, or nothing of it ended so")
     if not args.json:
         _tell(done, settings)
-    for text in left_out if args.numbers else left_out[:3]:
+    for text in _left_out(left_out):
         print(f"left out: {text}", file=sys.stderr)
-    if len(left_out) > 3 and not args.numbers:
-        print(f"left out: {len(left_out) - 3} more", file=sys.stderr)
+    if left_out and args.numbers:
+        return EXIT_UNUSABLE
     same = all(one.identical for one in done)
     return EXIT_OK if same or not settings.as_archived else EXIT_REFUSED
+
+
+def _left_out(reasons: dict[str, list[int]]) -> list[str]:
+    """Why jobs were left out, each reason once with the jobs it holds for."""
+    told = []
+    for text, numbers in reasons.items():
+        jobs = ", ".join(map(str, numbers[:SHOWN_JOBS]))
+        more = f" and {len(numbers) - SHOWN_JOBS} more" if len(numbers) > SHOWN_JOBS else ""
+        told.append(f"job{'s' * (len(numbers) > 1)} {jobs}{more}: {text}")
+    return told
 
 
 def settings_of(changes: list[str]) -> Settings:
@@ -99,13 +111,30 @@ def settings_of(changes: list[str]) -> Settings:
         known = name in Recipe.model_fields or name.startswith("parameters.")
         if equals and part == "recipe" and known and name not in ("number", "name"):
             recipe[name] = value
-        elif equals and part == "calibration" and name in LIMITS and isinstance(value, int | float):
+        elif equals and part == "calibration" and name in LIMITS:
             limits[name] = value
         elif equals and key == "calibration.file" and text:
             calibration = Path(text)
         else:
-            raise UserError(f"--set {change}: expected recipe.KEY=VALUE or calibration.KEY=VALUE, see --help")
+            known_keys = [f"recipe.{key}" for key in Recipe.model_fields] + [f"calibration.{key}" for key in LIMITS]
+            near = difflib.get_close_matches(key, known_keys, n=1)
+            hint = f"did you mean {near[0]}?" if near else "see --help"
+            raise UserError(f"--set {change}: expected recipe.KEY=VALUE or calibration.KEY=VALUE; {hint}")
+    _check_limits(limits)
     return Settings(recipe, limits, calibration)
+
+
+def _check_limits(limits: dict[str, Any]) -> None:
+    """Raise UserError where the configuration could not say so either."""
+    from pydantic import ValidationError
+
+    from service.config import Calibration
+    from service.config_mistakes import describe
+
+    try:
+        Calibration.model_validate({"file": "of the archive", **limits})
+    except ValidationError as error:
+        raise UserError("; ".join(f"--set calibration.{line}" for line in describe(error, Calibration))) from error
 
 
 def _numbers(args: argparse.Namespace, config: Config) -> list[int]:
@@ -117,6 +146,8 @@ def _numbers(args: argparse.Namespace, config: Config) -> list[int]:
         if args.since or args.outcome or args.reason:
             raise UserError("job numbers and --since, --outcome or --reason exclude each other")
         return list(args.numbers)
+    if args.limit < 0:
+        raise UserError(f"--limit {args.limit}: expected 0 or more")
     if not (args.since or args.outcome or args.reason or args.limit):
         raise UserError("which jobs? Give numbers, or --since, --outcome, --reason, --limit")
     try:

@@ -64,6 +64,10 @@ def test_jobs_are_listed_and_filtered_while_the_daemon_runs(cell: Cell) -> None:
     assert run(cell, "jobs", "--since", "2999-01-01").stderr.strip() == "no such jobs"
 
 
+def test_a_span_beyond_all_time_is_all_of_it(cell: Cell) -> None:
+    assert run(cell, "jobs", "--since", "999999w", "--limit", "0").stdout == run(cell, "jobs", "--limit", "0").stdout
+
+
 def test_one_job_is_shown_with_its_evidence_and_what_to_do(cell: Cell) -> None:
     shown = run(cell, "jobs", "show", "5")
     assert shown.returncode == 0, shown.stderr
@@ -127,7 +131,18 @@ def test_a_frame_that_was_changed_since_is_not_replayed(cell: Cell, tmp_path: Pa
     [
         (("replay",), "which jobs?"),
         (("replay", "1", "--set", "recipe.colour=red"), "expected recipe.KEY=VALUE"),
-        (("replay", "1", "--set", "recipe.tolerance_mm=-1"), "recipe.tolerance_mm"),
+        (("replay", "1", "--set", "recipe.tolerance=1"), "did you mean recipe.tolerance_mm?"),
+        (
+            ("replay", "1", "2", "--set", "recipe.tolerance_mm=-1"),
+            "replay: jobs 1, 2: recipe.tolerance_mm: seen -1, exp",
+        ),
+        (
+            ("replay", "1", "--set", "calibration.max_age_days=.nan"),
+            "calibration.max_age_days: seen nan, expected a fin",
+        ),
+        (("replay", "1", "--set", "calibration.sentinels_required=2"), "seen 2, expected true or false"),
+        (("replay", "1", "4000000000"), "left out: job 4000000000: "),
+        (("replay", "--limit", "-1"), "expected 0 or more"),
         (("replay", "1", "--set", "recipe.number=2"), "expected recipe.KEY=VALUE"),
         (("replay", "../1"), "is no job number"),
         (("jobs", "show"), "which job?"),

@@ -309,11 +309,19 @@ def test_a_wrong_token_is_told_and_a_right_one_measures_halts_and_resumes(panel:
     page.locator("#halt").click()
     settled_state(panel, "halted")
     expect(page.locator("#whys")).to_contain_text("anna from 127.0.0.1")
+    expect(page.locator("#whys strong")).to_have_text("Somebody halted it.")
+    expect(page.locator("#resume")).to_be_focused()
     expect(page.locator("#told")).to_have_text("Halted. Nothing is measured until you resume.")
     page.locator("#trigger").click()
     expect(page.locator("#told")).to_contain_text(Reason.NOT_READY.explained().sentence)
     page.locator("#resume").click()
     settled_state(panel, "ready")
+    page.locator("#halt").click()
+    expect(page.locator("#told")).to_have_text("Halted. Nothing is measured until you resume.")
+    settled_state(panel, "halted")
+    assert panel.client.order("/api/v1/resume").status == 200  # by somebody else
+    settled_state(panel, "ready")
+    expect(page.locator("#told")).to_have_text("")
     stored = page.evaluate("[document.cookie, JSON.stringify(localStorage), JSON.stringify(sessionStorage)].join()")
     assert TOKEN not in stored
 

@@ -106,8 +106,8 @@ function showCounts(name) {
 function whys() {
   const entries = Object.entries(state.faults).map(([part, fault]) => why(reasonOf(fault.code), `${part}: ${fault.text}`));
   const faults = entries.length;
-  if (state.state === "Halted" && !faults) entries.push(why(null, state.reason));
-  if (!faults && state.state === "Ready" && state.link?.not_ready) entries.push(why(null, state.link.not_ready));
+  if (state.state === "Halted" && !faults) entries.push(why({ sentence: words("halted_why"), next_action: words("halted_do") }, state.reason));
+  if (!faults && state.state === "Ready" && state.link?.not_ready) entries.push(why({ sentence: words("waiting_why"), next_action: words("waiting_do") }, state.link.not_ready));
   for (const [part, text] of Object.entries(state.warnings)) entries.push(why({ sentence: words("warning"), next_action: "" }, `${part}: ${text}`));
   const list = at("whys");
   if (list.textContent !== entries.map((entry) => entry.textContent).join("")) list.replaceChildren(...entries);
@@ -116,8 +116,7 @@ function whys() {
 }
 
 function why(told, text) {
-  const head = told ? [make("strong", {}, told.sentence), " ", told.next_action] : [];
-  return make("li", {}, ...head, make("small", {}, text ?? ""));
+  return make("li", {}, make("strong", {}, told?.sentence ?? ""), " ", told?.next_action ?? "", make("small", {}, text ?? ""));
 }
 
 function glance() {

@@ -10,15 +10,21 @@ let pending = null;
 let heard = null;
 let told = () => "";
 let isUnderWay = false; // an order that is not answered yet
+let isHaltTold = false;
 let measured = null; // the job that was ordered here, as long as it runs
 
 const REFUSALS = { 401: "wrong_token", 403: "no_orders", 409: "not_now", 429: "too_often", 503: "cannot" };
 
 /** Follow the state: which orders make sense now. */
 export function show(state) {
+  const isHalted = state.state === "Halted";
+  if (heard?.state === "Halted" && !isHalted && isHaltTold) tell(() => "", false); // somebody else has ended it
   heard = state;
-  at("halt").hidden = state.state === "Halted";
-  at("resume").hidden = state.state !== "Halted";
+  const focused = document.activeElement?.id;
+  at("halt").hidden = isHalted;
+  at("resume").hidden = !isHalted;
+  if (focused === "halt" && isHalted) at("resume").focus();
+  if (focused === "resume" && !isHalted) at("halt").focus();
   if (measured !== null && state.settled_job >= measured) ended(state.last_job);
   const key = JSON.stringify(state.recipes) + document.documentElement.lang;
   if (key === recipes) return;
@@ -58,6 +64,7 @@ async function carryOut() {
   try {
     const answer = await order(path, body);
     tell(done(answer), false);
+    isHaltTold = path === "/halt";
   } catch (error) {
     if (!(error instanceof Refused)) tell(() => words("transfer_unknown"), true);
     else tell(() => refusal(error), true);
@@ -75,6 +82,7 @@ function refusal(error) {
 
 function tell(text, isBad) {
   told = text;
+  isHaltTold = false;
   at("told").classList.toggle("bad", isBad);
   say("told", told());
 }

@@ -96,7 +96,8 @@ class Mailbox:
         self._big = word_order == "big"
         self._held = []
         self._heartbeat = 0
-        self._answered = 0  # the last trigger whose contour got a final answer
+        self._open = False  # a trigger of ours is neither answered by a contour nor told that there will be none
+        self._taken = None  # the job that the service made of it
         self._started = time.monotonic()
         self.session = memory.new_session()
         with self.lock:
@@ -123,30 +124,41 @@ class Mailbox:
     def service_is_ready(self):
         """Whether a trigger would be taken: the service is Ready, and no trigger is open."""
         with self.lock:
-            return self.registers[SERVICE + 1] == 5 and not self._trigger_open()
+            return self.registers[SERVICE + 1] == 5 and not self._open
 
     def request(self, recipe=0, thickness_um=0):
         """Ask for one measurement; False where the service is not ready for it or a trigger is still open."""
         with self.lock:
-            if self.registers[SERVICE + 1] != 5 or self._trigger_open():
+            if self.registers[SERVICE + 1] != 5 or self._open:
                 return False
             self.registers[LINK + 3] = recipe
             self._put32(LINK + 4, thickness_um)
             self.registers[LINK + 2] = self.registers[LINK + 2] % 65535 + 1
+            self._open, self._taken = True, None
             return True
 
     def open_trigger(self):
         """Whether a trigger of ours is not yet settled."""
         with self.lock:
-            return self._trigger_open()
+            return self._open
 
-    def _trigger_open(self):
-        """A trigger stays open until its contour got a final answer, or the service says that there will be none."""
-        counter = self.registers[LINK + 2]
-        if counter in (0, self._answered):
-            return False
-        acknowledged = (self.registers[SERVICE + 3], self.registers[SERVICE + 10]) == (counter, self.session)
-        return not (acknowledged and self._get32(SERVICE + 12) >= self._get32(SERVICE + 6))
+    # --- for the Modbus server -----------------------------------------------------------------------------------
+
+    def write(self, start, words):
+        """Registers as the service wrote them; what it says of our trigger is taken note of at each write."""
+        with self.lock:
+            self.registers[start : start + len(words)] = list(words)
+            self._follow_trigger()
+
+    def _follow_trigger(self):
+        """A trigger is closed when `settled_job` reaches the job that came with its acknowledgement: later jobs are
+        other triggers' business.
+        """
+        acknowledged = (self.registers[SERVICE + 3], self.registers[SERVICE + 10])
+        if self._open and self._taken is None and acknowledged == (self.registers[LINK + 2], self.session):
+            self._taken = self._get32(SERVICE + 6)
+        if self._open and self._taken is not None and self._get32(SERVICE + 12) >= self._taken:
+            self._open = False
 
     # --- one scan ------------------------------------------------------------------------------------------------
 
@@ -160,7 +172,7 @@ class Mailbox:
             self._put32(LINK + 8, (self._get32(SERVICE + 8) + 1) % WRAP)
             page = self.registers[CONTOUR:]
             state, counter = self.registers[LINK], self.registers[LINK + 2]
-            is_open = self._trigger_open()
+            is_open = self._open
             if page[0] in (0, self.registers[LINK + 6]):
                 return  # nothing to answer
         answer, job_id, contour = self._answer(page, state, counter, is_open)
@@ -172,7 +184,7 @@ class Mailbox:
             if is_final:
                 self.registers[LINK + 12] = answer
                 self._put32(LINK + 10, job_id)
-                self._answered = page[31] or self._answered
+                self._open = self._open and page[31] != self.registers[LINK + 2]
             self.registers[LINK + 7] = answer
             self.registers[LINK + 6] = page[0]
         if contour is not None:

@@ -7,7 +7,10 @@ ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 
 
 class ModbusServer(socketserver.ThreadingTCPServer):
-    """Serves `mailbox.registers` under `mailbox.lock`; what is not in `mailbox.writable` can only be read."""
+    """Serves `mailbox.registers`: reads under `mailbox.lock`, writes by `mailbox.write`.
+
+    What is not in `mailbox.writable` can only be read.
+    """
 
     allow_reuse_address = True
     daemon_threads = True
@@ -67,6 +70,5 @@ def answer(mailbox, function, body):
 def _written(mailbox, function, start, words, echo):
     if start not in mailbox.writable or start + len(words) - 1 not in mailbox.writable:
         return bytes([function | 0x80, ILLEGAL_ADDRESS])
-    with mailbox.lock:
-        mailbox.registers[start : start + len(words)] = list(words)
+    mailbox.write(start, words)
     return bytes([function]) + echo

@@ -38,6 +38,7 @@ class Plc:
         self.registers = [0] * 2048
         self.inputs = {"state": 1, "now_ms": 10, "seed": 4711}
         self.accepted = 0
+        self.lock = threading.Lock()
         if vector is not None:  # the session and the trigger that the vector was made for
             self.block.session = (vector["session"] - 2) % 65535 + 1
             self.block.trigger_counter = vector.get("trigger", 0)
@@ -51,6 +52,11 @@ class Plc:
         for _ in range(count):
             self.block.scan(reg=self.registers, **self.inputs)
             self.accepted += self.block.accepted
+
+    def write(self, start, words):
+        """Registers as a Modbus server writes them."""
+        with self.lock:
+            self.registers[start : start + len(words)] = list(words)
 
     def send(self, page, transfer):
         """Write a page, scan until it is answered, and give the answer."""
@@ -316,7 +322,7 @@ def served(**inputs):
     """The block behind a Modbus server: its port, and the controller."""
     plc = Plc()
     plc.inputs |= inputs
-    plc.lock, plc.writable = threading.Lock(), range(16, 2048)
+    plc.writable = range(16, 2048)
     begun = time.monotonic()
 
     def scan():

@@ -118,6 +118,52 @@ def test_a_memory_that_cannot_be_read_is_no_memory_to_guess(tmp_path):
         bridge.Memory(str(tmp_path / "memory.json"))
 
 
+def service_says(mailbox, session, **fields):
+    """Write the service block as a service of this session does."""
+    offsets = {"trigger_ack": 3, "job_id": 7, "settled_job": 13}
+    words = [1, 5, *[0] * 8, session, 1, *[0] * 4]
+    for name, value in fields.items():
+        words[offsets[name]] = value
+    mailbox.write(bridge.SERVICE, words)
+
+
+def test_a_trigger_that_brought_no_contour_is_closed_for_good(memory):
+    """A job of another trigger that begins then is no reason to wait for the old one again, nor to refuse it (5)."""
+    vector = next(v for v in VECTORS["contours"] if v["trigger"] == 0 and len(v["pages"]) == 1)
+    mailbox = FixedMailbox(memory, vector)
+    session, job = vector["session"], vector["job_id"]
+    service_says(mailbox, session)
+    assert mailbox.request()
+    assert mailbox.open_trigger()
+    counter = mailbox.registers[2]
+    service_says(mailbox, session, trigger_ack=counter, job_id=job - 1)
+    assert mailbox.open_trigger()
+    service_says(mailbox, session, trigger_ack=counter, job_id=job - 1, settled_job=job - 1)
+    assert not mailbox.open_trigger()
+    service_says(mailbox, session, trigger_ack=counter, job_id=job, settled_job=job - 1)
+    assert not mailbox.open_trigger()
+    assert mailbox.send(vector["pages"][0], 1) == bridge.ACCEPTED
+
+
+def test_while_its_own_trigger_is_open_the_contour_of_another_is_refused(memory):
+    vector = next(v for v in VECTORS["contours"] if v["trigger"] == 0 and len(v["pages"]) == 1)
+    mailbox = FixedMailbox(memory, vector)
+    service_says(mailbox, vector["session"])
+    assert mailbox.request()
+    assert not mailbox.request(), "one at a time"
+    assert mailbox.send(vector["pages"][0], 1) == bridge.EXPIRED
+
+
+def test_the_final_answer_to_its_contour_closes_a_trigger(memory):
+    vector = next(v for v in VECTORS["contours"] if v["trigger"] and len(v["pages"]) == 1)
+    mailbox = FixedMailbox(memory, vector)
+    service_says(mailbox, vector["session"])
+    mailbox.registers[2] = vector["trigger"] - 1
+    assert mailbox.request()
+    assert mailbox.send(vector["pages"][0], 1) == bridge.ACCEPTED
+    assert not mailbox.open_trigger()
+
+
 # --- its Modbus server -----------------------------------------------------------------------------------------------
 
 

@@ -138,6 +138,9 @@ def _read(config: Config) -> Iterable[Path]:
         yield config.table.file
     if isinstance(config.camera, FilesCamera):
         yield config.camera.path
+    if config.page is not None:
+        yield from filter(None, (config.page.token_file, config.page.certificate, config.page.key))
+    yield from filter(None, (recipe.gcode.template for recipe in config.recipes))
 
 
 def _quoted(path: Path) -> str:

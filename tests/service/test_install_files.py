@@ -75,6 +75,20 @@ def test_a_path_below_home_is_left_readable() -> None:
     assert dict(settings(PACKAGED["systemd/combtrace.service"]))["ProtectHome"] == "yes"
 
 
+@pytest.mark.parametrize(
+    "more",
+    [
+        "page: {token_file: /home/anna/tokens}",
+        "page: {certificate: /home/anna/chain.pem, key: /home/anna/key.pem}",
+        "recipes: [{number: 1, name: a, gcode: {template: /root/frame.ngc}}]",
+    ],
+)
+def test_what_else_is_read_below_home_is_left_readable_too(tmp_path: Path, more: str) -> None:
+    elsewhere = "service: {state_dir: /srv/s}\njournal: {path: /srv/j}\narchive: {path: /srv/a}\n"
+    assert dict(settings(of_config(tmp_path, elsewhere + more)))["ProtectHome"] == "read-only"
+    assert dict(settings(of_config(tmp_path, elsewhere)))["ProtectHome"] == "yes"
+
+
 def test_a_camera_with_a_long_wait_gets_a_longer_watchdog(tmp_path: Path) -> None:
     text = of_config(tmp_path, "", camera="path: pictures, loop: false, watch: true, timeout_s: 60")
     assert dict(settings(text))["WatchdogSec"] == "180"

@@ -14,6 +14,7 @@ from service.config import Config
 from service.config_file import ConfigError, load_config
 from service.cycle import Plan
 from service.health import Health
+from service.logs import event
 
 log = logging.getLogger("combtrace.reload")
 
@@ -67,9 +68,10 @@ class Reloader:
             plan = await asyncio.to_thread(self._make_plan, fresh)
         except (ConfigError, BadPlan) as error:
             lines = str(error).splitlines()
-            for line in lines:
-                log.error("not reloaded: %s", line)
-            log.warning("the configuration of before stays in force, all of it")
+            for line in lines:  # an event each, or some of many would be held back
+                log.error("not reloaded: %s", line, extra=event("reload", mistake=line))
+            told = event("reload", reloaded=False)
+            log.warning("the configuration of before stays in force, all of it", extra=told)
             more = f" (and {len(lines) - 1} more)" if lines[1:] else ""
             self._health.warn(PART, f"not reloaded: {lines[0]}{more}")
             return
@@ -80,7 +82,8 @@ class Reloader:
         self._health.warn(PART, None)
         job = self._health.job
         since = "from the next job on" if job is None else f"from the job after {job} on"
-        log.info("configuration reloaded, %s: %s", since, changed)
+        told = event("reload", reloaded=True, changed=changed)
+        log.info("configuration reloaded, %s: %s", since, changed, extra=told)
 
 
 def differences(old: BaseModel, new: BaseModel, path: str = "") -> Iterator[str]:

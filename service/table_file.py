@@ -54,8 +54,12 @@ def load_table(path: Path) -> TableRecord:
     """The taught table of a file. Raises TableFileError."""
     try:
         # Opened here: numpy leaves a file open that proves to be no archive.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            picture, noise, about = data["picture"], float(data["noise"]), json.loads(str(data["about"]))
+        with path.open("rb") as file:
+            if not zipfile.is_zipfile(file):  # numpy would advise to load it unsafely
+                raise ValueError("it is no archive of arrays")
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as data:
+                picture, noise, about = data["picture"], float(data["noise"]), json.loads(str(data["about"]))
         check_picture(picture)
         if about["version"] != VERSION or not 0 <= noise < 256:
             raise ValueError(f"version {about['version']}, noise {noise:g}")

@@ -68,15 +68,16 @@ def test_a_running_job_keeps_its_recipe_and_the_next_has_the_new_one_or_the_old_
     assert bench.hand_over()["outcome"] == "written", "it began with the old recipe"
     assert bench.hand_over()["reason"] == 112, "it began with the new one"
 
-    # Two good changes and a bad one: none of them.
-    bench.write(f"recipes: [{PLAIN}, {{number: 2, name: two, tolerance_mm: -1}}]\ncolour: red")
+    # Two good changes and bad ones, more than the log's bound on lines alike: none of them.
+    colours = "".join(f"colour{number}: red\n" for number in range(8))
+    bench.write(f"recipes: [{PLAIN}, {{number: 2, name: two, tolerance_mm: -1}}]\n{colours}")
     bench.reload("the configuration of before stays in force")
     text = bench.service.text
     assert "recipes[1].tolerance_mm" in text
-    assert "colour: unknown key" in text
+    assert all(f"colour{number}: unknown key" in text for number in range(8))
     status = combtrace("status", "--config", bench.folder / "config.yaml")
     assert "warning   configuration: not reloaded: " in status.stdout, "though the file is bad"
-    assert "(and 1 more)" in status.stdout
+    assert "(and 8 more)" in status.stdout
     assert bench.hand_over()["reason"] == 112
 
     bench.write(f"recipes: [{PLAIN}]", period_s=0.2)

@@ -31,6 +31,10 @@ _FAINT = 0.5
 _PICTURE_RISE = 0.2
 # Squares wider than any wall and narrower than most cells.
 _BESIDE_PITCHES = 0.8
+# What so many walls side by side would fill is wider than one (two more samples hold part of it), and what rises by
+# less than this share of the region's walls is fainter. Walls rise above it by this share of what they must elsewhere.
+_WIDE_WALLS, _PARTLY = 1.3, 2.0
+_TALL, _OVER = 0.5, 0.4
 _BYTE_CONTRAST = 40.0
 FINE_PITCH = 12.0
 _LEAST_OVER_NOISE = 14.0
@@ -59,13 +63,15 @@ class WallMask:
         return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
-def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0) -> WallMask:
+def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0, wall: float = 0.0) -> WallMask:
     """Walls of `light` (H, W) where cells are about `pitch` pixels apart and walls are brighter (or darker) than cells.
 
     Walls are what stands out on both sides over less than a cell, whatever the light: a table as light as the walls is
     no wall, nor is the edge of a shadow or of a lamp's spot on it. The threshold lies at 0.44 of the local height of
     walls, a mean weighted with itself, whatever share of the area is wall; it is never below NOISE_FLOOR times the
-    noise. `contrast`, where it is known, sets one more floor, and above 40 levels allows a faster way.
+    noise. `contrast`, where it is known, sets one more floor, and above 40 levels allows a faster way. Where the width
+    of walls is known, `wall` in pixels, what is both wider and fainter than they is none: a table's light between its
+    holes, or between a groove and the block.
     """
     step = max(1, int(pitch / _MAP_SAMPLES))
     smooth, unit = _smoothed(light, step, contrast)
@@ -78,8 +84,17 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0)
     share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch) / 8, 0, 1))
     rise = np.maximum(np.maximum(share * walls, _REGION_RISE * region), _PICTURE_RISE * contrast * unit)
     least = NOISE_FLOOR * noise
+    wide = np.zeros_like(beside)
+    square = _odd(_WIDE_WALLS * wall / step + _PARTLY)
+    if wall and square < _odd(_BESIDE_PITCHES * pitch / step - 1):
+        wide = np.minimum(_opened(sign * _shrunk(smooth, step), square) - beside, _TALL * region)
     mask, faint = (
-        _standing_out(smooth, sign * (beside + np.maximum(part * rise, least)), unit, bright=bright)
+        _standing_out(
+            smooth,
+            sign * (beside + np.maximum(part * rise, wide + np.maximum(_OVER * part * rise, least))),
+            unit,
+            bright=bright,
+        )
         for part in (1.0, _FAINT)
     )
     height, width = light.shape
@@ -129,7 +144,11 @@ def _beside(small: Float, pitch: float) -> Float:
     A morphological opening (Matheron): the highest of the lowest levels of all squares that hold a sample. A table's
     edge of light or shadow stays, for it stands out on one side only.
     """
-    square = np.ones((_odd(_BESIDE_PITCHES * pitch - 1),) * 2, np.uint8)
+    return _opened(small, _odd(_BESIDE_PITCHES * pitch - 1))
+
+
+def _opened(small: Float, size: int) -> Float:
+    square = np.ones((size, size), np.uint8)
     return np.asarray(cv2.morphologyEx(small, cv2.MORPH_OPEN, square, borderType=cv2.BORDER_REFLECT), np.float32)
 
 

@@ -78,7 +78,7 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
         if scale == 1
         else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     )
-    seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast)
+    seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast, wall=cells.wall / scale)
     if cells.pitch < FINE_PITCH and seen.may_be_noise and cells.score < _ORDERLY:
         raise NoBlockFound(
             f"no block found: cells of {cells.pitch:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "

@@ -42,6 +42,23 @@ def test_the_edge_of_a_shadow_on_a_light_table_is_no_wall() -> None:
     assert not (mask & ~cv2.dilate(block.astype(np.uint8), np.ones((9, 9), np.uint8)).astype(np.bool_)).any()
 
 
+@pytest.mark.parametrize(("spacing", "radius", "level"), [(22, 5.5, 30.0), (22, 3.3, 45.0), (26, 3.9, 45.0)])
+def test_a_tables_light_between_its_holes_is_no_wall_and_a_wall_as_faint_is(
+    spacing: int, radius: float, level: float
+) -> None:
+    light, block = comb(level)
+    grey = light.astype(np.float64)
+    rows, columns = np.indices(light.shape)
+    holes = np.hypot(rows % spacing - spacing // 2, columns % spacing - spacing // 2) < radius
+    grey[holes & ~block] = 10.0
+    grey[100:103, 144:196] = 45.0
+    light = np.rint(cv2.GaussianBlur(grey, (0, 0), 0.8)).astype(np.uint8)
+    outside = cv2.dilate(block.astype(np.uint8), np.ones((5, 5), np.uint8)) == 0
+    unknown, known = (wall_mask(light, 20.0, bright=True, contrast=110.0, wall=wall).mask > 0 for wall in (0.0, 3.0))
+    assert known[outside].mean() < 0.001 < unknown[outside].mean()
+    assert known[101, 144:196].all()
+
+
 def test_an_opening_behind_a_broken_strand_of_walls_is_a_hole() -> None:
     light, _ = comb(5.0)
     light[63:140, 240:320] = 5

@@ -12,6 +12,7 @@ from contour.outline_proposals import Proposals, gather, gentle, window_fits
 from contour.outline_witnesses import Witnesses, cost, weights
 
 _MOST_PLACES = 160
+_SHARED = (2, 4)
 _STEPS = 4
 
 
@@ -105,7 +106,8 @@ def around(witnesses: Witnesses, segments: Segments) -> Proposals:
 def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Index, Index]:
     """Stretches of four and more witnesses in a row, single ones apart, that lie off their segments: first and length.
 
-    Each comes as it is, and longer by one at either end.
+    Each comes as it is, and longer by one at either end. Those inside come shifted, too: what an arc cuts off of an
+    edge lies half on that arc. Those outside may be dust.
     """
     count = len(witnesses)
     signed = distance(segments.models.take(segments.owner(count)), witnesses.points)
@@ -118,7 +120,12 @@ def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Index, Index
         length = (np.roll(last, -1) - first) % count + 1
     long = (length >= 4) & (length + 2 < count)
     first, length = first[long], length[long]
-    return np.concatenate([first, (first - 1) % count]), np.concatenate([length, length + 2])
+    begins, sizes = [first, first - 1], [length, length + 2]
+    inside = signed[(first + length // 2) % count] < 0.0
+    for shift in _SHARED:
+        begins += [(first + shift)[inside], (first - 2 * shift)[inside]]
+        sizes += 2 * [(length + shift)[inside]]
+    return np.concatenate(begins) % count, np.minimum(np.concatenate(sizes), count)
 
 
 def _starts(witnesses: Witnesses, segments: Segments, begin: Index, last: Index, bend: bool) -> Models:

@@ -82,6 +82,14 @@ def test_a_notch_of_five_pitches_is_kept(seed: int) -> None:
     assert len(found.ring) <= 10
 
 
+@pytest.mark.parametrize("seed", [0, 1, 2, 7])
+def test_no_arc_cuts_off_the_short_edge_of_a_pocket(seed: int) -> None:
+    """With three in ten witnesses deep, an arc past six of that edge's was better than what lay near it."""
+    pocket = np.array([[0, 0], [24, 0], [24, 8], [15, 8], [15, 15], [24, 15], [24, 23], [0, 23]]) * PITCH + 100.0
+    found = fitted(witnesses(pocket, seed=seed, deep=0.3, sigma=0.3, outside=0.05))
+    assert distances(pocket, found.ring).max() < 0.6 * PITCH
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_a_circular_hole_is_one_arc_with_the_holes_own_direction(seed: int) -> None:
     truth = circle(150.0)

@@ -37,6 +37,10 @@ NEXT_STEPS = {
     10: "Check the gateway and device_id",
     11: "Check the gateway, the line behind it, and device_id",
 }
+HEARS_ITSELF = (
+    "It is what was sent: the line echoes it. Set echo: true; a serial server must be set to keep it to itself"
+)
+SURELY_OUR_OWN = 3  # bytes; of a reply with the right unit and function, the third is no byte of the request
 TIMER_STEP_S = 0.001  # epoll waits whole milliseconds, rounded up; t3.5 is 1.75 ms
 MOST_SINGLE_IN_A_ROW = 4  # while a page waits: a heartbeat takes three requests, and none may hold a page up for ever
 MAY_BE_DONE_LATER = (5, 11)  # these say that the request went on its way, not that it was refused
@@ -78,6 +82,7 @@ class Connection:
         self._under_way: _Exchange | None = None
         self._received = b""
         self._echo = b""
+        self._sent = b""  # the last request's frame, where the line might echo it
         self._deadline = 0.0
         self._silent_from = 0.0
         self._alarm: asyncio.TimerHandle | None = None
@@ -187,6 +192,8 @@ class Connection:
         self._deadline = now + self._timeout_s + self._pace.byte_s * self._frames.wire_length(request)
         if self._alarm is None:
             self._alarm = self._loop.call_at(self._deadline, self._look_at_deadline)
+        if self._pace.silence_s:
+            self._sent = data
         if self._pace.echo:
             self._echo = data
         self._channel.write(data)
@@ -252,7 +259,8 @@ class Connection:
                     return
             self._take(data)
         except ControllerNonsense as error:
-            self.end(ControllerNonsense(f"{self.name}: {error}. {self._wire.mismatch}"))
+            next_step = HEARS_ITSELF if self._hears_itself() else self._wire.mismatch
+            self.end(ControllerNonsense(f"{self.name}: {error}. {next_step}"))
         self._wait_in_place()
 
     def _take(self, data: bytes) -> None:
@@ -282,11 +290,18 @@ class Connection:
         if isinstance(refusal, ControllerUnavailable):
             self.end(refusal)
 
+    def _hears_itself(self) -> bool:
+        """True where what came instead of a reply is the beginning of what was sent."""
+        return len(self._received) >= SURELY_OUR_OWN and self._sent.startswith(self._received[: len(self._sent)])
+
     def _without_echo(self, data: bytes) -> bytes:
         """What is left of `data` when our own bytes are taken off."""
         own = self._echo[: len(data)]
         if not data.startswith(own):
-            raise ControllerNonsense("what was sent did not come back as it was sent, so two talked at once")
+            raise ControllerNonsense(
+                "what was sent did not come back as it was sent, so two talked at once, or the line does not echo: "
+                "then take out echo"
+            )
         self._echo = self._echo[len(own) :]
         return data[len(own) :]
 

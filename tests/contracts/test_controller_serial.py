@@ -369,6 +369,21 @@ async def test_what_comes_back_of_our_own_is_taken_off_where_the_line_echoes(lin
     await controller.close()
 
 
+async def test_a_line_that_echoes_unexpectedly_is_told_as_such(line: PtyLine, server: LineServer) -> None:
+    def echo(data: bytes) -> bytes:
+        line.say_to_near(data)
+        return data
+
+    line.towards_far = echo
+    with pytest.raises(ControllerNonsense, match="It is what was sent: the line echoes it"):
+        await ModbusRtuController(SerialLine(line.near), timeout_s=PATIENT_S).connect()
+
+
+async def test_a_line_that_does_not_echo_as_it_was_said_to_is_told_as_such(line: PtyLine, server: LineServer) -> None:
+    with pytest.raises(ControllerNonsense, match="the line does not echo: then take out echo"):
+        await ModbusRtuController(SerialLine(line.near, echo=True), timeout_s=PATIENT_S).connect()
+
+
 # --- ports ------------------------------------------------------------------------------------------------------------
 
 

@@ -131,7 +131,10 @@ class ArchivedJob:
 
 def load_archived(archive: Path, job_id: int) -> ArchivedJob:
     """The evidence of a job; raise EvidenceError."""
-    path = document_of(archive, job_id)
+    try:
+        path = document_of(archive, job_id)
+    except OSError as error:
+        raise EvidenceError(f"{archive}: cannot be looked at: {error.strerror}. Check its permissions") from error
     if path is None:
         raise EvidenceError(
             f"{archive}: holds nothing of job {job_id}. It was let go, or was never kept: see archive.max_bytes"

@@ -40,7 +40,9 @@ def read_yaml(path: Path, option: str = "--config") -> Any:
             raise ConfigError(f"{path}: {path.stat().st_size} bytes, expected {LARGEST_FILE} at most")
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}. Name another file with {option}") from error
+        who = "run this as a user who may read it, or name" if isinstance(error, PermissionError) else "name"
+        next_step = f"{who[0].upper()}{who[1:]} another file with {option}"
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}. {next_step}") from error
     except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: is no UTF-8 text (byte {error.start}). Save it as UTF-8") from error
     try:

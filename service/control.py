@@ -182,8 +182,9 @@ def _peer(writer: asyncio.StreamWriter) -> str:
 def _who_may(path: Path) -> str:
     import grp
 
-    with contextlib.suppress(OSError, KeyError):
-        found = path.stat()
-        owner, group = pwd.getpwuid(found.st_uid).pw_name, grp.getgrgid(found.st_gid).gr_name
-        return f"User {owner} and group {group} may"
+    for known in (path, path.parent):  # a folder that may not be entered hides the socket in it
+        with contextlib.suppress(OSError, KeyError):
+            found = known.stat()
+            owner, group = pwd.getpwuid(found.st_uid).pw_name, grp.getgrgid(found.st_gid).gr_name
+            return f"User {owner} and group {group} may"
     return "Its owner and group may"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import secrets
 import sqlite3
 import sys
@@ -121,7 +122,7 @@ class Journal:
         self._begin = (above, otherwise_from)
         self._now = now
         self._lock = threading.Lock()
-        if path.exists() and not path.is_file():  # opening a pipe would wait for ever
+        if os.path.exists(path) and not os.path.isfile(path):  # opening a pipe would wait for ever
             raise JournalError(f"{path}: is no file, expected a journal or nothing. Name another journal.path.")
         with self._translated():
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -117,9 +118,16 @@ class JournalReader:
 @contextmanager
 def reading(path: Path) -> Iterator[JournalReader]:
     """The journal, open for reading; raise JournalUnreadable."""
-    if path.exists() and not path.is_file():
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        found = None
+    except OSError as error:
+        next_step = "Run it as the service's user or a member of its group, or check journal.path"
+        raise JournalUnreadable(f"{path}: cannot be looked at: {error.strerror}. {next_step}") from error
+    if found is not None and not stat.S_ISREG(found.st_mode):
         raise JournalUnreadable(f"{path}: is no file. Check journal.path")
-    if not path.exists() or not path.stat().st_size:
+    if found is None or not found.st_size:
         raise JournalUnreadable(f"{path}: there is no journal yet. Check journal.path, or run the daemon first")
     database = _connected(path)
     try:

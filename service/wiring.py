@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import logging
+import os
 import secrets
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -271,7 +272,7 @@ def _make_archive(config: Config) -> ArchiveWriter | None:
 def _make_journal(config: Config) -> tuple[Locks, Journal]:
     locks = Locks()
     state_lock = config.service.state_dir / "combtrace.lock"
-    ran_before = state_lock.exists()
+    ran_before = os.path.exists(state_lock)
     state: Lock | None = None
     try:
         state = Lock(state_lock)
@@ -420,8 +421,15 @@ def cycle_settings(config: Config) -> CycleSettings:
 
 def find_table(config: Config) -> TableRecord | None:
     """The taught table, where there is one; raise WiringError where its file cannot be used."""
-    if config.table is None or not config.table.file.exists():
+    if config.table is None:
         return None
+    try:
+        config.table.file.stat()
+    except FileNotFoundError:
+        return None
+    except OSError as error:  # it may well be there, and what it would refuse must not pass
+        text = f"{config.table.file}: cannot be looked at: {error.strerror}. Check its permissions"
+        raise WiringError(text) from error
     try:
         return load_table(config.table.file)
     except TableFileError as error:

@@ -221,7 +221,7 @@ class FileCamera:
 
     def _check_target(self, folder: Path) -> None:
         """Raise CameraRefused, CameraUnavailable where read files cannot be moved to `folder`."""
-        source = self._path if self._path.is_dir() else self._path.parent
+        source = self._path if os.path.isdir(self._path) else self._path.parent
         if folder.resolve() == source.resolve():
             raise CameraRefused(
                 f"{shown(folder)}: files are read from here; expected another folder in camera.move_to."
@@ -232,7 +232,7 @@ class FileCamera:
             reason = error.strerror or error
             raise CameraUnavailable(f"{shown(folder)}: cannot be made ({reason}). Check camera.move_to.") from error
         for place in (folder, source):
-            if place.exists() and not os.access(place, os.W_OK | os.X_OK):
+            if os.path.exists(place) and not os.access(place, os.W_OK | os.X_OK):
                 raise CameraUnavailable(
                     f"{shown(place)}: files cannot be moved from {shown(source)} to {shown(folder)}, as this folder "
                     "cannot be written. Check permissions and how it is mounted, or take camera.move_to out."

@@ -51,7 +51,7 @@ def check_permissions(config: Config) -> Iterator[Finding]:
         devices.append(str(config.camera.device))
     user = _name(pwd.getpwuid, os.getuid())
     for device in map(Path, devices):
-        if not device.exists() or os.access(device, os.R_OK | os.W_OK):
+        if not os.path.exists(device) or os.access(device, os.R_OK | os.W_OK):
             continue
         group = _name(grp.getgrgid, device.stat().st_gid)
         yield fault(
@@ -99,7 +99,7 @@ def _waiting_folder(settings: FilesCamera) -> Finding:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         return fault("camera", f"{settings.path}: cannot be read: {why}", "Make the folder, or correct camera.path")
-    if target is not None and target.exists() and not os.access(target, os.W_OK | os.X_OK):
+    if target is not None and os.path.exists(target) and not os.access(target, os.W_OK | os.X_OK):
         return fault("camera", f"{target}: files cannot be moved there", "Give the folder to the service's user")
     seen = f"{waiting} picture{'s' * (waiting != 1)} waiting" if waiting else "no picture yet, which is no fault"
     return ok("camera", f"{settings.path}: {seen}; none is taken by this check")

@@ -17,6 +17,12 @@ def running_service(config: Config) -> int | None:
     return holder(config.service.state_dir / "combtrace.lock")
 
 
+def hidden(config: Config) -> bool:
+    """True where this user may not look whether a service runs."""
+    folder = config.service.state_dir
+    return os.path.isdir(folder) and not os.access(folder, os.X_OK)
+
+
 def holder(path: Path) -> int | None:
     """The process that holds a lock on the file, by the kernel's table; None where none does or the table is not there.
 

@@ -46,15 +46,15 @@ def _folders(config: Config) -> Iterator[Finding]:
         if why:
             yield fault(part, f"{folder}: {why[0]}", f"{why[1]}, or set {key}")
         else:
-            yield ok(part, f"{folder}" + ("" if folder.exists() else ": not there yet, the service makes it"))
+            yield ok(part, f"{folder}" + ("" if os.path.exists(folder) else ": not there yet, the service makes it"))
 
 
 def _not_writable(folder: Path) -> tuple[str, str] | None:
     """Why this user cannot write in the folder, or in the nearest one above it, and what to do; None where he can."""
     there = folder
-    while not there.exists() and there != there.parent:
+    while not os.path.exists(there) and there != there.parent:
         there = there.parent
-    if not there.is_dir():
+    if not os.path.isdir(there):
         return f"{there} is no folder", "Move it away"
     if os.access(there, os.W_OK | os.X_OK):
         return None
@@ -72,7 +72,7 @@ def _user() -> str:
 
 def _journal(config: Config, running: bool) -> tuple[Finding, Job | None]:
     path = config.journal.path
-    if not path.exists():
+    if not os.path.exists(path):
         why = _not_writable(path.parent)
         if why:
             return fault("journal", f"{path}: {why[0]}", f"{why[1]}, or set journal.path"), None
@@ -106,7 +106,11 @@ def _disks(config: Config) -> Iterator[Finding]:
         try:
             free = free_bytes(path)
         except OSError as error:
-            yield fault("disk", f"{path}: its disk cannot be looked at: {error.strerror}", "Check that it is mounted")
+            yield fault(
+                "disk",
+                f"{path}: its disk cannot be looked at: {error.strerror}",
+                "Check that it is mounted and may be entered",
+            )
             continue
         text = f"{what}: {free / _MEGABYTE:.0f} MB free, {bound / _MEGABYTE:.0f} MB are kept free"
         if free >= bound * _NEARLY:

@@ -57,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _findings(args: argparse.Namespace) -> Iterator[Finding]:
     """All that can be checked, part by part; after a bad configuration nothing more."""
-    from service.checkup.finding import fault, ok
+    from service.checkup.finding import fault, ok, warning
     from service.config_file import ConfigError, load_config
 
     try:
@@ -69,15 +69,19 @@ def _findings(args: argparse.Namespace) -> Iterator[Finding]:
     from service.checkup.devices import check_devices
     from service.checkup.files import check_files, summary
     from service.checkup.listening import check_listening
-    from service.checkup.running import running_service
+    from service.checkup.running import hidden, running_service
     from service.checkup.storage import check_storage
 
     yield ok("config", f"{args.config}: {summary(config)}")
-    running = running_service(config)
-    yield ok("service", "does not run" if running is None else f"runs as process {running}")
+    running, unseen = running_service(config), hidden(config)
+    if unseen:
+        text = f"{config.service.state_dir}: may not be entered, so whether the service runs is not known"
+        yield warning("service", f"{text}; no device is opened", "Run this as the service's user or one of its group")
+    else:
+        yield ok("service", "does not run" if running is None else f"runs as process {running}")
     yield from check_files(config)
     yield from check_listening(config, running)
-    if not args.no_devices:
+    if not args.no_devices and not unseen:
         yield from check_devices(config, running)
     yield from check_storage(config, running=running is not None)
 

@@ -85,9 +85,13 @@ def _config(path: Path) -> Config | None:
     """The configuration, None where there is none yet."""
     from service.config_file import ConfigError, load_config
 
-    if not path.exists():
+    try:
+        path.stat()
+    except FileNotFoundError:
         print(f"{path} is not there yet: the unit lets the daemon write to /var/lib/combtrace only", file=sys.stderr)
         return None
+    except OSError as error:
+        raise UserError(f"{path}: cannot be looked at: {error.strerror}. Run it with sudo") from error
     try:
         return load_config(path)
     except ConfigError as error:

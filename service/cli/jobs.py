@@ -74,7 +74,10 @@ def _print_json(jobs: list[Job], config: Config) -> None:
     from service.evidence import job_fields
 
     for job in jobs:
-        files = [str(path) for path in files_of(config.archive.path, job.job_id)]
+        try:
+            files = [str(path) for path in files_of(config.archive.path, job.job_id)]
+        except OSError as error:
+            raise UserError(f"{config.archive.path}: cannot be looked at: {error.strerror}") from error
         print(json.dumps({**job_fields(job), "evidence": files}, ensure_ascii=False))
 
 
@@ -135,7 +138,10 @@ def _print_one(job: Job, config: Config) -> None:
 def _evidence(job: Job, config: Config) -> list[Path | str]:
     from service.archive import files_of
 
-    return [*files_of(config.archive.path, job.job_id)] or ["none is kept"]
+    try:
+        return [*files_of(config.archive.path, job.job_id)] or ["none is kept"]
+    except OSError as error:
+        return [f"{config.archive.path} cannot be looked at: {error.strerror}"]
 
 
 def lines_of(job: Job) -> list[tuple[str, str]]:

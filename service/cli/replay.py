@@ -155,7 +155,12 @@ def _numbers(args: argparse.Namespace, config: Config) -> list[int]:
             jobs = journal.jobs(filter_of(args))
     except JournalUnreadable as error:
         raise UserError(str(error)) from error
-    kept = [job.job_id for job in jobs if document_of(config.archive.path, job.job_id) is not None]
+    try:
+        kept = [job.job_id for job in jobs if document_of(config.archive.path, job.job_id) is not None]
+    except OSError as error:
+        raise UserError(
+            f"{config.archive.path}: cannot be looked at: {error.strerror}. Check its permissions"
+        ) from error
     return kept[-args.limit :] if args.limit > 0 else kept
 
 

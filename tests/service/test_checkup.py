@@ -121,6 +121,47 @@ def test_a_clock_behind_the_last_job_is_a_warning(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="needs root to become somebody else")
+def test_who_may_not_enter_the_services_folders_gets_a_line_and_no_traceback(tmp_path: Path) -> None:
+    for folder in (tmp_path, *tmp_path.parents):
+        if folder.stat().st_uid == 0 and folder != Path("/"):
+            folder.chmod(folder.stat().st_mode | 0o055)
+    path = written(tmp_path, more="table: {file: closed/table}")
+    path.write_text(path.read_text().replace("journal: {path: journal", "journal: {path: state/journal"))
+    journal = Journal(tmp_path / "state" / "journal.sqlite")
+    journal.take(TriggerStamp("manual"))
+    journal.close()
+    for name in ("state", "archive", "closed"):
+        (tmp_path / name).mkdir(exist_ok=True, mode=0o750)
+        (tmp_path / name).chmod(0o750)
+    code = (
+        "import os, sys; from service.cli.main import main\n"
+        "os.setgroups([]); os.setgid(65534); os.setuid(65534)\n"
+        "sys.exit(main([*sys.argv[2:], '--config', sys.argv[1]]))"
+    )
+
+    def told(*command: str) -> tuple[int, str]:
+        arguments = [sys.executable, "-c", code, str(path), *command]
+        done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+        assert "Traceback" not in done.stderr
+        return done.returncode, done.stdout + done.stderr
+
+    state = tmp_path / "state"
+    assert "User root and group root may" in told("status")[1]
+    for command in (["jobs"], ["jobs", "show", "1"], ["replay", "--limit", "1"]):
+        status, text = told(*command)
+        assert (status, f"{state}/journal.sqlite: cannot be looked at: Permission denied" in text) == (2, True)
+    assert told("replay", "1")[0] == 2
+    assert "archive: cannot be looked at: Permission denied" in told("replay", "1")[1]
+    assert "closed/table: cannot be looked at: Permission denied" in told("run", "--once")[1]
+    status, text = told("check")
+    assert status == 1
+    assert f"warn  service      {state}: may not be entered, so whether the service runs is not known" in text
+    assert "camera " not in text
+    path.chmod(0o600)
+    assert "Run this as a user who may read it" in told("jobs")[1]
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="needs root to become somebody else")
 def test_what_the_user_may_not_use_names_the_group_that_may(tmp_path: Path) -> None:
     device = tmp_path / "ttyUSB0"
     device.touch(mode=0o660)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from pathlib import Path
 
 import cv2
@@ -23,7 +24,7 @@ class VideoFile:
         """Raises FrameUnusable for a file that holds no video that can be read."""
         self._path = path
         self._handed_out = 0
-        self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+        self._capture = _opened(path)
         if not self._capture.isOpened():
             raise FrameUnusable(
                 f"{shown(path)}: no video that can be read; expected one with a codec that FFmpeg knows. "
@@ -43,6 +44,8 @@ class VideoFile:
         if pixels is not None and not cut_off:
             self._handed_out += 1
             return pixels
+        if self._handed_out == self._promised == 0:
+            raise FrameUnusable(f"{shown(self._path)}: a video without a frame; expected one or more. Record it anew.")
         if self._handed_out == 0 or self._handed_out < self._promised:
             raise FrameUnusable(
                 f"{shown(self._path)}: the video is cut off after {self._handed_out} frames; "
@@ -62,3 +65,21 @@ class VideoFile:
     def _read(self) -> NDArray[np.uint8] | None:
         done, pixels = self._capture.read()
         return np.asarray(pixels, dtype=np.uint8) if done else None
+
+
+def _opened(path: Path) -> cv2.VideoCapture:
+    """The decoder of a regular file; raise FrameUnusable where there is none.
+
+    OpenCV gets it by its number: a name that is no UTF-8 would crash the process in it, and a pipe hold it up for ever.
+    """
+    try:
+        file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FrameUnusable(f"{shown(path)}: cannot be read ({reason}). Check path and permissions.") from error
+    try:
+        if not stat.S_ISREG(os.fstat(file).st_mode):
+            raise FrameUnusable(f"{shown(path)}: no regular file; expected a video. Take it out of the folder.")
+        return cv2.VideoCapture(f"/proc/self/fd/{file}", cv2.CAP_FFMPEG)
+    finally:
+        os.close(file)

@@ -371,6 +371,32 @@ def test_a_video_that_is_cut_off_says_after_how_many_frames_and_the_next_file_fo
     assert greys(camera, 1) == [7]
 
 
+def test_a_video_whose_name_is_no_utf_8_is_read(tmp_path):
+    write_video(tmp_path / "a.avi", [40, 80])
+    (tmp_path / "a.avi").rename(tmp_path / os.fsdecode(b"a-\xe4.avi"))
+    camera = FileCamera(tmp_path, loop=True)
+    camera.open()
+    assert [round(grey / 10) * 10 for grey in greys(camera, 3)] == [40, 80, 40]
+
+
+def test_a_pipe_called_a_video_holds_nobody_up(tmp_path):
+    os.mkfifo(tmp_path / "a.mp4")
+    write_video(tmp_path / "b.avi", [40])
+    camera = FileCamera(tmp_path, loop=False)
+    camera.open()
+    with pytest.raises(FrameUnusable, match=r"a\.mp4: no regular file"):
+        camera.grab(0.0, 1.0)
+    assert camera.grab(0.0, 1.0).source.endswith("b.avi frame 1")
+
+
+def test_a_video_without_a_frame_is_told_as_that(tmp_path):
+    write_video(tmp_path / "a.avi", [])
+    camera = FileCamera(tmp_path, loop=False)
+    camera.open()
+    with pytest.raises(FrameUnusable, match="a video without a frame"):
+        camera.grab(0.0, 1.0)
+
+
 def test_a_file_that_is_no_video_is_told(tmp_path):
     (tmp_path / "1.mp4").write_bytes(b"no video" * 100)
     camera = FileCamera(tmp_path / "1.mp4", loop=False)

@@ -10,6 +10,7 @@ LinuxCNC. `request` on standard input, or the HAL pin combtrace.request, asks fo
 """
 
 import argparse
+import math
 import os
 import sys
 import threading
@@ -70,9 +71,9 @@ class Machine:
         ]
 
     def offset_mm(self):
-        """Offset of G54 and of the tool, mm."""
+        """Offset of G54 and G92, mm; a tool's length is none, since the program begins by cancelling it (G49)."""
         unit = self.stat.linear_units
-        parts = (self.stat.g5x_offset, self.stat.g92_offset, self.stat.tool_offset)
+        parts = (self.stat.g5x_offset, self.stat.g92_offset)
         return [sum(part[axis] for part in parts) / unit for axis in range(3)]
 
     def open(self, name, text):
@@ -231,26 +232,60 @@ def request(bridge, recipe, thickness_mm):
         bridge.say("a measurement is asked for")
 
 
+def height(text):
+    """Millimetres, finite."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
+
+
+def positive(text):
+    """A finite number above 0."""
+    value = height(text)
+    if value <= 0:
+        raise ValueError(text)
+    return value
+
+
+def capacity(text):
+    """Registers of payload: even, within what one Modbus device holds beside the other blocks."""
+    value = int(text)
+    if value % 2 or not 4 <= value <= 65536 - 64:
+        raise ValueError(text)
+    return value
+
+
+def address(text):
+    """Host and port of HOST:PORT."""
+    host, colon, port = text.rpartition(":")
+    if not colon or not port.isdigit() or int(port) > 65535:
+        raise ValueError(text)
+    return host, int(port)
+
+
 def main():
     """Serve until the process is ended."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--listen", default="127.0.0.1:5020", metavar="HOST:PORT", help="default 127.0.0.1:5020")
+    parser.add_argument(
+        "--listen", type=address, default="127.0.0.1:5020", metavar="HOST:PORT", help="default 127.0.0.1:5020"
+    )
     parser.add_argument("--folder", required=True, help="for memory and programs; LinuxCNC must be able to read it")
-    parser.add_argument("--safe-z", type=float, required=True, metavar="MM", help="height between rings")
-    parser.add_argument("--cut-z", type=float, metavar="MM", help="height of cut; without it, a dry run")
-    parser.add_argument("--feed", type=float, default=3000.0, metavar="MM/MIN")
-    parser.add_argument("--plunge", type=float, default=600.0, metavar="MM/MIN")
-    parser.add_argument("--path-tolerance", type=float, default=0.01, metavar="MM", help="G64 P")
+    parser.add_argument("--safe-z", type=height, required=True, metavar="MM", help="height between rings")
+    parser.add_argument("--cut-z", type=height, metavar="MM", help="height of cut; without it, a dry run")
+    parser.add_argument("--feed", type=positive, default=3000.0, metavar="MM/MIN")
+    parser.add_argument("--plunge", type=positive, default=600.0, metavar="MM/MIN")
+    parser.add_argument("--path-tolerance", type=positive, default=0.01, metavar="MM", help="G64 P")
     parser.add_argument("--run", action="store_true", help="run a contour at once; without it, cycle start does")
     parser.add_argument("--simulated-too", action="store_true", help="also contours of pictures from files")
     parser.add_argument("--hal", action="store_true", help="offer the HAL pins combtrace.*")
     parser.add_argument("--word-order", choices=("big", "little"), default="big")
-    parser.add_argument("--payload-capacity", type=int, default=1984)
+    parser.add_argument("--payload-capacity", type=capacity, default=1984)
     args = parser.parse_args()
-    os.makedirs(args.folder, exist_ok=True)
     cutting = Cutting(args.safe_z, args.cut_z, args.feed, args.plunge, args.path_tolerance)
+    machine = _machine(args.folder)
     bridge = Bridge(
-        Machine(os.path.abspath(args.folder)),
+        machine,
         os.path.join(args.folder, "memory.json"),
         cutting,
         lambda text: print(text, flush=True),
@@ -259,8 +294,13 @@ def main():
         word_order=args.word_order,
         payload_capacity=args.payload_capacity,
     )
-    host, _, port = args.listen.rpartition(":")
-    server = ModbusServer((host, int(port)), bridge.mailbox)
+    host, port = args.listen
+    try:
+        server = ModbusServer((host, port), bridge.mailbox)
+    except OSError as error:
+        raise SystemExit(
+            f"--listen {host}:{port}: {error.strerror}. Name a free port and an address of this machine"
+        ) from error
     threading.Thread(target=server.serve_forever, daemon=True).start()
     asked = threading.Event()
     threading.Thread(target=_requests, args=(asked,), daemon=True).start()
@@ -276,6 +316,18 @@ def main():
             request(bridge, 0, 0)
         due = max(due + SCAN_S, time.monotonic())
         time.sleep(max(due - time.monotonic(), 0))
+
+
+def _machine(folder):
+    """LinuxCNC, as it runs, and the folder for memory and programs; SystemExit where either is not to be had."""
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise SystemExit(f"--folder {folder}: {error.strerror}. Name one that can be written") from error
+    try:
+        return Machine(os.path.abspath(folder))
+    except linuxcnc.error as error:
+        raise SystemExit(f"LinuxCNC does not answer ({error}). Start it first, as this user") from error
 
 
 def _requests(asked):

@@ -40,7 +40,7 @@ from drivers.controller.mailbox import (
     withdrawal,
 )
 from drivers.controller.simulated import SimulatedController
-from service.config import Config
+from service.config import Config, NoController
 from service.config_file import ConfigError, load_config
 from service.config_mistakes import describe
 from service.ownership import WATCH_S
@@ -331,6 +331,10 @@ def open_bench(url: str | None, config: Path | None) -> Bench:
         server = SimulatedController(scan_s=0.005, layout=layout)
         return Bench(_over_tcp(1, layout), layout, server)  # the port is known once it listens
     found = _config_of(url) if url is not None else _loaded(config)
+    if not isinstance(found.controller, NoController) and found.controller.mode == "observe":
+        raise HilError(
+            f"{url or config}: controller.mode is observe: another process writes there, and the suite would too"
+        )
     controller, layout_of = make_controller(found), mailbox_layout(found)
     if controller is None or layout_of is None:
         raise HilError(f"{config}: controller.kind is none. Name a configuration with a controller")

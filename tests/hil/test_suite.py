@@ -137,6 +137,7 @@ def test_a_controller_that_was_switched_off_and_on_is_taken_up_again_when_asked(
         ("tcp://127.0.0.1:502?word_order=middle", "word_order"),
         ("tcp://127.0.0.1:502?speed=9", "speed: unknown key"),
         ("rtu://", "port"),
+        ("tcp://127.0.0.1:502?mode=observe", "another process writes there"),
     ],
 )
 def test_a_controller_that_cannot_be_named_so_is_told(url: str, told: str) -> None:

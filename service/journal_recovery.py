@@ -75,8 +75,7 @@ def _move_aside(path: Path, unix_s: float) -> Path:
     First all have both names, then the old ones go, the database's before its log's: without its log a database looks
     sound and older than it is.
     """
-    stamp = datetime.fromtimestamp(unix_s, UTC).strftime("%Y%m%dT%H%M%SZ")
-    kept = path.with_name(f"{path.name}.damaged-{stamp}")
+    kept = _free_name(path, unix_s)
     try:
         for source in _files(path):
             target = kept.with_name(kept.name + source.name.removeprefix(path.name))
@@ -87,6 +86,18 @@ def _move_aside(path: Path, unix_s: float) -> Path:
     except OSError as error:
         raise JournalError(f"{path}: is damaged and cannot be moved aside: {error.strerror}. Move it away") from error
     return kept
+
+
+def _free_name(path: Path, unix_s: float) -> Path:
+    """A name by the clock that no other journal has: where it starts anew at each boot, the same second comes again."""
+    while True:
+        stamp = datetime.fromtimestamp(unix_s, UTC).strftime("%Y%m%dT%H%M%SZ")
+        kept = path.with_name(f"{path.name}.damaged-{stamp}")
+        if not any(kept.with_name(kept.name + part).exists() for part in PARTS):
+            return kept
+        if kept.exists() and path.exists() and kept.samefile(path):
+            return kept  # our own, broken off
+        unix_s += 1
 
 
 def _files(path: Path) -> list[Path]:

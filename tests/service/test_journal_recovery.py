@@ -309,6 +309,18 @@ def test_a_second_loss_remembers_what_was_moved_aside_at_the_first(tmp_path: Pat
     journal.close()
 
 
+def test_two_journals_moved_aside_in_one_second_of_a_clock_that_went_back_are_both_kept(tmp_path: Path) -> None:
+    path = tmp_path / "journal.sqlite"
+    contents = []
+    for jobs in (3, 40):
+        path.unlink(missing_ok=True)
+        filled(path, jobs)
+        changed(path, "DELETE FROM meta")
+        contents.append(path.read_bytes())
+        reopened(path).close()
+    assert sorted(kept.read_bytes() for kept in set_aside(path)) == sorted(contents)
+
+
 def test_numbers_that_stand_in_the_write_ahead_log_alone_are_found(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     journal = Journal(path)

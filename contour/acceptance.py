@@ -22,6 +22,8 @@ from contour.tracing import Trace
 # Of what contour and busy region may be apart in one place, the share that they may be apart everywhere. Of 500
 # traceable scenes none lies farther outside than 0.19 pitches; outlines a cell too fat lie 0.33 or more in 98 of 100.
 _EVERYWHERE = 0.125
+# Cell pitches. As much as contour and busy part of the picture may be apart.
+_SURE_WITHIN_PITCHES = 2.0
 # Of two blocks whose areas differ by less than this the larger one is a matter of chance.
 _EQUAL_SHARE = 0.8
 
@@ -106,6 +108,7 @@ def judge(
         _goes_on(traced),
         _area(polygon.area_mm2, limits),
         _disagreement(traced, limits.max_disagreement_pitches),
+        _vague(traced),
         _uncertainty(polygon.millimetres, budget, limits.max_uncertainty_mm),
         _work_area(polygon.millimetres, limits.work_area_mm),
         _several(traced, limits),
@@ -302,6 +305,21 @@ def _disagreement(traced: Trace | None, limit: float | None) -> Finding | None:
             f"{_EVERYWHERE * limit:g} are allowed. {advice}",
         )
     return None
+
+
+def _vague(traced: Trace | None) -> Finding | None:
+    """Whatever the recipe allows: beyond some cells it is not known which of them belong to the block."""
+    if traced is None or traced.uncertainty_px is None or not traced.pitch_px:
+        return None
+    cells = traced.uncertainty_px / traced.pitch_px
+    if cells <= _SURE_WITHIN_PITCHES:
+        return None
+    return Finding(
+        Refusal.UNCERTAINTY_TOO_LARGE,
+        f"The contour is sure within {traced.uncertainty_px:.1f} px only, {cells:.1f} cells, {_SURE_WITHIN_PITCHES:g} "
+        "are allowed: walls end far away from it. Look at the overlay; check light and table, and that no straight "
+        "light lines or cables lie in view.",
+    )
 
 
 def _uncertainty(millimetres: Contour | None, budget: ErrorBudget | None, limit: float | None) -> Finding | None:

@@ -96,7 +96,8 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
     found = bevelled(witnesses, segments, found, inlier, _material(evidence, rectifier))
     ring, owners = polygon(witnesses, segments, found, chains)
     spread = _spread(residual[inlier], wall_px)
-    sigma = vertex_sigma(witnesses, segments, inlier, ring=ring, owners=owners, spread=spread)
+    free = np.isin(np.arange(len(segments)), [k for chain in chains for k in chain.segments])
+    sigma = vertex_sigma(witnesses, segments, inlier, ring=ring, owners=owners, free=free, spread=spread)
     vertices = np.column_stack([ring.real, ring.imag])
     if rectifier is not None:
         vertices = rectifier.unrectify(vertices)

@@ -11,6 +11,9 @@ from contour.outline_segments import Segments, stretch
 from contour.outline_witnesses import Witnesses
 
 _SHARPEST_SINE = 0.2
+# Pitches.
+_MOST = 1.0
+_MOST_FREE = 0.25
 
 
 def vertex_sigma(
@@ -20,13 +23,16 @@ def vertex_sigma(
     *,
     ring: Complex,
     owners: NDArray[np.intp],
+    free: Flags,
     spread: float,
 ) -> Real:
     """Standard deviation of each vertex, shape (M,), pixels: of its place across its segment, or of a corner's place.
 
     owners: the two segments that meet in each vertex (twice the same inside one), shape (M, 2). A segment's own
     deviation at a place is the residual spread times the root of the fit's leverage there; a corner's is both of its
-    edges', over the sine of the angle between them.
+    edges', over the sine of the angle between them. A segment of one witness says nothing of its own direction, so no
+    vertex counts with more than `_MOST`: an outline farther off leaves walls out, and that is told apart. free:
+    segments of a curve that is drawn through all their witnesses together, shape (K,).
     """
     index, multiplicity = stretch(len(witnesses), segments.first, segments.length)
     weight = multiplicity * inlier[index]
@@ -50,9 +56,9 @@ def vertex_sigma(
     _, next_tangent = feet(segments.models.take(second), ring)
     sine = np.abs((tangent.conj() * next_tangent).imag)
     corner = (first != second) & (sine > _SHARPEST_SINE)
-    return spread * np.sqrt(
-        np.where(corner, (one + other) / np.maximum(sine, _SHARPEST_SINE) ** 2, np.maximum(one, other))
-    )
+    ratio = np.where(corner, (one + other) / np.maximum(sine, _SHARPEST_SINE) ** 2, np.maximum(one, other))
+    most = np.where(free[first] | free[second], _MOST_FREE, _MOST) * witnesses.pitch
+    return np.minimum(spread * np.sqrt(ratio), most)
 
 
 def unseen_share(witnesses: Witnesses, inlier: Flags) -> float:

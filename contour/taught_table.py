@@ -97,13 +97,13 @@ def teach(pictures: Sequence[Picture]) -> TaughtTable:
         raise PictureError("There is no picture to teach the table from: expected one or more. Take some.")
     shapes = {picture.shape for picture in pictures}
     if len(shapes) > 1:
-        raise PictureError(f"The pictures differ in size, {sorted(shapes)}: expected one. Do not change the camera.")
+        kinds = ", ".join(sorted({_kind(picture) for picture in pictures}))
+        raise PictureError(f"The pictures differ: {kinds}; expected one size and kind. Do not change the camera.")
     total = np.zeros(pictures[0].shape, np.float32)
     for picture in pictures:
         total += picture
     mean = np.clip(np.rint(total / len(pictures)), 0, 255).astype(np.uint8)
-    every = (slice(None, None, 7), slice(None, None, 7))
-    spread = np.std([picture[every].astype(np.float32) for picture in pictures], axis=0, ddof=1 if pictures[1:] else 0)
+    spread = np.std([_fine(picture) for picture in pictures], axis=0, ddof=1 if pictures[1:] else 0)
     noise = max(float(np.median(spread)), 0.5)
     unrest = max(float(np.abs(_cells(picture) - _cells(mean)).max()) for picture in pictures)
     if unrest > _UNREST + noise:
@@ -197,6 +197,14 @@ def _cells(picture: Picture) -> Floats:
     """Means over squares of the picture, (h, w) or (h, w, 3)."""
     size = (max(5, picture.shape[1] // _CELL_PX), max(5, picture.shape[0] // _CELL_PX))
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _fine(picture: Picture) -> Floats:
+    """Some of the pixels, less the light around them: light that changes is no noise."""
+    every = (slice(None, None, 7), slice(None, None, 7))
+    height, width = picture.shape[:2]
+    around = cv2.resize(_cells(picture), (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(picture[every].astype(np.float32) - around[every], np.float32)
 
 
 def _grey(picture: Picture) -> Picture:

@@ -153,6 +153,13 @@ def traced(**changes: object) -> Trace:
     return replace(Trace("wall-tips", "bright", 24.0, GOOD.pixels), **changes)
 
 
+def test_a_contour_that_is_not_sure_within_two_cells_is_refused_whatever_the_recipe_allows() -> None:
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=48.0)) == ()
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=51.0))
+    assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
+    assert "sure within 51.0 px only, 2.1 cells, 2 are allowed" in finding.text
+
+
 def test_the_ring_that_the_polygon_was_made_of_must_keep_off_the_frame_too() -> None:
     bulge = np.insert(GOOD.pixels.exterior, 1, [0.0, 150.0], axis=0)
     (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(contour=Contour(bulge)))

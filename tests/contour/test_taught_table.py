@@ -126,8 +126,14 @@ def test_a_hand_that_moves_while_teaching_is_noticed() -> None:
         teach([grid_table(1), grid_table(2), moved])
     with pytest.raises(PictureError, match="no picture"):
         teach([])
-    with pytest.raises(PictureError, match="differ in size"):
+    with pytest.raises(PictureError, match="640 x 400 px grey, 640 x 480 px grey; expected one size"):
         teach([grid_table(1), grid_table(2)[:400]])
+
+
+@pytest.mark.parametrize("light", [0.5, 0.85, 1.15])
+def test_light_that_changes_while_teaching_is_noticed_and_no_noise(light: float) -> None:
+    with pytest.raises(PictureError, match="let the light settle"):
+        teach([grid_table(1), grid_table(2, light=light)])
 
 
 def test_holes_of_the_block_stay_holes(table: TaughtTable) -> None:

@@ -100,6 +100,12 @@ def test_fewer_witnesses_all_around_leave_it_less_sure(seed: int) -> None:
     assert stated(few) > stated(many)
 
 
+@pytest.mark.parametrize(("radius", "spacing", "seed"), [(200, 0.6, 10), (100, 1.0, 7), (100, 1.0, 1)])
+def test_a_segment_of_one_witness_does_not_make_the_outline_unknown(radius: float, spacing: float, seed: int) -> None:
+    evidence = witnesses(blob(radius), seed=seed, spacing=spacing * PITCH)
+    assert stated(evidence) < 0.5 * PITCH
+
+
 @few
 @given(shapes, seeds, st.floats(0.5, 4.0), st.floats(-3.0, 3.0))
 def test_a_picture_enlarged_and_turned_has_the_bound_enlarged(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import termios
 import threading
 import time
@@ -147,6 +148,11 @@ class SerialLineTrigger:
 def fault_text(error: BaseException) -> str:
     """What went wrong, in words, without pyserial's nested numbers."""
     number = getattr(error, "errno", None)
+    nested = re.search(r"\((\d+), '", str(error))  # of termios, which pyserial only quotes
+    if number is None and nested:
+        number = int(nested[1])
+    if number == errno.ENOTTY:
+        return "it is no serial port"
     if number in (errno.EAGAIN, errno.EBUSY):
         return "in use by another program"
     return os.strerror(number) if number else str(error)

@@ -228,6 +228,11 @@ def test_a_name_that_is_no_serial_port_is_told(name):
         SerialLineTrigger(name, 9600).open()
 
 
+def test_a_device_that_is_no_serial_port_is_told_in_words():
+    with pytest.raises(TriggerUnavailable, match=r"/dev/null: cannot be opened at 9600 baud \(it is no serial port\)"):
+        SerialLineTrigger("/dev/null", 9600).open()
+
+
 def test_a_rate_that_the_port_refuses_is_told(wire):
     with pytest.raises(TriggerUnavailable, match="cannot be opened at -1 baud"):
         SerialLineTrigger(wire.name, -1).open()

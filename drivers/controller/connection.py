@@ -292,7 +292,8 @@ class Connection:
 
     def _hears_itself(self) -> bool:
         """True where what came instead of a reply is the beginning of what was sent."""
-        return len(self._received) >= SURELY_OUR_OWN and self._sent.startswith(self._received[: len(self._sent)])
+        came, sent = self._received, self._sent
+        return min(len(came), len(sent)) >= SURELY_OUR_OWN and sent.startswith(came[: len(sent)])
 
     def _without_echo(self, data: bytes) -> bytes:
         """What is left of `data` when our own bytes are taken off."""

@@ -16,7 +16,7 @@ from drivers.controller.errors import (
     ControllerUnavailable,
 )
 from drivers.controller.promptness import WAIT_S, Promptness
-from drivers.controller.requests import EXCEPTION, Request
+from drivers.controller.requests import EXCEPTION, READ_REGISTERS, Request
 from drivers.controller.wires import Descriptor, Wire
 
 EXCEPTION_NAMES = {
@@ -40,7 +40,7 @@ NEXT_STEPS = {
 HEARS_ITSELF = (
     "It is what was sent: the line echoes it. Set echo: true; a serial server must be set to keep it to itself"
 )
-SURELY_OUR_OWN = 3  # bytes; of a reply with the right unit and function, the third is no byte of the request
+SURELY_OUR_OWN = 3  # bytes of a read; the third is an address there, and a byte count in its reply
 TIMER_STEP_S = 0.001  # epoll waits whole milliseconds, rounded up; t3.5 is 1.75 ms
 MOST_SINGLE_IN_A_ROW = 4  # while a page waits: a heartbeat takes three requests, and none may hold a page up for ever
 MAY_BE_DONE_LATER = (5, 11)  # these say that the request went on its way, not that it was refused
@@ -82,7 +82,7 @@ class Connection:
         self._under_way: _Exchange | None = None
         self._received = b""
         self._echo = b""
-        self._sent = b""  # the last request's frame, where the line might echo it
+        self._sent = b""  # the last request's frame, where it is a read on a line that might echo it
         self._deadline = 0.0
         self._silent_from = 0.0
         self._alarm: asyncio.TimerHandle | None = None
@@ -192,8 +192,8 @@ class Connection:
         self._deadline = now + self._timeout_s + self._pace.byte_s * self._frames.wire_length(request)
         if self._alarm is None:
             self._alarm = self._loop.call_at(self._deadline, self._look_at_deadline)
-        if self._pace.silence_s:
-            self._sent = data
+        if self._pace.silence_s:  # the reply to a write begins as the write does
+            self._sent = data if request.pdu[0] == READ_REGISTERS else b""
         if self._pace.echo:
             self._echo = data
         self._channel.write(data)

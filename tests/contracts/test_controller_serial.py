@@ -379,6 +379,15 @@ async def test_a_line_that_echoes_unexpectedly_is_told_as_such(line: PtyLine, se
         await ModbusRtuController(SerialLine(line.near), timeout_s=PATIENT_S).connect()
 
 
+async def test_noise_behind_the_reply_to_a_write_which_repeats_it_is_no_echo(line: PtyLine, server: LineServer) -> None:
+    controller = ModbusRtuController(SerialLine(line.near), timeout_s=PATIENT_S)
+    await controller.connect()
+    line.towards_near = lambda data: data + b"\0"
+    with pytest.raises(ControllerNonsense, match="Check baud rate, parity, termination"):
+        await controller.write_transfer(5)
+    await controller.close()
+
+
 async def test_a_line_that_does_not_echo_as_it_was_said_to_is_told_as_such(line: PtyLine, server: LineServer) -> None:
     with pytest.raises(ControllerNonsense, match="the line does not echo: then take out echo"):
         await ModbusRtuController(SerialLine(line.near, echo=True), timeout_s=PATIENT_S).connect()

@@ -91,8 +91,10 @@ def _solved(
     """Control points and effective parameters of the penalised fit across the tangents, at the best of a few
     smoothnesses.
 
-    Each control point moves along one normal only, so that it cannot slide along the curve.
+    Each control point moves along one normal only, so that it cannot slide along the curve; none where nothing pulls.
     """
+    if not weight.any():
+        return control, 0.0
     column, value = basis
     knots = len(control)
     normal = -1j * tangent

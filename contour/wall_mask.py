@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import cv2
 import numpy as np
@@ -13,6 +13,7 @@ Gray = NDArray[np.uint8]
 Float = NDArray[np.float32]
 AnyFloat = NDArray[np.floating[Any] | np.integer[Any]]
 Levels = NDArray[np.uint8] | NDArray[np.uint16]
+L = TypeVar("L", bound=NDArray[Any])
 
 # Standard deviations above the level that walls stand on, itself about 1.5 below the mean where there is nothing but
 # noise: lower, and the table fills with specks.
@@ -31,9 +32,9 @@ _FAINT = 0.5
 _PICTURE_RISE = 0.2
 # Squares wider than any wall and narrower than most cells.
 _BESIDE_PITCHES = 0.8
-# What so many walls side by side would fill is wider than one (two more samples hold part of it), and what rises by
+# What so many walls side by side would fill is wider than one (blur adds to it on both sides), and what rises by
 # less than this share of the region's walls is fainter. Walls rise above it by this share of what they must elsewhere.
-_WIDE_WALLS, _PARTLY = 1.3, 2.0
+_WIDE_WALLS, _HALO_PX = 1.3, 4.0
 _TALL, _OVER = 0.5, 0.4
 _BYTE_CONTRAST = 40.0
 FINE_PITCH = 12.0
@@ -84,10 +85,10 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0,
     share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch) / 8, 0, 1))
     rise = np.maximum(np.maximum(share * walls, _REGION_RISE * region), _PICTURE_RISE * contrast * unit)
     least = NOISE_FLOOR * noise
+    size = _odd(_WIDE_WALLS * wall + _HALO_PX)
     wide = np.zeros_like(beside)
-    square = _odd(_WIDE_WALLS * wall / step + _PARTLY)
-    if wall and square < _odd(_BESIDE_PITCHES * pitch / step - 1):
-        wide = np.minimum(_opened(sign * _shrunk(smooth, step), square) - beside, _TALL * region)
+    if wall and size < _BESIDE_PITCHES * pitch:
+        wide = np.minimum(sign * _shrunk(_opened(smooth, size, closed=not bright), step) - beside, _TALL * region)
     mask, faint = (
         _standing_out(
             smooth,
@@ -147,9 +148,10 @@ def _beside(small: Float, pitch: float) -> Float:
     return _opened(small, _odd(_BESIDE_PITCHES * pitch - 1))
 
 
-def _opened(small: Float, size: int) -> Float:
-    square = np.ones((size, size), np.uint8)
-    return np.asarray(cv2.morphologyEx(small, cv2.MORPH_OPEN, square, borderType=cv2.BORDER_REFLECT), np.float32)
+def _opened(light: L, size: int, *, closed: bool = False) -> L:
+    """What stays of light when all brighter (with `closed`, darker) than what lies beside it within `size` is gone."""
+    square, way = np.ones((size, size), np.uint8), cv2.MORPH_CLOSE if closed else cv2.MORPH_OPEN
+    return cast(L, cv2.morphologyEx(light, way, square, borderType=cv2.BORDER_REFLECT))
 
 
 def _typical(span: Float) -> float:

@@ -339,10 +339,10 @@ def test_the_silence_is_the_standards(settings: SerialLine, silence_s: float) ->
 
 
 async def test_the_time_a_frame_is_on_the_line_is_no_part_of_the_time_out(line: PtyLine, server: LineServer) -> None:
-    """At 1200 baud 123 registers are on the line for more than two seconds."""
-    controller = ModbusRtuController(SerialLine(line.near, baudrate=1200), timeout_s=IMPATIENT_S)
+    """At 300 baud the first request of a page is on the line for more than two seconds."""
+    controller = ModbusRtuController(SerialLine(line.near, baudrate=300), timeout_s=1.0)
     await controller.connect()
-    server.delays_s = [3 * IMPATIENT_S]
+    server.delays_s = [1.8]
     await controller.write_page(Page((1, 0, 1, 1, 1, 1, 0, *(0,) * 24), (5,) * 82))
     await controller.close()
 

@@ -12,6 +12,7 @@ from contour.outline_proposals import Proposals, gather, gentle, window_fits
 from contour.outline_witnesses import Witnesses, cost, weights
 
 _MOST_PLACES = 160
+# Witnesses by which a stretch inside of the outline is shifted, to share the rest with what lies beside it.
 _SHARED = (2, 4)
 _STEPS = 4
 

@@ -104,11 +104,16 @@ def test_the_machine_moves_along_the_true_outline_of_the_block_in_the_picture(ma
     points = shapely.points(cutting)
     assert shapely.distance(points, lines_of(sent)).max() <= PATH_TOLERANCE_MM + 0.01
     assert shapely.distance(points, lines_of(truth)).max() <= 0.6
-    went = shapely.MultiPoint(cutting)
-    step_mm = np.hypot(*np.diff(cutting, axis=0).T)
-    for ring in sent:  # nothing of it left out: between samples lies what the feed makes of a sample's time
-        along = [shapely.LinearRing(ring).interpolate(s, normalized=True) for s in np.linspace(0, 1, 400)]
-        assert shapely.distance(shapely.points([p.coords[0] for p in along]), went).max() <= step_mm[step_mm < 50].max()
+    rings = [shapely.LinearRing(ring) for ring in sent]
+    nearest = np.argmin([shapely.distance(points, ring) for ring in rings], axis=0)
+    for number, ring in enumerate(rings):  # nothing of it left out
+        went = cutting[nearest == number]
+        # What the feed makes of a sample's time, or of the time that the sampler was kept waiting.
+        step_mm = np.hypot(*np.diff(np.vstack([went, went[:1]]), axis=0).T).max()
+        along = shapely.points([ring.interpolate(s, normalized=True).coords[0] for s in np.linspace(0, 1, 400)])
+        apart = shapely.distance(along, shapely.MultiPoint(went))
+        assert apart.max() <= step_mm
+        assert np.mean(apart <= 2.0) > 0.8
     fast = positions[positions[:, 2] >= CUT_Z + 1e-3]
     assert fast[:, 2].max() <= SAFE_Z + 1e-3
     if picture := os.environ.get("COMBTRACE_PICTURE"):

@@ -46,12 +46,12 @@ _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
 class Coefficients:
     """Standard deviation that one pixel of each cause stands for."""
 
-    blur: float = 0.254
-    dark: float = 0.397
-    leverage: float = 0.998
-    gap: float = 0.0013
-    misfit: float = 0.334
-    outside: float = 1.13
+    blur: float = 0.267
+    dark: float = 0.417
+    leverage: float = 1.048
+    gap: float = 0.0042
+    misfit: float = 0.351
+    outside: float = 1.187
 
 
 @dataclass(frozen=True)

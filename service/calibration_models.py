@@ -12,7 +12,7 @@ from contour.calibration import Alignment, Calibration, CameraCalibration, Simpl
 from contour.plane_calibration import PlaneCalibration
 from contour.position_uncertainty import PositionUncertainty
 from contour.sentinels import Mark, Sentinels
-from service.config import Number, no_truth_value
+from service.config_values import Number, no_truth_value
 
 VERSION = 1
 Size = Annotated[int, BeforeValidator(no_truth_value), Field(ge=1, le=100_000)]

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from service import config as models
+from service.config_values import TruthValue
 
 Location = tuple[int | str, ...]
 
@@ -133,8 +134,10 @@ def _choices(quoted: str) -> str:
 def _shown(seen: Any) -> str:
     if isinstance(seen, dict):
         return "keys with values"
-    if isinstance(seen, bool | models.TruthValue):
-        return str(models.TruthValue(seen) if isinstance(seen, bool) else seen)
+    if isinstance(seen, bool):
+        return str(TruthValue(seen))
+    if isinstance(seen, TruthValue):
+        return str(seen)
     if isinstance(seen, date):
         return f"the date {seen}"
     text = "nothing" if seen is None else repr(seen)

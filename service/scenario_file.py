@@ -11,9 +11,9 @@ from drivers.controller.simulated_faults import FAULT_KINDS, TARGETS, FaultKind,
 from drivers.controller.simulated_faults import Fault as FaultRule
 from drivers.controller.simulated_scenario import EVENT_KINDS, KINDS_OF, EventKind, MachineSettings, Scenario
 from drivers.controller.simulated_scenario import Event as MachineEvent
-from service.config import Model
 from service.config_file import SCHEMA_DIALECT, ConfigError, line_of, read_yaml, seen_instead_of_keys
 from service.config_mistakes import describe
+from service.config_values import Model
 
 Word = Annotated[int, Field(ge=1, le=65_535)]
 Seconds = Annotated[float, Field(ge=0, le=86_400)]

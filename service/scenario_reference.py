@@ -14,8 +14,8 @@ from drivers.controller.simulated_faults import FAULT_KINDS, TARGETS
 from drivers.controller.simulated_scenario import EVENT_KINDS
 from drivers.controller.simulated_verdict import KINDS
 from service import scenario_file
-from service.config import Model
 from service.config_reference import rows
+from service.config_values import Model
 
 BEGIN = "<!-- made from the models -->\n"
 END = "<!-- end of what is made -->\n"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
-import socket
 from collections.abc import Iterator
 
 from service.checkup.finding import Finding, fault, ok
 from service.config import Config
+from service.listening_socket import bound
 
 
 def check_listening(config: Config, running: int | None) -> Iterator[Finding]:
@@ -32,10 +32,7 @@ def _why_not(host: str, port: int, running: int | None) -> str | None:
     if running is not None:
         return None
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, kind, protocol) as listener:
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listener.bind(address)
+        bound(host, port).close()
     except (OSError, UnicodeError) as error:
         return f"{host}:{port} cannot be listened on: {getattr(error, 'strerror', None) or error}"
     return None

@@ -18,6 +18,7 @@ from starlette.responses import Response
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.config import Page as PageSettings
+from service.listening_socket import bound
 from service.operations import Operations
 from service.web.api import Api, problem
 from service.web.guard import Guard
@@ -152,11 +153,8 @@ def _serve(server: uvicorn.Server, listener: socket.socket) -> None:
 def _bound(host: str, port: int) -> socket.socket:
     """A listening socket; raise PageError."""
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listener = socket.socket(family, kind, protocol)
+        listener = bound(host, port)
         try:
-            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listener.bind(address)
             listener.listen(MOST_CONNECTIONS)
         except OSError:
             listener.close()

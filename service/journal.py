@@ -135,7 +135,7 @@ class Journal:
             raise
 
     def _prepare(self) -> None:
-        self._db.text_factory = _text
+        self._db.text_factory = readable_text
         version = self._db.execute("PRAGMA user_version").fetchone()[0]
         if version == 0:
             self._refuse_tables()
@@ -431,7 +431,7 @@ class Journal:
         return self._now().isoformat(timespec="milliseconds")
 
 
-def _text(stored: bytes) -> str:
+def readable_text(stored: bytes) -> str:
     """Text of the journal, also where its bytes were damaged: a job is more than its detail."""
     return stored.decode("utf-8", "replace")
 

@@ -12,7 +12,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from service.journal import Job, JournalDamaged, job_of
+from service.journal import Job, JournalDamaged, job_of, readable_text
 from service.journal_schema import SCHEMA_VERSION, columns
 from service.reasons import Outcome, Reason
 
@@ -150,5 +150,5 @@ def _connected(path: Path) -> sqlite3.Connection:
             database = sqlite3.connect(f"{name}?mode=ro&immutable=1", uri=True)
     except sqlite3.Error as error:
         raise JournalUnreadable(f"{path}: cannot be opened: {error}. Check its permissions") from error
-    database.text_factory = lambda stored: stored.decode("utf-8", "replace")
+    database.text_factory = readable_text
     return database

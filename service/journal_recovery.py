@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from service.journal import LARGEST_JOB, RESTORED, UNSETTLED, Journal, JournalDamaged, JournalError
+from service.journal import LARGEST_JOB, RESTORED, UNSETTLED, Journal, JournalDamaged, JournalError, readable_text
 from service.reasons import Reason
 
 log = logging.getLogger("combtrace.journal")
@@ -158,7 +158,7 @@ def _sound(row: tuple[Any, ...]) -> tuple[Any, ...]:
 
 def _reading(path: Path) -> sqlite3.Connection:
     database = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)
-    database.text_factory = lambda stored: stored.decode("utf-8", "replace")
+    database.text_factory = readable_text
     return database
 
 

@@ -87,15 +87,14 @@ def _journal(config: Config, running: bool) -> tuple[Finding, Job | None]:
     except JournalUnreadable as error:
         next_step = "" if running else "A damaged journal is moved aside at the service's next start"
         return fault("journal", str(error), next_step), None
+    newest = jobs[-1] if jobs else None
     ended = [job for job in jobs if job.outcome is not None]
     text = f"{path}: last job {ended[-1].job_id} {ended[-1].outcome}" if ended else f"{path}: no job yet"
     if damaged:
         next_step = "Copy the file, and look at its disk. If it cannot be gone on from, the next start moves it aside"
-        return warning("journal", f"{path}: {len(damaged)} damaged: {damaged[-1]}", next_step), jobs[
-            -1
-        ] if jobs else None
+        return warning("journal", f"{path}: {len(damaged)} damaged: {damaged[-1]}", next_step), newest
     open_ = len(jobs) - len(ended)
-    return ok("journal", text + (f", {open_} in flight" if open_ else "")), jobs[-1] if jobs else None
+    return ok("journal", text + (f", {open_} in flight" if open_ else "")), newest
 
 
 def _disks(config: Config) -> Iterator[Finding]:

@@ -35,12 +35,12 @@ def prepare():
 
 
 def sample(path):
-    """Positions from the next program's start to its end, as fast as they can be read; to a JSON file."""
+    """Positions and their times, s, from the next program's start to its end, as fast as can be; to a file."""
     until(lambda: stat.interp_state != linuxcnc.INTERP_IDLE, 60, "a program runs")
     points = []
     while stat.interp_state != linuxcnc.INTERP_IDLE or not stat.inpos:
         stat.poll()
-        points.append([round(value, 5) for value in stat.actual_position[:3]])
+        points.append([*(round(value, 5) for value in stat.actual_position[:3]), round(time.monotonic(), 5)])
         time.sleep(0.001)
     with open(path, "w", encoding="ascii") as file:
         json.dump(points, file)

@@ -13,26 +13,25 @@ from typing import Any, ParamSpec, TypeVar
 from contour.errors import ParameterError, PictureError
 from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
 from drivers.controller import ControllerError
-from drivers.controller.mailbox import ContourTooLarge, MailboxError, Page, crc32_of, withdrawal
+from drivers.controller.mailbox import ContourTooLarge, MailboxError, Page, crc32_of, decode_header, withdrawal
 from service.config import Recipe
+from service.controller_clock import Stamp
 from service.evidence import Evidence
 from service.health import Fault, Health, journal_fault
 from service.job_pages import Envelope, contour_pages
 from service.journal import Job, Journal, JournalError, Terms
-from service.link import Link, Stamp
+from service.link import Link
 from service.measure import Measurement, Measurer
 from service.reasons import Outcome, Reason
-from service.transfer import Settlement, Transfer, TransferCounter, TransferSettings
+from service.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
 
 log = logging.getLogger("combtrace.cycle")
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-STAMP_WAIT_S = 1.5  # a lost connection is back within that
+STAMP_WAIT_S = 3.0  # a lost connection is back within that, and a clock has held over two heartbeats
 JOURNAL_PAUSE_S = 1.0
-NO_LIMIT = (0, 0)
-VALID_FOR = slice(27, 29)  # in a page's header, which begins with offset 1
 
 
 @dataclass(frozen=True)
@@ -48,6 +47,7 @@ class CycleSettings:
     """Bounds of one job. valid_for_s 0 = no limit by the controller's clock; job_timeout_s bounds it then.
 
     observe: the pages are made and not sent.
+    target: which controller it is and how it is laid out, by configuration key: a job in flight is settled there only.
     """
 
     default_recipe: int = 1
@@ -57,6 +57,7 @@ class CycleSettings:
     observe: bool = False
     mailbox: MailboxFormat = field(default_factory=MailboxFormat)
     transfer: TransferSettings = field(default_factory=TransferSettings)
+    target: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def lifetime_s(self) -> float:
@@ -195,18 +196,34 @@ class Cycle:
                 job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), _Course(job, self._plan)
             )
         assert job.session is not None
-        expires_at_s = self._now() + self._settings.lifetime_s
-        transfer = self._transfer(self._link, job, job.session, job.pages, expires_at_s, sent=True)
+        validity = self._validity(job.pages)
+        lasts_s = validity.valid_for / 1000 or self._settings.lifetime_s
+        lifetime = Lifetime(self._now() + lasts_s, job.taken_at_s, lasts_s, self._now)
+        transfer = self._transfer(self._link, job, job.session, job.pages, lifetime, sent=True)
         if job.withdraw_reason is not None:
             settlement = await transfer.withdraw(job.withdraw_reason, "a withdrawal that the restart cut short")
         elif not job.pages:
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, "its pages cannot be read in the journal")
-        elif job.pages[0].header[VALID_FOR] == NO_LIMIT:
+        elif not validity.valid_for:
             detail = "how old the contour is cannot be known after a restart, and the controller would not look"
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
         else:
             settlement = await transfer.run()
         return await self._settle(job, settlement, _Course(job, self._plan))
+
+    def hindrance(self, job: Job) -> str | None:
+        """Why a job found in flight cannot be settled as the service is configured now; None where it can."""
+        if not job.sent:
+            return None
+        target = self._settings.target
+        text = "it is in flight at a controller that the configuration does not name as it was. Put back "
+        if job.target and job.target != dict(target):
+            keys = [key for key in {**job.target, **target} if job.target.get(key) != target.get(key)]
+            was = ", ".join(f"controller.{key}: {job.target[key]}" for key in keys if key in job.target)
+            return f"{text}{was}, and start again; once the job has ended, it may be changed"
+        if self._link is None or self._settings.observe:
+            return f"{text}the controller with mode: send, and start again; once the job has ended, it may be changed"
+        return None
 
     # --- the steps ----------------------------------------------------------------------------------------------
 
@@ -232,8 +249,9 @@ class Cycle:
         course.report["pages_ms"] = self._since(before)
         if self._settings.observe:
             return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
-        expires_at_s = stamped_at + self._settings.lifetime_s
-        transfer = self._transfer(self._link, job, stamp.session, pages, expires_at_s, terms=course.terms)
+        lasts_s = self._settings.lifetime_s
+        lifetime = Lifetime(stamped_at + lasts_s, job.taken_at_s, lasts_s, self._now)
+        transfer = self._transfer(self._link, job, stamp.session, pages, lifetime, terms=course.terms)
         before = self._now()
         settlement = await transfer.run()
         course.report["transfer_ms"] = self._since(before)
@@ -345,13 +363,13 @@ class Cycle:
         job: Job,
         session: int,
         pages: tuple[Page, ...],
-        expires_at_s: float,
+        lifetime: Lifetime,
         *,
         sent: bool = False,
         terms: Terms | None = None,
     ) -> Transfer:
         async def before_sending() -> None:
-            await self._durably(self._journal.store_pages, job.job_id, session, pages, terms)
+            await self._durably(self._journal.store_pages, job.job_id, session, pages, terms, self._settings.target)
 
         async def before_withdrawal(reason: Reason) -> None:
             await self._durably(self._journal.store_withdrawal, job.job_id, reason)
@@ -367,14 +385,20 @@ class Cycle:
             session=session,
             pages=pages,
             withdrawal=withdrawal(job.job_id, session, self._settings.mailbox.word_order),
-            expires_at_s=expires_at_s,
+            lifetime=lifetime,
+            validity=self._validity(pages),
             before_sending=before_sending,
             before_withdrawal=before_withdrawal,
             on_stuck=on_stuck,
             sent=sent,
             beat=self._beat,
-            now=self._now,
         )
+
+    def _validity(self, pages: tuple[Page, ...]) -> Validity:
+        if not pages:
+            return Validity()
+        header = decode_header(pages[0], self._settings.mailbox.word_order)
+        return Validity(header["captured_at"], header["valid_for"])
 
     # --- the end ------------------------------------------------------------------------------------------------
 
@@ -427,7 +451,7 @@ class Cycle:
         if known is None or not known.sent or known.session is None or never_answered:
             return Settlement(Outcome.FAILED, Reason.INTERNAL_ERROR, detail)
         assert self._link is not None
-        transfer = self._transfer(self._link, job, known.session, known.pages, self._now(), sent=True)
+        transfer = self._transfer(self._link, job, known.session, known.pages, Lifetime(self._now()), sent=True)
         return await transfer.withdraw(Reason.INTERNAL_ERROR, detail)
 
 

@@ -2,11 +2,13 @@
 
 Version 2 added what a job was carried out with (its recipe's whole settings, the calibration's hash) and its transfer.
 Version 3 added who asked for what from the operator's page.
+Version 4 added at which controller, and how laid out there, a job was sent.
 """
 
 from __future__ import annotations
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
+WITH_TARGETS = 4
 
 AUDIT = """
 CREATE TABLE audit (
@@ -41,7 +43,8 @@ CREATE TABLE jobs (
     report TEXT,
     recipe_digest TEXT,
     calibration TEXT,
-    transfer TEXT
+    transfer TEXT,
+    target TEXT
 ) STRICT;
 CREATE INDEX jobs_unsettled ON jobs (job_id) WHERE outcome IS NULL;
 CREATE INDEX jobs_by_controller ON jobs (job_id) WHERE trigger_counter IS NOT NULL;
@@ -56,18 +59,24 @@ ALTER TABLE jobs ADD COLUMN calibration TEXT;
 ALTER TABLE jobs ADD COLUMN transfer TEXT;
 """,
     2: AUDIT,
+    3: "ALTER TABLE jobs ADD COLUMN target TEXT;",
 }
 
 COLUMNS_OF_1 = (
     "job_id, taken_at, trigger_kind, recipe, thickness_um, trigger_session, trigger_counter,"
     " session, pages, withdraw_reason, outcome, reason, detail, settled_at, report"
 )
-COLUMNS = f"{COLUMNS_OF_1}, (SELECT settings FROM recipe_settings WHERE digest = recipe_digest), calibration, transfer"
+COLUMNS_OF_2 = (
+    f"{COLUMNS_OF_1}, (SELECT settings FROM recipe_settings WHERE digest = recipe_digest), calibration, transfer"
+)
+COLUMNS = f"{COLUMNS_OF_2}, target"
 
 
 def columns(version: int) -> str:
     """What to select of `jobs` in a journal of this version, for `service.journal.job_of`."""
-    return COLUMNS if version > 1 else f"{COLUMNS_OF_1}, NULL, NULL, NULL"
+    if version == 1:
+        return f"{COLUMNS_OF_1}, NULL, NULL, NULL, NULL"
+    return COLUMNS if version >= WITH_TARGETS else f"{COLUMNS_OF_2}, NULL"
 
 
 def migration(version: int) -> str | None:

@@ -65,6 +65,10 @@ from service.triggers import SerialPulses, SerialTrigger, interval_trigger
 
 log = logging.getLogger("combtrace.daemon")
 
+TARGET_KEYS = {
+    *("kind", "host", "port", "device_id", "word_order", "handshake", "mode"),
+    *("link_address", "service_address", "contour_address", "payload_capacity"),
+}
 BURST_SILENCE_S = 0.2
 LEVEL_HOLDS_S = 0.05
 
@@ -286,12 +290,6 @@ def _make_journal(config: Config) -> tuple[Locks, Journal]:
             state.leave_no_file()
         locks.release()
         raise WiringError(str(error)) from error
-    try:
-        _observe_settles_nothing(config, journal)
-    except WiringError:
-        journal.close()
-        locks.release()
-        raise
     return locks, journal
 
 
@@ -304,16 +302,6 @@ def controller_names(config: Config) -> list[str]:
         return []
     unit = settings.device_id if isinstance(settings, ModbusTcp) else None
     return network_names(settings.host, settings.port, unit)
-
-
-def _observe_settles_nothing(config: Config, journal: Journal) -> None:
-    """Raise WiringError where a job is in flight at the controller, which only a service that writes can settle."""
-    sent = [job.job_id for job in journal.unsettled() if job.sent]
-    if sent and not isinstance(config.controller, NoController) and config.controller.mode == "observe":
-        raise WiringError(
-            f"{config.journal.path}: job {sent[0]} is in flight at the controller, and mode observe cannot settle it. "
-            "Run once with mode send, or give this one its own journal.path and service.state_dir"
-        )
 
 
 def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:
@@ -400,7 +388,9 @@ def cycle_settings(config: Config) -> CycleSettings:
     """The bounds of a job."""
     settings = config.controller
     if isinstance(settings, NoController):
-        return CycleSettings(default_recipe=config.default_recipe, camera_timeout_s=config.camera.timeout_s)
+        return CycleSettings(
+            default_recipe=config.default_recipe, camera_timeout_s=config.camera.timeout_s, target=_target(config)
+        )
     return CycleSettings(
         camera_timeout_s=config.camera.timeout_s,
         default_recipe=config.default_recipe,
@@ -416,7 +406,13 @@ def cycle_settings(config: Config) -> CycleSettings:
             max_repeats=settings.max_repeats,
             poll_period_s=settings.poll_period_s,
         ),
+        target=_target(config),
     )
+
+
+def _target(config: Config) -> dict[str, str | int]:
+    """Which controller it is and how it is laid out: the keys that must not change while a job is in flight there."""
+    return config.controller.model_dump(mode="json", include=TARGET_KEYS)
 
 
 def find_table(config: Config) -> TableRecord | None:

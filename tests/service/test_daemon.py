@@ -82,9 +82,9 @@ class Built:
         await asyncio.wait_for(running, 15)
         Lock(self.folder / "lock").release()  # it let go
         journal = Journal(self.folder / "journal.sqlite")
-        jobs = [job for number in range(1, 20) if (job := journal.find(number))]
+        jobs = journal._jobs("ORDER BY job_id")
         journal.close()
-        return jobs
+        return list(jobs)
 
 
 class Systemd:
@@ -158,7 +158,7 @@ async def test_once_takes_no_trigger_of_the_controller(tmp_path: Path) -> None:
     controller.link = replace(controller.link, trigger_counter=4)
     built = Built(tmp_path, controller)
     job = await asyncio.wait_for(built.daemon.run_once(5.0), 10)
-    assert (job.job_id, job.trigger.kind) == (1, "manual")
+    assert job.trigger.kind == "manual"
     journal = Journal(tmp_path / "journal.sqlite")
     assert journal.last_taken() == job
     assert journal.last_controller_trigger() == (0, 0)

@@ -201,7 +201,8 @@ class Cycle:
         lifetime = Lifetime(self._now() + lasts_s, job.taken_at_s, lasts_s, self._now)
         transfer = self._transfer(self._link, job, job.session, job.pages, lifetime, sent=True)
         if job.withdraw_reason is not None:
-            settlement = await transfer.withdraw(job.withdraw_reason, "a withdrawal that the restart cut short")
+            detail = "a withdrawal that the restart cut short" if job.pages else "whether it was sent is not known"
+            settlement = await transfer.withdraw(job.withdraw_reason, detail)
         elif not job.pages:
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, "its pages cannot be read in the journal")
         elif not validity.valid_for:

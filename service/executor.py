@@ -85,6 +85,7 @@ class Executor:
         self.last_settled: Job | None = None
         self._last_pair = journal.last_controller_trigger()
         self._found = False
+        self._begun = link is None or not link.settings.handshake or link.settings.observe
         self._numbered_above_last_job = False
         # Two that start at once with one journal find the same: by chance they number differently.
         self._room = ROOM + secrets.randbelow(ROOM)
@@ -133,8 +134,8 @@ class Executor:
         self._tell_found(gone_on, ours)
         if gone_on.in_flight is not None:
             self._report_in_flight(gone_on.in_flight)
-            self._found = True
-            self._wake.set()
+        self._begun = self._found = True
+        self._wake.set()
 
     def _tell_found(self, gone_on: GoneOn, ours: bool) -> None:
         """An alarm where our own number stands beside what our journal does not know: it is an old one."""
@@ -365,6 +366,8 @@ class Executor:
                 return
             log.warning("job %d was in flight when the service ended", job.job_id)
             self._report_in_flight(job.job_id)
+            if not job.sent and not self._begun:  # the block at the controller may know more of it than the journal
+                return
             await self._finish(await self._runner.resume(job))
         self._health.report("in-flight", None)
 

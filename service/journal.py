@@ -311,6 +311,12 @@ class Journal:
                 values |= {"adopted_above": highest, "adopted_session": pair[0], "adopted_counter": pair[1]}
             for key, value in values.items():
                 db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, str(value)))
+            if session:  # one that this journal calls unsent may have been sent in a life that it does not know
+                db.execute(
+                    "UPDATE jobs SET session = ?, withdraw_reason = ?"
+                    f" WHERE {UNSETTLED} AND session IS NULL AND job_id <= ?",
+                    (session, int(Reason.SERVICE_RESTARTED), found.job_id),
+                )
             unknown = (
                 found.job_id > found.settled_job
                 and session

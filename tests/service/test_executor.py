@@ -33,6 +33,7 @@ class HeldRunner:
         self.journal = journal
         self.begun: list[int] = []
         self.resumed: list[int] = []
+        self.sent: list[int] = []
         self.go = asyncio.Event()
         self.go.set()
 
@@ -46,6 +47,7 @@ class HeldRunner:
 
     async def resume(self, job: Job) -> Job:
         self.resumed.append(job.job_id)
+        self.sent += [job.job_id] if job.sent else []
         await self.go.wait()
         return self.journal.settle(job.job_id, Outcome.FAILED, Reason.SERVICE_RESTARTED, "sent before")
 
@@ -85,8 +87,10 @@ class Bench:
 
 
 @asynccontextmanager
-async def running(folder: Path, *, observe: bool = False, counter: int = 0) -> AsyncIterator[Bench]:
+async def running(folder: Path, *, observe: bool = False, counter: int = 0, begun: bool = True) -> AsyncIterator[Bench]:
+    """begun: what stands at the controller was seen: nobody has written there."""
     bench = Bench(folder, observe=observe)
+    bench.executor._begun = bench.executor._begun or begun
     task = asyncio.ensure_future(bench.executor.run())
     bench.health.start()
     bench.controller_says(trigger_counter=counter)
@@ -228,6 +232,7 @@ async def test_a_job_in_flight_at_the_start_is_settled_before_any_trigger_is_tak
     old = before.take(TriggerStamp("controller", session=9, counter=6))
     before.close()
     bench = Bench(tmp_path)
+    bench.executor._begun = True
     bench.runner.go.clear()
     bench.health.start()
     bench.controller_says(trigger_counter=7)
@@ -451,6 +456,32 @@ async def test_a_job_that_only_the_service_block_knows_is_taken_back(tmp_path: P
         await bench.link.on_found(found)
         await until(lambda: bench.runner.resumed == [before + 1])
         assert bench.link.published.settled_job == before + 1, "so that its trigger ends"
+
+
+async def test_a_job_that_the_journal_calls_unsent_is_settled_by_the_controller_where_the_block_knows_it(
+    tmp_path: Path,
+) -> None:
+    """A copy of the journal was taken after the trigger and before the contour was sent, and put back afterwards."""
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        job = (await bench.executor.submit(TriggerStamp("serial"))).job
+    async with running(tmp_path, begun=False) as bench:
+        await asyncio.sleep(0.05)
+        assert bench.runner.resumed == [], "what the controller knows is asked first"
+        assert bench.health.state is State.ERROR
+        owner = bench.journal.owner
+        await bench.link.on_found(left_behind(owner=owner, job_id=job.job_id, settled_job=0, trigger_ack=0))
+        await until(lambda: bench.runner.resumed == [job.job_id])
+        assert bench.runner.sent == [job.job_id], "as one that may have been sent"
+
+
+async def test_a_job_that_the_journal_calls_unsent_and_the_block_does_not_know_was_never_sent(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        job = (await bench.executor.submit(TriggerStamp("serial"))).job
+    async with running(tmp_path) as bench:
+        await until(lambda: bench.runner.resumed == [job.job_id])
+        assert bench.runner.sent == []
 
 
 async def test_an_earlier_trigger_in_the_service_block_takes_nothing_back(tmp_path: Path) -> None:

@@ -32,6 +32,12 @@ class Rule:
     there: str
     without: str
 
+    def taken_out(self) -> str:
+        """The text of the code's file without the rule."""
+        text = (ROOT / self.code.partition("::")[0]).read_text(encoding="utf-8")
+        whole = source_of(self.code)
+        return text.replace(whole, whole.replace(self.there, self.without, 1))
+
 
 RULES = (
     # --- conventions ---

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from drivers.controller.mailbox import Answer, LinkBlock, ServiceBlock
@@ -121,6 +121,7 @@ def test_a_foreign_owner_later_stops_all_writing() -> None:
         watched.ownership.check()
 
 
+@example([(THEIRS, 0, 0.0), (THEIRS, 0, 0.0), (THEIRS, 0, 2.9)])  # hardly ever drawn, and what the rule is about
 @given(st.lists(st.tuples(st.sampled_from([0, OURS, THEIRS, 300]), st.integers(0, 1), st.floats(0, 2.9)), max_size=60))
 def test_nothing_is_written_over_another_that_moved_or_was_watched_for_less_than_3_s(
     readings: list[tuple[int, int, float]],

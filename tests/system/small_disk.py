@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 
@@ -32,3 +33,24 @@ def mounted(disk: Path, megabytes: int) -> Iterator[Path]:
         yield disk
     finally:
         unmounts.communicate()
+
+
+def fill(disk: Path, leave: int) -> Path:
+    """Somebody else's file, which leaves so many bytes free."""
+    file = disk / "somebody-else"
+    with suppress(OSError), file.open("wb") as stream:  # the daemon may have taken some meanwhile
+        while (room := free(disk) - leave) > 0:
+            stream.write(bytes(min(room, 64 * 1024)))
+            stream.flush()
+    return file
+
+
+def free(disk: Path) -> int:
+    """Bytes that are free."""
+    room = os.statvfs(disk)
+    return room.f_bavail * room.f_frsize
+
+
+def remount(disk: Path, how: str) -> None:
+    """`ro` or `rw`: read-only, as a file system that has found a fault, or writable again."""
+    subprocess.run(["mount", "-o", f"remount,{how}", disk], check=True, capture_output=True)

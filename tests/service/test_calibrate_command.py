@@ -73,6 +73,62 @@ def test_a_verdict_that_is_not_good_writes_the_report_and_no_file(
     assert "not written" in capsys.readouterr().err
 
 
+def calibrated(views: Path, output: Path, *options: str, square_mm: str = "30") -> int:
+    board = ["--board", "charuco", "--squares", "11x8", "--square-mm", square_mm]
+    plane = ["--plane", str(views / "flat.png"), "--output", str(output)]
+    return main(["calibrate", *board, *plane, *options, *images(views)])
+
+
+def test_tape_and_result_stand_side_by_side_and_a_wrong_square_is_refused_by_them(
+    views: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output, tape = tmp_path / "cell.yaml", f"{SMALL.position_mm[2]:.0f}"
+    assert calibrated(views, output, "--camera-height-mm", tape, square_mm="25") == 3
+    told = capsys.readouterr()
+    report = output.with_suffix(".html").read_text()
+    for text in (told.out, report):
+        assert f"mm by the calibration, {tape} mm measured: 16." in text
+        assert f"squares of 30.0 mm would give {tape[:3]}" in text
+    assert 'class="verdict bad"' in report
+    assert not output.exists()
+    assert told.err.endswith("To take it nevertheless: --accept-apart-percent 17\n")
+    assert calibrated(views, output, "--camera-height-mm", tape, "--accept-apart-percent", "17", square_mm="25") == 0
+    assert "WARNING   camera above the table" in capsys.readouterr().out
+    assert f"measured {tape}" in str(load_record(output).made["compared_lengths"])
+    assert calibrated(views, output, "--camera-height-mm", tape) == 0
+    assert "WARNING" not in capsys.readouterr().out
+
+
+def test_a_known_length_in_the_picture_is_told_beside_the_result(
+    views: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ends = np.array([[200.0, 200.0], [700.0, 500.0]])
+    length_mm = float(np.linalg.norm(np.diff(SMALL.back_project(ends, 0.0), axis=0)))
+    between = ["--between", "200,200", "700,500"]
+    assert calibrated(views, tmp_path / "x.yaml", "--known-length-mm", f"{length_mm:.1f}", *between) == 0
+    assert f"known length on the table {length_mm:.0f} mm by the calibration" in capsys.readouterr().out
+    assert calibrated(views, tmp_path / "x.yaml", "--known-length-mm", f"{1.1 * length_mm:.1f}", *between) == 3
+
+
+def test_the_part_that_no_corner_reached_is_named_and_kept_in_the_file(
+    views: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "cell.yaml"
+    assert calibrated(views, output, "--area-px", "0,0,959,719") == 3
+    told = capsys.readouterr()
+    assert "of --area-px (0, 0)" in told.out
+    assert told.err.endswith("To take it nevertheless: --accept-uncovered\n")
+    assert calibrated(views, output, "--area-px", "300,200,600,500") == 0
+    assert "a block that leaves that part is refused (115 outside_work_area)" in capsys.readouterr().out
+    sure = load_calibration(output).uncertainty
+    assert sure is not None
+    assert len(sure.uncovered(np.array([[450.0, 350.0], [2.0, 2.0]]))) == 1
+    assert calibrated(views, output, "--area-px", "0,0,959,719", "--accept-uncovered") == 0
+    sure = load_calibration(output).uncertainty
+    assert sure is not None
+    assert sure.covered_px is None
+
+
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
@@ -80,6 +136,10 @@ def test_a_verdict_that_is_not_good_writes_the_report_and_no_file(
         (["--output", "x.yaml", "--scale", "1", "--points", "a.csv"], "seen points and scale"),
         (["--output", "x.yaml", "--scale", "1"], "--scale needs --size WxH"),
         (["--output", "x.yaml", "--scale", "-1", "--size", "9x9"], "mm_per_pixel is -1.0"),
+        (["--output", "x.yaml", "--scale", "1", "--size", "9x9", "--camera-height-mm", "9"], "give --known-length-mm"),
+        (["--output", "x.yaml", "--scale", "1", "--size", "9x9", "--accept-uncovered"], "no views that cover an area"),
+        (["--output", "x.yaml", "--scale", "1", "--size", "9x9", "--known-length-mm", "9"], "belong together"),
+        (["--output", "x.yaml", *BOARD, "--plane", "a.png", "--accept-apart-percent", "0"], "--accept-apart-percent 0"),
         (["--output", "x.yaml", "--board", "chessboard"], "--board needs --squares and --square-mm and --plane"),
         (
             ["--output", "x.yaml", "--board", "chessboard", "--squares", "8x8", "--square-mm", "9", "--plane", "a.png"],
@@ -172,3 +232,25 @@ def test_a_scale_becomes_the_simple_form(tmp_path: Path) -> None:
     calibration = load_calibration(tmp_path / "x.yaml")
     assert isinstance(calibration, SimpleCalibration)
     np.testing.assert_allclose(calibration.to_work(np.array([[200.0, 1000.0]]), 0), [[37.5, 37.5]])
+
+
+@pytest.mark.parametrize(("length_mm", "status", "told"), [(301, 0, "lengths"), (312, 0, "WARNING"), (330, 3, "apart")])
+def test_a_scale_is_held_against_a_known_length(
+    length_mm: int, status: int, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--scale", "0.375", "--size", "1600x1200", "--known-length-mm", str(length_mm)]
+    output = tmp_path / "x.yaml"
+    assert main(["calibrate", *options, "--between", "100,100", "900,100", "--output", str(output)]) == status
+    text = capsys.readouterr()
+    assert told in text.out
+    assert output.exists() is (status == 0)
+    if status:
+        assert "Check --scale: 1.1 times as much would agree" in text.err
+        assert "--accept-apart-percent 10" in text.err
+
+
+def test_points_are_held_against_a_known_length(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    between = ["--between", "100,1100", "1500,1100"]
+    assert from_points(tmp_path, POINTS, "--known-length-mm", "561", *between) == 0
+    assert from_points(tmp_path, POINTS, "--known-length-mm", "672", *between) == 3
+    assert "the points' millimetres: all times 1.2 would agree" in capsys.readouterr().err

@@ -292,4 +292,4 @@ def _overrides(faults: Sequence[_Fault]) -> tuple[str, ...]:
     needed: dict[str, float] = {}
     for fault in faults:
         needed[fault.option] = max(needed.get(fault.option, 0.0), fault.value)
-    return tuple(f"{option} {value:g}" if value else option for option, value in needed.items())
+    return tuple(f"{option} {value:.9g}" if value else option for option, value in needed.items())

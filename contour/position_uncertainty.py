@@ -54,7 +54,8 @@ class PositionUncertainty:
         ring = np.array(self.covered_px, dtype=np.float64)
         if ring.ndim != 2 or ring.shape[1:] != (2,) or len(ring) < 3 or not np.isfinite(ring).all():
             raise CalibrationError(
-                f"uncertainty: covered_px has shape {ring.shape}, expected three or more finite points. Calibrate again."
+                f"uncertainty: covered_px has shape {ring.shape}, expected three or more finite points. Calibrate "
+                "again."
             )
         ring.flags.writeable = False
         object.__setattr__(self, "covered_px", ring)

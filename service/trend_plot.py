@@ -6,6 +6,7 @@ import html
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
+from math import floor, log10
 
 from service.trend_file import CHECKS, TrendLine
 
@@ -16,8 +17,8 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 70, 20, 34, 36
 _HEADROOM = 1.15
 _STYLE = """
 svg { font: 13px system-ui, sans-serif; fill: #222; background: #fff; } .title { font-weight: bold; }
-.axis { stroke: #999; } .grid { stroke: #ddd; } .limit { fill: none; stroke: #b2182b; stroke-dasharray: 6 4; }
-.worst { fill: none; stroke: #2166ac; stroke-width: 1.5; } .p95 { fill: none; stroke: #92c5de; stroke-width: 1.5; }
+path { fill: none; } .axis { stroke: #999; } .grid { stroke: #ddd; } .limit { stroke: #b2182b; stroke-dasharray: 6 4; }
+.worst { stroke: #2166ac; stroke-width: 1.5; } .p95 { stroke: #92c5de; stroke-width: 1.5; }
 .pass { fill: #2166ac; } .fail { fill: #b2182b; } .new { stroke: #777; stroke-dasharray: 2 3; }
 .down { text-anchor: end; } .middle { text-anchor: middle; } .red { fill: #b2182b; }
 """
@@ -63,10 +64,10 @@ def _panel(check: str, lines: Sequence[TrendLine]) -> str:
         f"{last.worst_mm:.3f} mm of {last.limit_mm:g} mm</text>",
         f'<text x="{WIDTH - _RIGHT}" y="20" class="down">dark: worst, light: 95 %, mm; red: limit, failed</text>',
     ]
-    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
-        value = top * share
+    step = _step(top)
+    for value in (number * step for number in range(int(top / step) + 1)):
         parts.append(f'<path class="grid" d="M{_LEFT} {y(value):.1f}H{WIDTH - _RIGHT}"/>')
-        parts.append(f'<text x="{_LEFT - 8}" y="{y(value) + 4:.1f}" class="down">{value:.3f}</text>')
+        parts.append(f'<text x="{_LEFT - 8}" y="{y(value) + 4:.1f}" class="down">{value:.3g}</text>')
     for before, line in pairwise(lines):
         if line.calibration != before.calibration:
             parts.append(f'<path class="new" d="M{x(line):.1f} {_TOP}V{PANEL - _BOTTOM}"/>')
@@ -84,6 +85,12 @@ def _panel(check: str, lines: Sequence[TrendLine]) -> str:
     for time, place, kind in ((begin, _LEFT, ""), (end, WIDTH - _RIGHT, "down")):
         parts.append(f'<text x="{place}" y="{PANEL - 12}" class="{kind}">{_day(time)}</text>')
     return "".join(parts)
+
+
+def _step(top: float) -> float:
+    """A step of 1, 2 or 5 that divides the height into two to five."""
+    power = 10.0 ** floor(log10(top))
+    return next(share * power for share in (0.2, 0.5, 1.0, 2.0) if top / (share * power) <= 5)
 
 
 def _limits(places: Sequence[tuple[float, float]]) -> str:

@@ -123,5 +123,12 @@ def _tell(fit: AlignmentFit, accept_scale: float) -> None:
 def _work_points(pixels: NDArray[np.float64], calibration: Calibration, height_mm: float) -> NDArray[np.float64]:
     """Work points of pixels at a height; raise UserError where the calibration does not know that height."""
     if not calibration.height_known(height_mm):
-        raise UserError(f"--height-mm {height_mm:g}: the calibration does not know its scale there. Use its own plane")
+        own_mm = getattr(calibration, "plane_height_mm", 0.0)
+        raise UserError(
+            f"--height-mm {height_mm:g}: the calibration does not know its scale there. Take marks on its own plane, "
+            f"and --height-mm {own_mm:g}"
+        )
+    sure = calibration.uncertainty
+    for x, y in [] if sure is None else sure.uncovered(pixels):
+        print(f"WARNING   pixel ({x:g}, {y:g}) lies where the calibration is not covered: take a mark inside")
     return calibration.to_work(pixels, height_mm)

@@ -266,6 +266,7 @@ def _report(
 
 def _from_points(args: argparse.Namespace) -> Calibration:
     from contour.errors import CalibrationFailed
+    from contour.length_check import rounded_up
     from contour.point_calibration import calibrate_points
     from service.points_file import PointsFileError, read_points
 
@@ -283,8 +284,8 @@ def _from_points(args: argparse.Namespace) -> Calibration:
         number = int(result.residuals_mm.argmax()) + 1
         raise UserError(
             f"{args.points}: point {number} lies {worst:.3f} mm from the map through all points, {accept_mm:g} mm are "
-            "allowed. Measure it again; if all are off, the lens bends lines: calibrate with a board, or raise "
-            "--accept-mm",
+            "allowed. Measure it again; if all are off, the lens bends lines: calibrate with a board. To take it "
+            f"nevertheless: --accept-mm {rounded_up(worst, 0.001):.9g}",
             EXIT_REFUSED,
         )
     sure = result.calibration.uncertainty
@@ -340,7 +341,9 @@ def _sentinels(args: argparse.Namespace, gathered: Gathered | None) -> Sentinels
     except (CameraError, ContourError) as error:
         raise UserError(f"--sentinels: {error}") from error
     if found is None:
-        raise UserError(f"--sentinels {args.sentinels}: no such mark is seen. Check the name, and the light")
+        raise UserError(
+            f"--sentinels {args.sentinels}: no such mark is seen. Check name and light, or leave --sentinels out"
+        )
     print(f"sentinels {', '.join(str(mark.id) for mark in found.marks)}")
     return found
 

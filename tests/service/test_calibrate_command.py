@@ -70,7 +70,10 @@ def test_a_verdict_that_is_not_good_writes_the_report_and_no_file(
     assert main(["calibrate", *BOARD, *options, *images(views)]) == 3
     assert not output.exists()
     assert "repeat with more and sharper views" in output.with_suffix(".html").read_text()
-    assert "not written" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "not written" in told
+    advice = told.strip().split("To take it nevertheless: ")[1].split()
+    assert main(["calibrate", *BOARD, *options, *images(views), *advice]) == 0
 
 
 def calibrated(views: Path, output: Path, *options: str, square_mm: str = "30") -> int:
@@ -222,8 +225,11 @@ def test_points_that_do_not_serve_are_one_clear_line(
 
 
 def test_points_that_contradict_one_another_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert from_points(tmp_path, POINTS.replace("280,200", "290,200")) == 3
-    assert "1 mm are allowed" in capsys.readouterr().err
+    wrong = POINTS.replace("280,200", "290,200")
+    assert from_points(tmp_path, wrong) == 3
+    told = capsys.readouterr().err
+    assert "1 mm are allowed" in told
+    assert from_points(tmp_path, wrong, *told.strip().split("To take it nevertheless: ")[1].split()) == 0
 
 
 def test_a_scale_becomes_the_simple_form(tmp_path: Path) -> None:

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 import yaml
 
-from contour.calibration import Alignment
-from service.calibration_file import load_calibration, load_record, save_record
+from contour.calibration import Alignment, SimpleCalibration
+from contour.position_uncertainty import PositionUncertainty
+from service.calibration_file import CalibrationRecord, load_calibration, load_record, save_record
 from service.cli.main import main
 
 SAMPLES = Path(__file__).parents[2] / "service" / "samples"
@@ -185,6 +186,22 @@ def test_pixels_at_a_height_align_it_too(tmp_path: Path) -> None:
     aligned = load_calibration(tmp_path / "d.yaml")
     np.testing.assert_allclose(aligned.to_machine(aligned.to_work(pixels, 20.0)), machine, atol=1e-6)
     assert load_calibration(tmp_path / "c.yaml").alignment == Alignment(0.0, (0.0, 0.0))
+
+
+def test_marks_off_the_calibrations_plane_or_beyond_what_it_covers_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pixels = np.array([[100.0, 100.0], [1500.0, 150.0], [1400.0, 1100.0]])
+    ring = np.array([[0.0, 0.0], [1599.0, 0.0], [1599.0, 800.0], [0.0, 800.0]])
+    sure = replace(PositionUncertainty.everywhere(1600, 1200, 0.1), covered_px=ring)
+    plain = SimpleCalibration(1600, 1200, 0.375, (0.0, 1199.0), 20.0, uncertainty=sure)
+    machine = MACHINE.apply(plain.to_work(pixels, 20.0))
+    save_record(tmp_path / "c.yaml", CalibrationRecord(plain))
+    assert align(tmp_path, pixels, machine, "x_px,y_px") == 2
+    advice = capsys.readouterr().err.strip().split(", and ")[1].split()
+    assert advice == ["--height-mm", "20"]
+    assert align(tmp_path, pixels, machine, "x_px,y_px", *advice) == 0
+    assert "WARNING   pixel (1400, 1100) lies where the calibration is not covered" in capsys.readouterr().out
 
 
 MIRROR = np.array([1.0, -1.0])

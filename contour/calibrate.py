@@ -44,7 +44,7 @@ class Setup:
     `block_mm` is the height for which the verdict is given besides the table; `accept_mm` the largest 95 % figure that
     counts as good. `camera_height_mm` and `known_length`, where they were measured, are compared with what the views
     say; from `accept_apart`, a share, the calibration is not good. `area_px` (left, top, right, bottom) is where blocks
-    will lie; with `accept_uncovered` the whole picture may be used, whatever part of it corners enclose.
+    will lie, and must be covered; with `accept_uncovered` neither that nor half of the picture must be.
     """
 
     plane: str

@@ -270,6 +270,12 @@ def test_views_in_one_corner_serve_for_blocks_in_that_corner_and_as_surely_as_th
         assert (errors <= sure.figure_mm(height_mm)).mean() >= 0.95
 
 
+def test_the_whole_picture_may_be_used_where_half_of_it_is_covered(good: tuple[CameraResult, list[BoardPose]]) -> None:
+    verdict = good[0].verdict
+    assert 0.5 < verdict.zones.covered_share < 0.95
+    assert verdict.uncertainty.covered_px is None
+
+
 def test_the_whole_picture_may_be_used_where_a_person_says_so() -> None:
     views, small, _ = views_in_one_corner()
     setup = replace(PLANE, area_px=(0.0, 0.0, 1599.0, 1199.0), accept_uncovered=True)

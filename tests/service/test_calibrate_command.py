@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
+from contour.board import Board
 from contour.calibration import CameraCalibration, SimpleCalibration
 from contour.plane_calibration import PlaneCalibration
-from contour.synthetic.board_poses import board_poses
+from contour.synthetic.board_poses import BoardPose, board_poses
 from service.calibration_file import load_calibration, load_record
 from service.cli.main import main
 from tests.contour.board_scenes import CHARUCO, SMALL, picture
@@ -113,7 +114,7 @@ def test_a_known_length_in_the_picture_is_told_beside_the_result(
     assert calibrated(views, tmp_path / "x.yaml", "--known-length-mm", f"{1.1 * length_mm:.1f}", *between) == 3
 
 
-def test_the_part_that_no_corner_reached_is_named_and_kept_in_the_file(
+def test_an_area_that_no_corner_reached_is_refused_unless_told_otherwise(
     views: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / "cell.yaml"
@@ -121,12 +122,29 @@ def test_the_part_that_no_corner_reached_is_named_and_kept_in_the_file(
     told = capsys.readouterr()
     assert "of --area-px (0, 0)" in told.out
     assert told.err.endswith("To take it nevertheless: --accept-uncovered\n")
-    assert calibrated(views, output, "--area-px", "300,200,600,500") == 0
-    assert "a block that leaves that part is refused (115 outside_work_area)" in capsys.readouterr().out
+    assert calibrated(views, output, "--area-px", "0,0,959,719", "--accept-uncovered") == 0
+
+
+def test_views_of_less_than_half_serve_for_that_part_and_blocks_beyond_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small = Board("charuco", 11, 8, 15.0, 10.5, "DICT_5X5_250")
+    middle = np.array([240.0, 180.0, 0.0])
+    for number, (turn, place) in enumerate(board_poses(small, SMALL, 10, np.random.default_rng(4))):
+        pose = BoardPose(turn, middle + 0.4 * (place - middle))
+        cv2.imwrite(
+            str(tmp_path / ("flat.png" if number == 0 else f"{number}.png")), picture(small, SMALL, pose, number)
+        )
+    output = tmp_path / "cell.yaml"
+    assert calibrated(tmp_path, output, "--block-mm", "20", square_mm="15") == 0
+    told = capsys.readouterr().out
+    assert "verdict   good in " in told
+    assert "a block that leaves that part is refused (115 outside_work_area)" in told
     sure = load_calibration(output).uncertainty
     assert sure is not None
-    assert len(sure.uncovered(np.array([[450.0, 350.0], [2.0, 2.0]]))) == 1
-    assert calibrated(views, output, "--area-px", "0,0,959,719", "--accept-uncovered") == 0
+    assert len(sure.uncovered(np.array([[480.0, 360.0], [2.0, 2.0]]))) == 1
+    assert calibrated(tmp_path, output, "--block-mm", "20", "--accept-uncovered", square_mm="15") == 0
+    assert "contours outside of it are taken, too" in capsys.readouterr().out
     sure = load_calibration(output).uncertainty
     assert sure is not None
     assert sure.covered_px is None

@@ -300,8 +300,6 @@ def test_what_takes_a_calibration_nevertheless_does_take_it() -> None:
         accept_apart=float(options["--accept-apart-percent"]) / 100,
     )
     assert calibrate_camera(bent, squares_told_as(25.0), SIZE, taken).verdict.good
-    for spared in ({"accept_uncovered": False}, {"accept_mm": 0.1}, {"accept_apart": 0.08}):
-        assert not calibrate_camera(bent, squares_told_as(25.0), SIZE, replace(taken, **spared)).verdict.good
 
 
 def test_a_lens_that_no_model_holds_is_told() -> None:

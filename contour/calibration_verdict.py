@@ -40,6 +40,10 @@ MOSTLY_COVERED = 0.5
 STRUCTURE_PX = 0.05
 
 
+_ADVICE_STEP_MM = 0.01
+"""Solved again, the last digits differ: what is advised leaves room for that."""
+
+
 class Judgement(Enum):
     """What a person does with a calibration; the value is the plain sentence's beginning."""
 
@@ -239,7 +243,7 @@ def _wrong_model(structure: float, mm_per_px: float, demands: Demands) -> list[_
         f"corners miss it by {structure:.2f} px in the same direction over whole zones of the picture. Check that "
         "the board is flat and the focus locked; otherwise the lens is wider than these models hold"
     )
-    return [_Fault(Judgement.WRONG_MODEL, text, "--accept-mm", rounded_up(2 * structure * mm_per_px, 0.001))]
+    return [_Fault(Judgement.WRONG_MODEL, text, "--accept-mm", rounded_up(2 * structure * mm_per_px, _ADVICE_STEP_MM))]
 
 
 def _uncovered(zones: Zones, demands: Demands) -> list[_Fault]:
@@ -263,7 +267,7 @@ def _too_unsure(sure: PositionUncertainty, demands: Demands) -> list[_Fault]:
     table, block = sure.figure_mm(0.0), sure.figure_mm(demands.block_mm)
     if max(table, block) <= demands.accept_mm:
         return []
-    needed = rounded_up(max(table, block), 0.001)
+    needed = rounded_up(max(table, block), _ADVICE_STEP_MM)
     if table <= demands.accept_mm:
         text = (
             f"{_figures(sure, demands)}. Tilt tells distance from focal length: 20 degrees to all four sides, in more "

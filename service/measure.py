@@ -273,6 +273,7 @@ class Measurer:
             max_area_mm2=recipe.max_area_mm2,
             max_vertices=recipe.max_vertices,
             work_area_mm=self._work_area_mm,
+            sure=None if self._calibration is None else self._calibration.uncertainty,
             pieces=recipe.pieces,
             max_uncertainty_mm=recipe.max_uncertainty_mm or None,
             max_disagreement_pitches=recipe.max_disagreement_pitches or None,

@@ -374,3 +374,18 @@ def test_a_refusal_is_told_in_russian_with_what_was_measured(tmp_path: Path) -> 
     assert told.returncode == 3
     assert "отказ: 102 image_quality: Снимок нерезкий" in told.stdout
     assert "brightest parts reach 0 of 255" in told.stdout
+
+
+def test_a_refusal_for_several_blocks_shows_both_outlines_below_its_caption(tmp_path: Path) -> None:
+    small = cv2.resize(cv2.imread(str(RECTANGLE)), (640, 480), interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(tmp_path / "two.png"), np.concatenate([small, small], axis=1))
+    (record,) = traced(tmp_path / "two.png", "--overlay", tmp_path / "seen.png", status=3)
+    assert record["reason"] == "several_blocks"
+    seen = cv2.imread(str(tmp_path / "seen.png"))
+    picture = seen[len(seen) - 480 :].astype(int)
+    assert len(seen) > 480
+    red = (picture[:, :, 2] - picture[:, :, :2].max(axis=2)) > 120
+    # Both lie alike in their halves, so both lines enclose the same box.
+    left, right = (np.argwhere(half) for half in (red[:, :640], red[:, 640:]))
+    for side in ("min", "max"):
+        np.testing.assert_allclose(getattr(left, side)(axis=0), getattr(right, side)(axis=0), atol=6)

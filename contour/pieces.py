@@ -68,8 +68,8 @@ def pieces_beside(mask: Gray, exterior: Ring, pitch_px: float, scale: int = 1) -
         if filled is not None:
             whole = step * scale
             box = (x * whole, y * whole, (x + w) * whole, (y + h) * whole)
-            outline = (_outline(filled) + (x, y) + 0.5) * whole - 0.5
-            found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, outline))
+            ring = (_outline(filled) + (x, y) + 0.5) * whole - 0.5
+            found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring))
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
 
 

@@ -41,7 +41,7 @@ class Piece:
     def moved(self, x: int, y: int) -> Piece:
         """The piece in a picture whose first pixel lies (x, y) before this one's."""
         left, top, right, bottom = self.box_px
-        return Piece(self.area_px2, (left + x, top + y, right + x, bottom + y), self.outline_px + (x, y))
+        return Piece(self.area_px2, (left + x, top + y, right + x, bottom + y), self.outline_px + np.array([x, y]))
 
 
 def pieces_beside(mask: Gray, exterior: Ring, pitch_px: float, scale: int = 1) -> tuple[Piece, ...]:

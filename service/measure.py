@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.acceptance import Finding, Limits, judge, judge_table, judge_without_block
+from contour.acceptance import Finding, Limits, judge, judge_table, judge_without_block, other_blocks
 from contour.calibration import Calibration
 from contour.error_budget import ErrorBudget, error_budget
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
@@ -33,13 +33,15 @@ class Measurement:
     """What was seen in one picture: the contour, where there is one, and the findings against it, lowest code first.
 
     pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
-    has a figure for each stage that ran, and "total".
+    has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
+    was refused (116).
     """
 
     method: str
     polarity: str | None = None
     pitch_px: float | None = None
     pixels: Contour | None = None
+    other_blocks_px: tuple[Ring, ...] = ()
     millimetres: Contour | None = None
     area_px2: float | None = None
     area_mm2: float | None = None
@@ -219,10 +221,11 @@ class Measurer:
         if sure_px is not None:
             sure_px = float(np.hypot(sure_px, polygon.shift_px)) + polygon.given_up_px
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
+        limits = self._limits(recipe)
         findings = judge(
             polygon,
             (width, height),
-            self._limits(recipe),
+            limits,
             traced=traced,
             region=region,
             budget=budget,
@@ -232,6 +235,7 @@ class Measurer:
         return replace(
             result,
             pixels=polygon.pixels,
+            other_blocks_px=tuple(piece.outline_px for piece in other_blocks(traced, limits)),
             millimetres=polygon.millimetres,
             area_px2=polygon.area_px2,
             area_mm2=polygon.area_mm2,

@@ -196,7 +196,10 @@ class ModbusController:
 
     def _held(self) -> Connection:
         if self._connection is None:
-            raise ControllerUnavailable(f"{self._wire.name}: not connected. Connect first")
+            # A job meets this while the connection is opened anew: it is read by people, in log and journal.
+            raise ControllerUnavailable(
+                f"{self._wire.name}: no connection stands. Check that the controller is on, and its cable"
+            )
         return self._connection
 
     def _drop(self, why: str) -> None:

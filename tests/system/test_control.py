@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from service.control import ControlError, ask
+from service.control import ask
+from tests.nobody import needs_root, python_as_nobody
 from tests.system.cell import Cell
 from tests.system.processes import combtrace, until
 from tests.system.terminal import Terminal
@@ -147,26 +148,15 @@ def test_a_dead_daemons_socket_is_told_and_taken_over(cell: Cell) -> None:
     assert not (cell.folder / "state" / "control.sock").exists()
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to become somebody without rights")
+@needs_root
 def test_without_rights_the_error_says_who_may(cell: Cell) -> None:
     cell.folder.chmod(0o755)
-    folder = os.open(cell.folder / "state", os.O_PATH)  # pytest's own folders are closed to others
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.setgroups([])
-        os.setgid(65534)
-        os.setuid(65534)
-        try:
-            ask(Path(f"/proc/self/fd/{folder}"), {"command": "halt"})
-            told = "it was done"
-        except ControlError as error:
-            told = str(error)
-        os.write(writing, told.encode())
-        os._exit(0)
-    os.waitpid(child, 0)
-    told = os.read(reading, 1000).decode()
-    for descriptor in (folder, reading, writing):
-        os.close(descriptor)
-    assert "you may not use it. User root and group root may" in told
+    done = python_as_nobody(
+        # By its descriptor: pytest's own folders are closed to others.
+        "import os; from pathlib import Path; from service.control import ControlError, ask\n"
+        "state = Path('/proc/self/fd') / str(os.open(sys.argv[1], os.O_PATH))",
+        "try:\n    print(ask(state, {'command': 'halt'}))\nexcept ControlError as error:\n    print(error)",
+        cell.folder / "state",
+    )
+    assert "you may not use it. User root and group root may" in done.stdout, done.stderr
     assert state_of(cell) == "Ready"

@@ -198,6 +198,18 @@ def test_one_recipe_is_one_recipe(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "calibration  none" in told
 
 
+def test_a_step_above_twice_the_core_is_a_warning_where_both_are_given(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(SAMPLES / "1-rectangle.jpg", written(tmp_path).parent / "in")
+    recipe = "{number: 4, name: a, method: sliding-matrix, parameters: {step_px: 21, core_px: CORE}}"
+    for core, warned in ((10, True), (11, False)):
+        path = written(tmp_path, more=f"recipes: [{recipe.replace('CORE', str(core))}]\ndefault_recipe: 4")
+        assert main(["check", "--config", str(path)]) == 0
+        told = capsys.readouterr().out
+        assert ("warn  recipes      recipe 4: step_px is 21, expected up to 20, twice core_px" in told) == warned
+
+
 def test_each_mistake_is_a_finding_and_keys_of_other_kinds_are_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

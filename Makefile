@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page accuracy refusals rules soak soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page accuracy methods refusals rules soak soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -48,6 +48,10 @@ bench-page: install
 
 accuracy: install
 	$(BIN)/python -m benchmarks.bench --random 300 --first 998000 --write
+
+# Every figure and table of docs/methods.md; a test redraws them.
+methods: install
+	$(BIN)/python -m benchmarks.methods
 
 # Each rule of the protocol taken out of a copy of the code: its test must fail then. Some minutes.
 rules: install

@@ -39,6 +39,16 @@ def state_of(cell: Cell) -> str:
     return str(ask(cell.folder / "state", {"command": "status"})["state"])
 
 
+def connected(cell: Cell) -> socket.socket:
+    """A client of the control socket, however deep the test's folder lies: addresses hold 107 bytes."""
+    client = socket.socket(socket.AF_UNIX)
+    client.settimeout(10)
+    folder = os.open(cell.folder / "state", os.O_PATH)
+    client.connect(f"/proc/self/fd/{folder}/control.sock")
+    os.close(folder)
+    return client
+
+
 def test_a_halt_holds_over_a_restart_until_it_is_resumed(cell: Cell, terminal: Terminal) -> None:
     config = ("--config", cell.folder / "config.yaml")
     halted = combtrace("halt", *config, "--reason", "blade is being changed")
@@ -78,9 +88,7 @@ def test_a_halt_is_done_whatever_its_reason_holds(cell: Cell) -> None:
         status = json.loads(combtrace("status", *config, "--json").stdout)
         assert status["reason"].startswith(f"halted: {told} (")
         assert combtrace("resume", *config).returncode == 0
-    with socket.socket(socket.AF_UNIX) as client:
-        client.settimeout(10)
-        client.connect(str(cell.folder / "state" / "control.sock"))
+    with connected(cell) as client:
         client.sendall(b'{"command": "halt", "reason": "\\udce4"}\n')
         assert json.loads(client.makefile("rb").readline()) == {"ok": True, "state": "Halted"}
     assert "udce4" in combtrace("status", *config).stdout
@@ -112,10 +120,7 @@ def test_a_daemon_can_be_halted_while_its_configuration_is_being_written(cell: C
 def test_the_socket_is_the_owners_and_groups_and_serves_several_and_odd_clients(cell: Cell) -> None:
     path = cell.folder / "state" / "control.sock"
     assert stat.S_IMODE(path.stat().st_mode) == 0o660
-    clients = [socket.socket(socket.AF_UNIX) for _ in range(3)]
-    for client in clients:
-        client.settimeout(10)
-        client.connect(str(path))
+    clients = [connected(cell) for _ in range(3)]
     for line, expected in (
         (b"\x00\xff no json\n", "no line of JSON"),
         (b'{"command": "explode"}\n', "expected one of halt, reset, resume, status"),

@@ -489,14 +489,17 @@ def _serial(parts: Parts, trigger: SerialTriggerSettings) -> Callable[[], Awaita
     shared = parts.executor, parts.health
     parts.ports.append(trigger.port)
     if trigger.mode == "text":
-        return SerialTrigger(
+        line = SerialTrigger(
             SerialLineTrigger(trigger.port, trigger.baudrate),
             trigger.port,
             *shared,
+            parts.journal,
             lambda: status_line(parts.health, parts.executor.settled_job, parts.executor.missed),
             parts.serial_pool,
             beat=beat,
-        ).run
+        )
+        parts.executor.on_settled.append(line.job_ended)
+        return line.run
     stamp = TriggerStamp(trigger.mode)
     return SerialPulses(make_pulses(trigger), trigger.port, stamp, *shared, parts.serial_pool, beat=beat).run
 

@@ -314,9 +314,18 @@ class Journal:
         row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         return int(row[0]) if row else 0
 
-    def store_pages(self, job_id: int, session: int, pages: tuple[Page, ...], terms: Terms | None = None) -> None:
-        """Make the pages durable, before the first request of theirs is sent."""
-        self._update(job_id, "session = ?, pages = ?", (session, pages_to_text(pages)), terms)
+    def store_pages(
+        self,
+        job_id: int,
+        session: int,
+        pages: tuple[Page, ...],
+        terms: Terms | None = None,
+        report: dict[str, Any] | None = None,
+        transfer: dict[str, Any] | None = None,
+    ) -> None:
+        """Make the pages durable, before the first request of theirs is sent, and all that is known of the job."""
+        values = session, pages_to_text(pages), json.dumps(report or {}), json.dumps(transfer) if transfer else None
+        self._update(job_id, "session = ?, pages = ?, report = ?, transfer = ?", values, terms)
 
     def store_withdrawal(self, job_id: int, reason: Reason) -> None:
         """Make durable that the job is being withdrawn, and why; the first reason stands."""

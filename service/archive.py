@@ -137,8 +137,11 @@ class Archive:
         leave nothing then.
         """
         written = {**files, f"{outcome}.json": document}
+        size = sum(_on_disk(len(data)) for data in written.values())
+        if job_id in self._unended and not self._has_room(size):
+            self.forget(job_id)  # all of it is in memory still
         self._write_all(job_id, written)
-        self._count(job_id, outcome in GOOD, sum(_on_disk(len(data)) for data in written.values()))
+        self._count(job_id, outcome in GOOD, size)
         if job_id not in self._unended:
             return
         try:
@@ -147,6 +150,13 @@ class Archive:
         except OSError as error:
             raise _cannot(self.folder_of(job_id), error) from error
         del self._unended[job_id]
+
+    def _has_room(self, size: int) -> bool:
+        try:
+            self._make_room(size)
+        except (ArchiveFull, OSError):
+            return False
+        return True
 
     def _write_all(self, job_id: int, files: Mapping[str, bytes]) -> None:
         folder = self.folder_of(job_id)

@@ -105,7 +105,11 @@ class ArchiveWriter:
 
     def draft(self, evidence: Evidence) -> Future[None] | None:
         """Done once the draft is durable, or cannot be; None where the disk hangs with that of an earlier job."""
-        return self._step(evidence.job.job_id, partial(self._draft, evidence))
+        job_id = evidence.job.job_id
+        step = self._step(job_id, partial(self._draft, evidence))
+        if step is None:
+            log.warning("archive: job %d goes on without its evidence: the disk still writes an earlier job's", job_id)
+        return step
 
     def _step(self, job_id: int, step: Callable[[], None]) -> Future[None] | None:
         last = self._last_step
@@ -202,21 +206,22 @@ class ArchiveWriter:
 
     def _draft(self, evidence: Evidence) -> None:
         job_id, frame = evidence.job.job_id, evidence.frame
-        if frame is not None:
-            self._put(job_id, PLAIN_FRAME, lambda: plain_bytes(frame))
-        self._put(job_id, DRAFT, lambda: document_bytes(self._document(evidence)))
+        if frame is not None and self._put(job_id, PLAIN_FRAME, lambda: plain_bytes(frame)):
+            self._put(job_id, DRAFT, lambda: document_bytes(self._document(evidence)))
 
-    def _put(self, job_id: int, suffix: str, content: Callable[[], bytes]) -> None:
-        """Keep it where it is not kept yet. Without room the job goes on; its evidence is tried again at its end."""
+    def _put(self, job_id: int, suffix: str, content: Callable[[], bytes]) -> bool:
+        """True where it is kept now, or was before. Without room the job goes on; its evidence is tried again at its end."""
         try:
             with self._opened_archive() as archive:
                 if not archive.has(job_id, suffix):
                     archive.put(job_id, suffix, content())
-            self._draft_trouble = ""
         except (ArchiveError, ValueError) as error:
             if str(error) != self._draft_trouble:
                 log.warning("archive: job %d goes on without its evidence: %s", job_id, error)
             self._draft_trouble = str(error)
+            return False
+        self._draft_trouble = ""
+        return True
 
     # --- after the job ------------------------------------------------------------------------------------------
 

@@ -239,17 +239,20 @@ class Cycle:
         course.report["pages_ms"] = self._since(before)
         if self._settings.observe:
             return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
-        expires_at_s = stamped_at + self._settings.lifetime_s
+        return await self._send(self._link, course, stamp, stamped_at + self._settings.lifetime_s)
+
+    async def _send(self, link: Link, course: _Course, stamp: Stamp, expires_at_s: float) -> Settlement:
+        """Bring the pages to the controller, all that is known of the job being durable before anything is sent."""
+        job, pages = course.job, course.pages
         course.transfer = _figures(stamp, pages)
         drafted = self._keeper.draft(course.evidence(job))
 
         async def before_sending() -> None:
-            report, figures = course.report, course.transfer
-            store = self._journal.store_pages
-            await self._durably(store, job.job_id, stamp.session, pages, course.terms, report, figures)
+            known = course.terms, course.report, course.transfer
+            await self._durably(self._journal.store_pages, job.job_id, stamp.session, pages, *known)
             await self._drafted(job, drafted)
 
-        transfer = self._transfer(self._link, job, stamp.session, pages, expires_at_s, before_sending=before_sending)
+        transfer = self._transfer(link, job, stamp.session, pages, expires_at_s, before_sending=before_sending)
         before = self._now()
         settlement = await transfer.run()
         course.report["transfer_ms"] = self._since(before)

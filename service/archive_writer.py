@@ -210,7 +210,7 @@ class ArchiveWriter:
             self._put(job_id, DRAFT, lambda: document_bytes(self._document(evidence)))
 
     def _put(self, job_id: int, suffix: str, content: Callable[[], bytes]) -> bool:
-        """True where it is kept now, or was before. Without room the job goes on; its evidence is tried again at its end."""
+        """True where it is kept. Without room the job goes on, and its evidence is tried again at its end."""
         try:
             with self._opened_archive() as archive:
                 if not archive.has(job_id, suffix):

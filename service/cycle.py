@@ -189,29 +189,25 @@ class Cycle:
         return await self._settle(job, settlement, course)
 
     async def resume(self, job: Job) -> Job:
-        """A job that a restart found in flight, settled: sent again bit-identical, or withdrawn (154).
-
-        What was measured and figured of it before is in journal and archive already, and stays its.
-        """
-        settlement = await self._settled_again(job)
-        return await self._settle(job, settlement, _Course(job, self._plan, job.report, transfer=job.transfer))
-
-    async def _settled_again(self, job: Job) -> Settlement:
+        """A job that a restart found in flight, settled: sent again bit-identical, or withdrawn (154)."""
+        course = _Course(job, self._plan, job.report, transfer=job.transfer)  # what is known of it stays its own
         handshake = self._settings.transfer.handshake
         if not job.sent or self._link is None or not handshake:
             detail = "nothing of it was sent" if not job.sent else "whether it was taken cannot be known"
-            return Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail)
+            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), course)
         assert job.session is not None
         expires_at_s = self._now() + self._settings.lifetime_s
         transfer = self._transfer(self._link, job, job.session, job.pages, expires_at_s)
         if job.withdraw_reason is not None:
-            return await transfer.withdraw(job.withdraw_reason, "a withdrawal that the restart cut short")
-        if not job.pages:
-            return await transfer.withdraw(Reason.SERVICE_RESTARTED, "its pages cannot be read in the journal")
-        if job.pages[0].header[VALID_FOR] == NO_LIMIT:
+            settlement = await transfer.withdraw(job.withdraw_reason, "a withdrawal that the restart cut short")
+        elif not job.pages:
+            settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, "its pages cannot be read in the journal")
+        elif job.pages[0].header[VALID_FOR] == NO_LIMIT:
             detail = "how old the contour is cannot be known after a restart, and the controller would not look"
-            return await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
-        return await transfer.run()
+            settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
+        else:
+            settlement = await transfer.run()
+        return await self._settle(job, settlement, course)
 
     # --- the steps ----------------------------------------------------------------------------------------------
 
@@ -248,9 +244,9 @@ class Cycle:
         drafted = self._keeper.draft(course.evidence(job))
 
         async def before_sending() -> None:
+            await self._drafted(job, drafted)  # first: with its pages in the journal a restart would send it
             known = course.terms, course.report, course.transfer
             await self._durably(self._journal.store_pages, job.job_id, stamp.session, pages, *known)
-            await self._drafted(job, drafted)
 
         transfer = self._transfer(link, job, stamp.session, pages, expires_at_s, before_sending=before_sending)
         before = self._now()

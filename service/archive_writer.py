@@ -21,7 +21,6 @@ from typing import Any
 import cv2
 
 from contour.errors import PictureError
-from drivers.camera import Frame
 from service.allocator import give_back
 from service.archive import DRAFT, PLAIN_FRAME, Archive, ArchiveError
 from service.archived_job import EvidenceError, drafted_evidence, load_draft
@@ -81,7 +80,7 @@ class ArchiveWriter:
         self._queue: queue.Queue[Evidence | None] = queue.Queue(depth)
         self._thread = threading.Thread(target=self._run, name="archive", daemon=True)
         self.drafting = ThreadPoolExecutor(1, "draft")  # a job waits for it: not at low priority
-        self._last_step: tuple[int, Future[None]] | None = None
+        self._drafted: Future[None] | None = None
         self._draft_trouble = ""
         self._unkept: list[int] = []
         self._stored = self._dropped = self._failed = self._since_given = 0
@@ -99,24 +98,14 @@ class ArchiveWriter:
         """Begin: the archive is looked through first."""
         self._thread.start()
 
-    def begin(self, job_id: int, frame: Frame) -> None:
-        """Have the frame written, so that the draft need not wait for it."""
-        self._step(job_id, partial(self._put, job_id, PLAIN_FRAME, lambda: plain_bytes(frame)))
-
     def draft(self, evidence: Evidence) -> Future[None] | None:
         """Done once the draft is durable, or cannot be; None where the disk hangs with that of an earlier job."""
-        job_id = evidence.job.job_id
-        step = self._step(job_id, partial(self._draft, evidence))
-        if step is None:
-            log.warning("archive: job %d goes on without its evidence: the disk still writes an earlier job's", job_id)
-        return step
-
-    def _step(self, job_id: int, step: Callable[[], None]) -> Future[None] | None:
-        last = self._last_step
-        if last is not None and last[0] != job_id and not last[1].done():
+        if self._drafted is not None and not self._drafted.done():
+            told = "archive: job %d goes on without its evidence: the disk still writes an earlier job's"
+            log.warning(told, evidence.job.job_id)
             return None
-        self._last_step = job_id, self.drafting.submit(step)
-        return self._last_step[1]
+        self._drafted = self.drafting.submit(self._draft, evidence)
+        return self._drafted
 
     def keep(self, evidence: Evidence) -> None:
         """Have it written; never blocks. Where too many wait already, it is counted and let go."""

@@ -219,8 +219,6 @@ class Cycle:
         stamp = await self._stamp(job)
         stamped_at = self._now()
         frame = course.frame = await self._frame(course.report)
-        if self._link is not None and not self._settings.observe:
-            self._keeper.begin(job.job_id, frame)
         self._beat()
         measurement = course.measurement = await self._measure(course.plan.measurer, frame, recipe, course.thickness_mm)
         self._beat()

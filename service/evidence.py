@@ -56,9 +56,6 @@ class Evidence:
 class Keeper(Protocol):
     """Keeps evidence; none of the calls blocks. `service.archive_writer.ArchiveWriter` in the daemon."""
 
-    def begin(self, job_id: int, frame: Frame) -> None:
-        """Begin with the frame, while it is being measured."""
-
     def draft(self, evidence: Evidence) -> Future[None] | None:
         """Keep what a restart would need to end the job with all its evidence.
 
@@ -71,9 +68,6 @@ class Keeper(Protocol):
 
 class KeepsNothing:
     """Where there is no archive."""
-
-    def begin(self, job_id: int, frame: Frame) -> None:
-        """Nothing."""
 
     def draft(self, evidence: Evidence) -> None:
         """Nothing."""

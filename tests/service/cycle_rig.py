@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from contour.geometry import Contour
-from drivers.camera import Frame
 from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.mailbox import Page
 from service.config import Recipe
@@ -63,13 +62,9 @@ class HeldKeeper:
     """Keeps evidence in memory; what is drafted is durable once `durable` is told so."""
 
     def __init__(self) -> None:
-        self.begun: list[int] = []
         self.drafted: list[Evidence] = []
         self.kept: list[Evidence] = []
         self.durable: Future[None] = Future()
-
-    def begin(self, job_id: int, frame: Frame) -> None:
-        self.begun.append(job_id)
 
     def draft(self, evidence: Evidence) -> Future[None]:
         self.drafted.append(evidence)

@@ -67,7 +67,6 @@ def writer(
 def drafted(path: Path, given: Evidence) -> None:
     """A process that is killed once the draft is durable."""
     with writer(path) as built:
-        built.begin(given.job.job_id, FRAME)
         step = built.draft(given)
         assert step is not None
         step.result(5)
@@ -85,7 +84,6 @@ def test_a_draft_is_frame_and_document_and_is_no_document_of_an_ended_job(tmp_pa
 
 def test_after_a_restart_the_evidence_is_to_the_byte_what_it_is_without(tmp_path: Path) -> None:
     with writer(tmp_path / "usual") as built:
-        built.begin(7, FRAME)
         built.draft(evidence())
         built.keep(evidence(ended()))
     drafted(tmp_path / "killed", evidence())
@@ -149,7 +147,6 @@ def test_where_a_draft_does_not_fit_the_job_goes_on_and_nothing_is_left(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     with writer(tmp_path, max_bytes=4096) as built:
-        built.begin(7, FRAME)
         step = built.draft(evidence())
         assert step is not None
         assert step.result(5) is None

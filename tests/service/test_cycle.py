@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
 from concurrent.futures import Future
 from contextlib import suppress
@@ -372,9 +373,10 @@ async def test_a_disk_that_hangs_holds_no_contour_up_for_long(
 
 async def test_a_job_that_is_stopped_before_it_was_sent_leaves_what_it_came_to(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
-        built.plan.measure = lambda *_: time.sleep(0.3)  # type: ignore[assignment,method-assign,return-value]
+        measuring = threading.Event()
+        built.plan.measure = lambda *_: measuring.set() or time.sleep(0.3)  # type: ignore[assignment,method-assign]
         task = asyncio.ensure_future(built.job())
-        await until(lambda: built.keeper.begun)
+        await until(measuring.is_set)
         task.cancel()
         with suppress(asyncio.CancelledError):
             await task

@@ -278,6 +278,7 @@ class Daemon:
         if parts.metrics is not None:
             await asyncio.to_thread(parts.metrics.close)
         if parts.archive is not None:
+            await self._freed(parts.archive.drafting, "archive's disk")
             await asyncio.to_thread(parts.archive.close)
         parts.journal.close()
         parts.lock.release()

@@ -107,7 +107,7 @@ def build(
     health = Health(StateMachine(_publisher(link)))
     health.report("calibration", calibration_fault)
     pool = ThreadPoolExecutor(1, "camera")
-    archive = _make_archive(config)
+    archive = _make_archive(config, journal)
     _tell_exports(config)
     notifier = Notifier()
     watchdog = Watchdog(notifier)
@@ -122,7 +122,7 @@ def build(
         cycle_settings(config),
         pool,
         observe=observe,
-        keep=archive.keep if archive is not None else lambda _evidence: None,
+        keeper=archive,
         beat=partial(watchdog.beat, "jobs"),
     )
     kinds = {type(trigger) for trigger in config.triggers}
@@ -266,11 +266,13 @@ def _tell_exports(config: Config) -> None:
                 log.warning("recipe %d will not be exported: %s", recipe.number, text)
 
 
-def _make_archive(config: Config) -> ArchiveWriter | None:
+def _make_archive(config: Config, journal: Journal) -> ArchiveWriter | None:
     settings = config.archive
     if not settings.max_bytes:
         return None
-    return ArchiveWriter(Archive(settings.path, ArchiveLimits(settings.max_bytes, settings.min_free_bytes)))
+    limits = ArchiveLimits(settings.max_bytes, settings.min_free_bytes)
+    in_flight = [job.job_id for job in journal.unsettled()]
+    return ArchiveWriter(Archive(settings.path, limits), journal.find, in_flight)
 
 
 def _make_journal(config: Config) -> tuple[Locks, Journal]:
@@ -485,14 +487,17 @@ def _serial(parts: Parts, trigger: SerialTriggerSettings) -> Callable[[], Awaita
     shared = parts.executor, parts.health
     parts.ports.append(trigger.port)
     if trigger.mode == "text":
-        return SerialTrigger(
+        line = SerialTrigger(
             SerialLineTrigger(trigger.port, trigger.baudrate),
             trigger.port,
             *shared,
+            parts.journal,
             lambda: status_line(parts.health, parts.executor.settled_job, parts.executor.missed),
             parts.serial_pool,
             beat=beat,
-        ).run
+        )
+        parts.executor.on_settled.append(line.job_ended)
+        return line.run
     stamp = TriggerStamp(trigger.mode)
     return SerialPulses(make_pulses(trigger), trigger.port, stamp, *shared, parts.serial_pool, beat=beat).run
 

@@ -370,7 +370,7 @@ def make_controller(config: Config) -> modbus.ModbusController | None:
     layout = mailbox_layout(config)
     assert layout is not None
     limits = modbus.RequestLimits(settings.longest_write, settings.longest_read)
-    shared = settings.device_id, layout, settings.timeout_s, limits
+    shared = settings.device_id, layout, settings.timeout_s, limits, settings.single_write
     if isinstance(settings, ModbusTcp):
         return modbus.ModbusTcpController(settings.host, settings.port, *shared)
     if isinstance(settings, ModbusRtuOverTcp):

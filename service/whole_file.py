@@ -30,11 +30,16 @@ def write_whole(path: Path, data: bytes, mode: int | None = None) -> None:
     finally:
         with suppress(FileNotFoundError):
             os.unlink(beside)
-    folder = os.open(target.parent, os.O_RDONLY)
+    sync_folder(target.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make durable which files are in the folder, and under which names; raise OSError."""
+    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        os.fsync(folder)
+        os.fsync(number)
     finally:
-        os.close(folder)
+        os.close(number)
 
 
 def file_mode(target: Path) -> int:

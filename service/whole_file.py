@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+
+# What a disk says that takes no writes now, which may pass: full, read-only, failing.
+REFUSALS = frozenset({errno.ENOSPC, errno.EROFS, errno.EDQUOT, errno.EIO, errno.ESTALE})
 
 
 def write_whole(path: Path, data: bytes, mode: int | None = None) -> None:

@@ -32,3 +32,8 @@ def mounted(disk: Path, megabytes: int) -> Iterator[Path]:
         yield disk
     finally:
         unmounts.communicate()
+
+
+def remount(disk: Path, how: str) -> None:
+    """Mount it anew, `ro` or `rw`."""
+    subprocess.run(["mount", "-o", f"remount,{how}", disk], check=True)

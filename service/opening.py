@@ -22,10 +22,17 @@ IF_THE_DISK_IS = (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN)  # a mistake
 class DiskRefuses(Exception):
     """A disk takes no writes: read-only, full or failing. That may pass, where a wrong configuration does not."""
 
+    def __init__(self, message: str, *, full: bool) -> None:
+        super().__init__(message)
+        self._full = full
+
     @property
     def fault(self) -> Fault:
         """What it means for the service."""
-        return Fault(Reason.STORAGE_FULL, f"{str(self).rstrip('.')}. It is tried again by itself")
+        return Fault(
+            Reason.STORAGE_FULL if self._full else Reason.INTERNAL_ERROR,
+            f"{str(self).rstrip('.')}. It is tried again by itself",
+        )
 
 
 class Opening:
@@ -54,7 +61,7 @@ class Opening:
             self._journal = open_journal(self._path, self._archive, ran_before=self._ran_before)
         except (LockError, JournalError) as error:
             if _is_refusal(error, self._path):
-                raise DiskRefuses(str(error)) from error
+                raise DiskRefuses(str(error), full=_is_full(self._path)) from error
             raise
         return self._journal
 
@@ -94,13 +101,18 @@ def _is_refusal(error: BaseException, path: Path) -> bool:
     cause = error.__cause__
     if isinstance(cause, sqlite3.Error):
         code = getattr(cause, "sqlite_errorcode", 0) & 0xFF  # the rest of it says more of the same
-        return code in PASSING or (code in IF_THE_DISK_IS and _takes_nothing(path))
+        refused = code in IF_THE_DISK_IS and (_is_full(path) or bool(_disk_of(path).f_flag & os.ST_RDONLY))
+        return refused or code in PASSING
     return isinstance(cause, OSError) and cause.errno in REFUSALS
 
 
-def _takes_nothing(path: Path) -> bool:
-    """True where the disk on which `path` is, or will be, is read-only or full."""
+def _is_full(path: Path) -> bool:
+    """True where the disk on which `path` is, or will be, has no room left for bytes or for files."""
+    found = _disk_of(path)
+    return not found.f_bavail or bool(found.f_files and not found.f_favail)
+
+
+def _disk_of(path: Path) -> os.statvfs_result:
     while not path.exists() and path != path.parent:
         path = path.parent
-    found = os.statvfs(path)
-    return bool(found.f_flag & os.ST_RDONLY) or not found.f_bavail or bool(found.f_files and not found.f_favail)
+    return os.statvfs(path)

@@ -64,16 +64,19 @@ class ModbusController:
         limits: RequestLimits | None = None,
         single_write: SingleWrite = "fc6",
     ) -> None:
-        """single_write: the function by which the commit register is written."""
+        """single_write: the function by which the commit register is written.
+
+        Both it and `device_id` may be changed; another device id counts from the next connection on.
+        """
         cap_library_log()
         wire.frames(device_id)  # MailboxError: a device id that none can have
         self._wire = wire
-        self._device_id = device_id
+        self.device_id = device_id
         self._layout = layout or MailboxLayout()
         self._read_link = (read_registers(self._layout.link_address, BLOCK_REGISTERS),)
         self._read_service = (read_registers(self._layout.service_address, BLOCK_REGISTERS),)
         self._timeout_s = timeout_s
-        self._single_write = single_write
+        self.single_write = single_write
         self._limits = limits or RequestLimits()
         if wire.pace.byte_s:
             self._limits = self._limits.within(LONGEST_EXCHANGE_S / wire.pace.byte_s)
@@ -84,7 +87,7 @@ class ModbusController:
         self._barriers = secrets.randbelow(1000)  # another place in their row than that of a process just killed
 
     def __str__(self) -> str:
-        return f"{self._wire.name} device {self._device_id}"
+        return f"{self._wire.name} device {self.device_id}"
 
     @property
     def connected(self) -> bool:
@@ -105,6 +108,11 @@ class ModbusController:
         """Close the connection; never raises."""
         self._closings += 1
         self._drop("closed by this side")
+
+    @property
+    def serial(self) -> bool:
+        """True on a line, where device id 0 is a broadcast."""
+        return self._wire.serial
 
     @property
     def layout(self) -> MailboxLayout:
@@ -145,7 +153,7 @@ class ModbusController:
         if not 0 <= transfer <= 0xFFFF:
             raise MailboxError(f"transfer is {transfer}, expected 0 to 65535")
         address = self._layout.contour_address
-        by_fc6 = self._single_write == "fc6"
+        by_fc6 = self.single_write == "fc6"
         await self._held().run(
             [write_register(address, transfer) if by_fc6 else write_registers(address, stream_of((transfer,)))]
         )
@@ -180,9 +188,7 @@ class ModbusController:
     async def _checked(self, closings: int) -> Connection:
         """A new connection on which no late reply can come."""
         for left in reversed(range(LATE_REPLIES)):
-            connection = Connection(
-                self._wire, await self._wire.open(self._timeout_s), self._device_id, self._timeout_s
-            )
+            connection = Connection(self._wire, await self._wire.open(self._timeout_s), self.device_id, self._timeout_s)
             self._opening = connection
             try:
                 self._check_still_wanted(closings)

@@ -109,6 +109,6 @@ async def test_it_is_the_same_against_a_server_that_others_wrote(most: int, monk
 
 async def test_a_controller_without_fc6_is_told_with_what_to_set() -> None:
     async with pair("modbus-tcp", 125, fc6=False) as (driver, _):
-        driver._single_write = "fc6"
+        driver.single_write = "fc6"
         with pytest.raises(ControllerRefused, match="single_write: fc16"):
             await driver.write_transfer(0)

@@ -29,8 +29,8 @@ async def survey(read: Read, longest: int, near: int, in_time: Callable[[], bool
         if await take(first, min(longest, REGISTERS - first)):
             continue
         for part in _multiples(first, min(first + longest, REGISTERS)):
-            if in_time() and not await take(part, BLOCK):
-                await take(part, 1)
+            if in_time() and await take(part, 1):
+                await take(part, BLOCK)
     for edge, step in list(_edges(known)):
         beyond = edge
         while in_time() and beyond not in known and 0 <= beyond < REGISTERS and await take(beyond, 1):
@@ -39,7 +39,7 @@ async def survey(read: Read, longest: int, near: int, in_time: Callable[[], bool
 
 
 def _multiples(first: int, end: int) -> Iterator[int]:
-    """Blocks that touch these registers, each at a multiple of its length: one of them holds any row of 31."""
+    """Where blocks begin that touch these registers, at multiples of their length: any row of 16 holds one."""
     yield from range(first // BLOCK * BLOCK, min(end, REGISTERS - BLOCK + 1), BLOCK)
 
 

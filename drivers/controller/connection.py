@@ -34,7 +34,7 @@ EXCEPTION_NAMES = {
 NEXT_STEPS = {
     1: "The controller must know function codes 3, 6 and 16; for one without 6 set single_write: fc16",
     2: "Check link_address, service_address, contour_address and payload_capacity",
-    3: "Check payload_capacity, and the controller's limit of registers in one request",
+    3: "Check payload_capacity, and the controller's limit of registers in one request, which must be 16 or more",
     10: "Check the gateway and device_id",
     11: "Check the gateway, the line behind it, and device_id",
 }

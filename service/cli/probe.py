@@ -125,10 +125,9 @@ def _print_section(config: Config, changes: Mapping[str, Any]) -> None:
 
     section: dict[str, Any] = config.controller.model_dump(mode="json", exclude_unset=True)
     print("\nThe configuration's section as it should be (--apply changes it in the file)\ncontroller:")
-    for key, value in {**section, **changes}.items():
-        line = yaml.safe_dump({key: value}, default_flow_style=None, sort_keys=False).rstrip()
-        was = f"  # was {getattr(config.controller, key)}" if key in changes else ""
-        print(f"  {line}{was}")
+    for line in yaml.safe_dump({**section, **changes}, sort_keys=False).splitlines():
+        key = line.partition(":")[0]
+        print(f"  {line}" + (f"  # was {getattr(config.controller, key)}" if key in changes else ""))
 
 
 def _apply(path: Path, changes: Mapping[str, Any]) -> None:

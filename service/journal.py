@@ -252,6 +252,11 @@ class Journal:
                     self._db.execute("ROLLBACK")
                 raise
 
+    def refuse_writes(self) -> None:
+        """From here on each write raises JournalError."""
+        with self._lock:
+            self._db.execute("PRAGMA query_only = ON")
+
     def close(self) -> None:
         """Close the file."""
         with self._lock:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from contour.comb_likeness import unlike_comb
 from contour.error_budget import ErrorBudget
 from contour.geometry import Contour, Ring, area, contour_defect
+from contour.pieces import Piece
 from contour.polygon import Polygon
 from contour.position_uncertainty import PositionUncertainty
 from contour.quality import QualityLimits, lost_in_noise, picture_faults, quality_faults
@@ -251,15 +252,17 @@ def _touches_region(outlines: list[Ring], region: Region | None, border_px: floa
     )
 
 
+def other_blocks(traced: Trace, limits: Limits) -> list[Piece]:
+    """The pieces beside the traced block for which it is refused, largest first."""
+    share = max(limits.block_share, _EQUAL_SHARE) if limits.pieces == "largest" else limits.block_share
+    return [piece for piece in traced.others if piece.area_px2 >= share * area(traced.contour)]
+
+
 def _several(traced: Trace | None, limits: Limits) -> Finding | None:
-    if traced is None:
+    blocks = [] if traced is None else other_blocks(traced, limits)
+    if traced is None or not blocks:
         return None
     own = area(traced.contour)
-    blocks = [piece for piece in traced.others if piece.area_px2 >= limits.block_share * own]
-    if limits.pieces == "largest":
-        blocks = [piece for piece in blocks if piece.area_px2 >= _EQUAL_SHARE * own]
-    if not blocks:
-        return None
     left, top, right, bottom = blocks[0].box_px
     seen = (
         f"Beside the traced block of {own:.0f} px² lies another of {blocks[0].area_px2:.0f} px² "

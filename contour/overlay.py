@@ -45,18 +45,24 @@ def draw_overlay(
     refused: bool = False,
     marks: bool = True,
     uncertainty_px: float | None = None,
+    others_px: Sequence[Ring] = (),
 ) -> Picture:
     """The picture as BGR, shape (H, W, 3), with the contour, its vertices and lines of text; the input stays as it is.
 
+    Where `refused`, the text stands on rows of its own above the picture: what speaks against it may lie anywhere.
+
     Exterior green, or red where `refused`, holes blue, vertices yellow (without `marks` none). The first caption line
-    is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. Raises
-    PictureError.
+    is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `others_px`,
+    outlines of what lies besides, are drawn like the exterior, without vertices. Raises PictureError.
     """
     check_picture(picture)
     canvas = _cv.bgr(picture)
     unit = max(max(canvas.shape[:2]) / _UNIT_PX, 1.0)
     text = _Caption.fitted(caption, canvas.shape[1], unit)
-    text.darken(canvas)
+    if not refused:
+        text.darken(canvas)
+    for other in others_px:
+        _draw_ring(canvas, other, REFUSED if refused else ACCEPTED, unit)
     if contour_px is not None:
         if uncertainty_px is not None:
             _draw_band(canvas, contour_px, uncertainty_px, unit)
@@ -66,6 +72,8 @@ def draw_overlay(
         if marks and contour_px.point_count <= _MOST_MARKS:
             for ring in contour_px.rings:
                 _mark_vertices(canvas, ring, unit)
+    if refused:
+        canvas = text.above(canvas)
     text.write(canvas, REFUSED if refused else ACCEPTED, unit)
     return canvas
 
@@ -123,11 +131,19 @@ class _Caption:
         shrink = min(1.0, max(width - 2 * margin, 1) / max(longest, 1))
         return cls(lines, [size * shrink for size in sizes], margin, max(round(24 * unit * shrink), 1))
 
+    @property
+    def height(self) -> int:
+        """Rows that the text takes."""
+        return self.margin + self.line_height * len(self.lines) if self.lines else 0
+
     def darken(self, canvas: Picture) -> None:
         """Darken the band that the text will stand on."""
-        if self.lines:
-            band = canvas[: self.margin + self.line_height * len(self.lines)]
-            band[:] = band // 3
+        band = canvas[: self.height]
+        band[:] = band // 3
+
+    def above(self, canvas: Picture) -> Picture:
+        """The canvas with black rows above it that the text will stand on."""
+        return np.vstack([np.zeros((self.height, *canvas.shape[1:]), np.uint8), canvas])
 
     def write(self, canvas: Picture, colour: Colour, unit: float) -> None:
         stroke = max(round(1.2 * unit), 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -29,15 +29,19 @@ _HEXAGON = 2 / np.sqrt(3)
 
 @dataclass(frozen=True)
 class Piece:
-    """A piece of comb: its area, cells filled, px², and its box (left, top, right, bottom)."""
+    """A piece of comb: its area, cells filled, px², its box (left, top, right, bottom), and its outline to look at.
+
+    The outline, shape (N, 2), is as coarse as the samples that the piece was found in; empty = not known.
+    """
 
     area_px2: float
     box_px: tuple[int, int, int, int]
+    outline_px: Ring = field(default_factory=lambda: np.empty((0, 2)), compare=False)
 
     def moved(self, x: int, y: int) -> Piece:
         """The piece in a picture whose first pixel lies (x, y) before this one's."""
         left, top, right, bottom = self.box_px
-        return Piece(self.area_px2, (left + x, top + y, right + x, bottom + y))
+        return Piece(self.area_px2, (left + x, top + y, right + x, bottom + y), self.outline_px + np.array([x, y]))
 
 
 def pieces_beside(mask: Gray, exterior: Ring, pitch_px: float, scale: int = 1) -> tuple[Piece, ...]:
@@ -60,11 +64,12 @@ def pieces_beside(mask: Gray, exterior: Ring, pitch_px: float, scale: int = 1) -
     found = []
     for number in np.flatnonzero(wide):
         x, y, w, h = (int(value) for value in stats[number, :4])
-        area = _celled_area(labels[y : y + h, x : x + w] == number, samples)
-        if area:
+        filled = _filled(labels[y : y + h, x : x + w] == number, samples)
+        if filled is not None:
             whole = step * scale
             box = (x * whole, y * whole, (x + w) * whole, (y + h) * whole)
-            found.append(Piece(area * whole**2, box))
+            ring = (_outline(filled) + (x, y) + 0.5) * whole - 0.5
+            found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring))
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
 
 
@@ -80,8 +85,14 @@ def reaches_frame(mask: Gray, block: CoarseBlock) -> bool:
     return any(bool((line[samples.repeat(step)[: len(line)] > 0] > 0).any()) for line, samples in sides)
 
 
-def _celled_area(walls: NDArray[np.bool_], samples: float) -> float:
-    """Area of a piece with walls `walls` (h, w), cells filled, in samples; 0 where it has too few cells of its own."""
+def _outline(filled: NDArray[np.bool_]) -> Ring:
+    """The outermost samples of the largest part, shape (N, 2)."""
+    rings, _ = cv2.findContours(filled.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    return np.asarray(max(rings, key=cv2.contourArea), dtype=np.float64).reshape(-1, 2)
+
+
+def _filled(walls: NDArray[np.bool_], samples: float) -> NDArray[np.bool_] | None:
+    """A piece with walls `walls` (h, w), its cells filled; None where it has too few cells of its own."""
     cell = samples**2 / _HEXAGON
     pad = round(_CLOSING_PITCHES * samples) + 2
     free = cv2.copyMakeBorder((~walls).astype(np.uint8), pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=1)
@@ -92,7 +103,7 @@ def _celled_area(walls: NDArray[np.bool_], samples: float) -> float:
     cells = (whole > _CELL_AREAS[0] * cell) & (whole < _CELL_AREAS[1] * cell)
     cells[[0, labels[0, 0]]] = False
     if np.count_nonzero(cells) < _FEWEST_CELLS:
-        return 0.0
+        return None
     grown = (cv2.distanceTransform(free, cv2.DIST_L2, 5) <= _CLOSING_PITCHES * samples).astype(np.uint8)
     filled = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > _CLOSING_PITCHES * samples) | (free == 0)
-    return float(np.count_nonzero(filled))
+    return np.asarray(filled[pad:-pad, pad:-pad])

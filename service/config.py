@@ -5,16 +5,17 @@ Unknown keys are refused everywhere. Paths are resolved by `service.config_file`
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from contour.geometry import ring_defect
 from contour.start_vertex import Start
 from contour.tracing import Method
-from service.config_values import REGISTERS, FilePath, Host, Model, Number, Point, Port, Register, Seconds
+from service.config_values import REGISTERS, FilePath, Host, MistakeAt, Model, Number, Point, Port, Register, Seconds
 
 DEFAULT_METHOD: Method = "wall-tips"
 METHOD_PARAMETERS: dict[str, dict[str, tuple[float, float]]] = {
@@ -134,8 +135,18 @@ class ModbusController(Model):
     )
     contour_address: Register = Field(32, description="First register of header and payload (PDU address).")
     payload_capacity: int = Field(1984, ge=8, le=REGISTERS, description="Registers of payload, an even number.")
-    longest_write: int = Field(123, ge=32, le=123, description="Most registers in one write, the standard's 123.")
-    longest_read: int = Field(125, ge=32, le=125, description="Most registers in one read, the standard's 125.")
+    longest_write: int = Field(
+        123,
+        ge=16,
+        le=123,
+        description="Most registers in one write; blocks of 16 go whole, the standard's most is 123.",
+    )
+    longest_read: int = Field(
+        125, ge=16, le=125, description="Most registers in one read; blocks of 16 go whole, the standard's most is 125."
+    )
+    single_write: Literal["fc6", "fc16"] = Field(
+        "fc6", description="How `transfer` is written; fc16 (of one register): for a controller without FC6."
+    )
     timeout_s: Seconds = Field(1.0, description="Longest wait for the reply to one request, s.")
     poll_period_s: float = Field(0.05, ge=0.001, le=0.5, description="Period of looking at the controller's block, s.")
     heartbeat_timeout_s: float = Field(
@@ -181,6 +192,9 @@ class ModbusTcp(ModbusController):
     """A controller over Modbus TCP."""
 
     kind: Literal["modbus-tcp"]
+    device_id: int = Field(
+        1, ge=0, le=255, description="Modbus device id (unit); 0 and 255: the device itself, behind no gateway."
+    )
     host: Host = Field("127.0.0.1", description="Host name or address of the controller.")
     port: Port = Field(502, description="TCP port.")
 
@@ -489,6 +503,11 @@ Controller = Annotated[NoController | ModbusTcp | ModbusRtu | ModbusRtuOverTcp, 
 Trigger = Annotated[IntervalTrigger | ControllerTrigger | SerialTrigger, Field(discriminator="kind")]
 
 
+def _repeated(values: list[Any]) -> Iterator[tuple[int, Any]]:
+    """Index and value of each that stood before already; None counts as none."""
+    return ((k, value) for k, value in enumerate(values) if value is not None and value in values[:k])
+
+
 class Config(Model):
     """Everything that config.yaml says."""
 
@@ -512,10 +531,8 @@ class Config(Model):
         if not self.recipes:
             raise ValueError("recipes is empty, expected one or more")
         for name in ("number", "name"):
-            values = [getattr(recipe, name) for recipe in self.recipes]
-            twice = sorted({str(value) for value in values if values.count(value) > 1})
-            if twice:
-                raise ValueError(f"recipes: {name} {', '.join(twice)} is there more than once")
+            for k, value in _repeated([getattr(recipe, name) for recipe in self.recipes]):
+                raise MistakeAt(("recipes", k, name), f"{value} is there more than once. Give each recipe its own")
         if self.default_recipe not in {recipe.number for recipe in self.recipes}:
             numbers = ", ".join(str(recipe.number) for recipe in self.recipes)
             raise ValueError(f"default_recipe is {self.default_recipe}, but recipes have only the numbers {numbers}")
@@ -527,13 +544,13 @@ class Config(Model):
         controllers = [trigger for trigger in self.triggers if isinstance(trigger, ControllerTrigger)]
         if controllers and (isinstance(self.controller, NoController) or self.controller.handshake == "none"):
             raise ValueError("triggers: kind controller needs a controller with handshake full")
-        if len(controllers) > 1:
-            raise ValueError("triggers: kind controller is there more than once")
-        ports = [trigger.port for trigger in self.triggers if isinstance(trigger, SerialTrigger)]
-        if isinstance(self.controller, ModbusRtu):
-            ports.append(self.controller.port)
-        if len(set(ports)) != len(ports):
-            raise ValueError("a serial port is named more than once")
+        for k, kind in _repeated([trigger.kind for trigger in self.triggers]):
+            if kind == "controller":
+                raise MistakeAt(("triggers", k), "kind controller is there more than once. Take one out")
+        ports = [self.controller.port if isinstance(self.controller, ModbusRtu) else None]
+        ports += [trigger.port if isinstance(trigger, SerialTrigger) else None for trigger in self.triggers]
+        for k, port in _repeated(ports):
+            raise MistakeAt(("triggers", k - 1, "port"), f"{port} is named more than once. A serial port serves one")
         if self.page is not None and self.metrics is not None and self.page.port == self.metrics.port:
             raise ValueError(f"page.port and metrics.port are both {self.page.port}. Give each its own")
         return self

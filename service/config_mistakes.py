@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from service import config as models
-from service.config_values import TruthValue
+from service.config_values import MistakeAt, TruthValue
 
 Location = tuple[int | str, ...]
 
@@ -55,6 +55,9 @@ def describe(
     """
     told: dict[Location, list[ErrorDetails]] = {}
     for mistake in error.errors(include_url=False):
+        raised = mistake.get("ctx", {}).get("error")
+        if isinstance(raised, MistakeAt):
+            mistake["loc"] = (*mistake["loc"], *raised.location)
         told.setdefault(_plain(mistake["loc"]), []).append(mistake)
     _gather_foreign_keys(told, model)
     for location, mistakes in told.items():

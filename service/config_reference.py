@@ -40,6 +40,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`journal`", (config.JournalSettings,)),
     ("`archive`", (config.ArchiveSettings,)),
     ("`metrics`", (config.Metrics,)),
+    ("`page`", (config.Page,)),
     ("`log`", (config.Log,)),
 )
 TYPES = {

@@ -11,6 +11,15 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 REGISTERS = 65536
 
+
+class MistakeAt(ValueError):
+    """What is wrong at one place within the model that finds it: keys and indices, and a sentence."""
+
+    def __init__(self, location: tuple[int | str, ...], text: str) -> None:
+        super().__init__(text)
+        self.location = location
+
+
 Seconds = Annotated[float, Field(gt=0, le=86_400)]
 Port = Annotated[int, Field(ge=1, le=65_535)]
 Register = Annotated[int, Field(ge=0, lt=REGISTERS)]

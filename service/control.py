@@ -18,6 +18,8 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from service.whole_file import REFUSALS
+
 log = logging.getLogger("combtrace.control")
 
 SOCKET_NAME = "control.sock"
@@ -25,6 +27,7 @@ MODE = 0o660
 LONGEST_LINE = 4096
 LONGEST_REASON = 200
 IDLE_S = 10.0
+RETRY_S = 1.0
 MOST_CLIENTS = 16
 PEER_CREDENTIALS = struct.Struct("3i")  # process, user, group: unix(7), SO_PEERCRED
 ANSWER_BOUND_S = 15.0
@@ -50,7 +53,19 @@ class ControlServer:
         self._clients = 0
 
     async def run(self) -> None:
-        """Serve for ever."""
+        """Serve for ever, from when the disk lets the socket be made."""
+        told = False
+        while True:
+            try:
+                await self._run()
+            except OSError as error:
+                if error.errno not in REFUSALS:
+                    raise
+                log.log(logging.DEBUG if told else logging.WARNING, "no control socket, tried again: %s", error)
+                told = True
+            await asyncio.sleep(RETRY_S)
+
+    async def _run(self) -> None:
         with _bound(self._folder) as listener:
             server = await asyncio.start_unix_server(self._serve, sock=listener, limit=LONGEST_LINE)
             async with server:

@@ -13,7 +13,7 @@ import sqlite3
 import sys
 import threading
 from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -31,7 +31,7 @@ LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
 LARGEST_OWNER = 0xFFFF
 LATER = 32768  # a trigger counter that is less ahead than this is later, one that is more is earlier
 RESTORED = (
-    "job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
+    "job_id, taken_at, trigger_kind, line, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
     " target, withdraw_reason"
 )
 UNSETTLED = "outcome IS NULL"
@@ -61,6 +61,7 @@ class JournalConflict(Exception):
 class TriggerStamp:
     """Where a job came from. `session` and `counter` are set for triggers of the controller only.
 
+    line: the serial port over which it is acknowledged and told its end, as configured; None where nobody is told.
     recipe 0 means the configured default, thickness_um 0 the recipe's.
     """
 
@@ -69,6 +70,7 @@ class TriggerStamp:
     thickness_um: int = 0
     session: int | None = None
     counter: int | None = None
+    line: str | None = None
 
 
 @dataclass(frozen=True)
@@ -250,6 +252,11 @@ class Journal:
                     self._db.execute("ROLLBACK")
                 raise
 
+    def refuse_writes(self) -> None:
+        """From here on each write raises JournalError."""
+        with self._lock:
+            self._db.execute("PRAGMA query_only = ON")
+
     def close(self) -> None:
         """Close the file."""
         with self._lock:
@@ -280,7 +287,7 @@ class Journal:
                 )
             db.execute(
                 "INSERT INTO jobs (job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe,"
-                " thickness_um) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                " thickness_um, line, owed) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 (
                     job_id,
                     taken_at,
@@ -289,6 +296,8 @@ class Journal:
                     trigger.counter,
                     trigger.recipe,
                     trigger.thickness_um,
+                    trigger.line,
+                    int(trigger.line is not None),
                 ),
             )
         return Job(job_id, taken_at, trigger)
@@ -335,6 +344,7 @@ class Journal:
         marks = ", ".join("?" * len(RESTORED.split(",")))
         with self._transaction() as db:
             db.executemany(f"INSERT INTO jobs ({RESTORED}) VALUES ({marks})", rows)
+            db.execute(f"UPDATE jobs SET owed = 1 WHERE line IS NOT NULL AND {UNSETTLED}")
             if pair[1]:
                 highest = max((row[0] for row in rows), default=0)
                 values = {"adopted_above": highest, "adopted_session": pair[0], "adopted_counter": pair[1]}
@@ -352,11 +362,18 @@ class Journal:
         session: int,
         pages: tuple[Page, ...],
         terms: Terms | None = None,
+        report: dict[str, Any] | None = None,
+        transfer: dict[str, Any] | None = None,
+        *,
         target: Mapping[str, Any] | None = None,
     ) -> None:
-        """Make the pages durable, and for which controller they are, before the first request of theirs is sent."""
-        values = session, pages_to_text(pages), json.dumps(dict(target or {}))
-        self._update(job_id, "session = ?, pages = ?, target = ?", values, terms)
+        """Make the pages durable, before the first request of theirs is sent, and all that is known of the job.
+
+        target: at which controller they are to be sent and how laid out there, by configuration key.
+        """
+        texts = pages_to_text(pages), json.dumps(report or {}), json.dumps(transfer) if transfer else None
+        values = session, *texts, json.dumps(dict(target or {}))
+        self._update(job_id, "session = ?, pages = ?, report = ?, transfer = ?, target = ?", values, terms)
 
     def store_withdrawal(self, job_id: int, reason: Reason) -> None:
         """Make durable that the job is being withdrawn, and why; the first reason stands."""
@@ -444,6 +461,15 @@ class Journal:
         """Jobs without a final state, oldest first: after a crash at most the one in flight."""
         return self._jobs(f"WHERE {UNSETTLED} ORDER BY job_id")
 
+    def owed(self, line: str) -> tuple[Job, ...]:
+        """Jobs that have ended, and whose end this line has not been told, oldest first."""
+        return self._jobs("WHERE owed = 1 AND line = ? AND outcome IS NOT NULL ORDER BY job_id", (line,))
+
+    def told(self, job_ids: Iterable[int]) -> None:
+        """Make durable that the ends of these jobs are owed to their line no more."""
+        with self._transaction() as db:
+            db.executemany("UPDATE jobs SET owed = 0 WHERE job_id = ?", [(job_id,) for job_id in job_ids])
+
     def last_settled(self) -> Job | None:
         """The settled job with the highest id."""
         return next(iter(self._jobs("WHERE outcome IS NOT NULL ORDER BY job_id DESC LIMIT 1")), None)
@@ -501,13 +527,14 @@ def job_of(row: tuple[Any, ...]) -> Job:
 
 def _job_of(row: tuple[Any, ...]) -> Job:
     job_id, taken_at, kind, recipe, thickness_um, trigger_session, counter, session, pages = row[:9]
-    withdraw_reason, outcome, reason, detail, settled_at, report, settings, calibration, transfer, target = row[9:]
+    withdraw_reason, outcome, reason, detail, settled_at, report, settings, calibration, transfer = row[9:18]
+    line, target = row[18:]
     for moment in (taken_at, settled_at or taken_at):
         datetime.fromisoformat(moment)
     return Job(
         job_id=job_id,
         taken_at=taken_at,
-        trigger=TriggerStamp(kind, recipe, thickness_um, trigger_session, counter),
+        trigger=TriggerStamp(kind, recipe, thickness_um, trigger_session, counter, line),
         session=session,
         pages=pages_from_text(pages or ""),
         withdraw_reason=None if withdraw_reason is None else Reason(withdraw_reason),

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 from service.journal import LARGEST_JOB, RESTORED, UNSETTLED, Journal, JournalDamaged, JournalError, readable_text
-from service.journal_schema import WITH_TARGETS
 from service.reasons import Reason
 
 log = logging.getLogger("combtrace.journal")
@@ -137,9 +136,7 @@ def _restore(kept: Path, journal: Journal) -> str:
     """Bring over what had not ended, where it can be read; a sentence of what that was."""
     try:
         with closing(_reading(kept)) as old:
-            version = old.execute("PRAGMA user_version").fetchone()[0]
-            restored = RESTORED if version >= WITH_TARGETS else RESTORED.replace("target", "NULL")
-            rows = old.execute(f"SELECT {restored} FROM jobs WHERE {UNSETTLED}").fetchall()
+            rows = old.execute(f"SELECT {_there(old)} FROM jobs WHERE {UNSETTLED}").fetchall()
             pairs = "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL"
             pair = old.execute(f"{pairs} ORDER BY job_id DESC LIMIT 1").fetchone() or (0, 0)
         journal.restore([_sound(row) for row in rows], pair)
@@ -147,6 +144,12 @@ def _restore(kept: Path, journal: Journal) -> str:
         log.info("%s: %s", kept, error)
         return "Which jobs had not ended cannot be read in it: look them up at the controller. "
     return f"Jobs in it that had not ended: {', '.join(str(row[0]) for row in rows) or 'none'}. "
+
+
+def _there(old: sqlite3.Connection) -> str:
+    """The columns of RESTORED, those that a journal of an earlier version has not as NULL."""
+    known = {str(row[1]) for row in old.execute("PRAGMA table_info(jobs)")}
+    return ", ".join(name if name in known else "NULL" for name in RESTORED.split(", "))
 
 
 def _sound(row: tuple[Any, ...]) -> tuple[Any, ...]:

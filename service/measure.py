@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.acceptance import Finding, Limits, judge, judge_table, judge_without_block
+from contour.acceptance import Finding, Limits, judge, judge_table, judge_without_block, other_blocks
 from contour.calibration import Calibration
 from contour.error_budget import ErrorBudget, error_budget
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
@@ -18,12 +19,15 @@ from contour.geometry import Contour, Ring, densified
 from contour.polygon import Finish, Polygon, cutting_polygon
 from contour.quality import Quality
 from contour.region import Region
+from contour.sliding_matrix import coarse_step, default_core_px
 from contour.taught_table import TableLimits, look_at
 from contour.tracing import Trace, TraceSettings, check_picture, trace
 from service.calibration_guard import CalibrationGuard
 from service.config import Recipe
 from service.reasons import Reason
 from service.table_file import TableRecord
+
+log = logging.getLogger("combtrace.measure")
 
 _ROI_STEPS = 12
 
@@ -33,13 +37,15 @@ class Measurement:
     """What was seen in one picture: the contour, where there is one, and the findings against it, lowest code first.
 
     pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
-    has a figure for each stage that ran, and "total".
+    has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
+    was refused (116).
     """
 
     method: str
     polarity: str | None = None
     pitch_px: float | None = None
     pixels: Contour | None = None
+    other_blocks_px: tuple[Ring, ...] = ()
     millimetres: Contour | None = None
     area_px2: float | None = None
     area_mm2: float | None = None
@@ -122,6 +128,7 @@ class Measurer:
         self._work_area_mm = work_area_mm
         self._table = table
         self._clock = clock
+        self._doubted: set[int] = set()
 
     @property
     def guard(self) -> CalibrationGuard | None:
@@ -170,6 +177,10 @@ class Measurer:
             findings = (*result.findings, *self._guard.findings(picture, camera))
             result = replace(result, findings=tuple(sorted(findings, key=lambda finding: finding[0])))
             watch.lap("guard")
+        doubt = step_doubt(recipe, result.pitch_px)
+        if doubt and recipe.number not in self._doubted:
+            self._doubted.add(recipe.number)
+            log.warning("recipe %d: %s", recipe.number, doubt)
         total = sum(watch.milliseconds.values())
         return replace(result, timings_ms={**watch.milliseconds, "total": total})
 
@@ -219,10 +230,11 @@ class Measurer:
         if sure_px is not None:
             sure_px = float(np.hypot(sure_px, polygon.shift_px)) + polygon.given_up_px
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
+        limits = self._limits(recipe)
         findings = judge(
             polygon,
             (width, height),
-            self._limits(recipe),
+            limits,
             traced=traced,
             region=region,
             budget=budget,
@@ -232,6 +244,7 @@ class Measurer:
         return replace(
             result,
             pixels=polygon.pixels,
+            other_blocks_px=tuple(piece.outline_px for piece in other_blocks(traced, limits)),
             millimetres=polygon.millimetres,
             area_px2=polygon.area_px2,
             area_mm2=polygon.area_mm2,
@@ -296,6 +309,14 @@ def trace_settings(recipe: Recipe) -> TraceSettings:
         threshold=recipe.parameters.get("threshold"),
         **sizes,
     )
+
+
+def step_doubt(recipe: Recipe, pitch_px: float | None = None) -> str | None:
+    """What speaks against the recipe's step; None where nothing does, or where the core follows from a pitch."""
+    step, core = recipe.parameters.get("step_px"), recipe.parameters.get("core_px")
+    if core is None and pitch_px is not None:
+        core = default_core_px(pitch_px)
+    return None if step is None or core is None else coarse_step(int(core), int(step))
 
 
 def _rounded(value: float | None) -> float | None:

@@ -22,6 +22,7 @@ from service.reasons import Reason
 from service.state import State
 from service.supervisor import Supervisor
 from service.trigger_queue import TriggerRefused
+from service.whole_file import sync_folder, write_whole
 
 log = logging.getLogger("combtrace.control")
 
@@ -51,16 +52,12 @@ class Halt:
     def set(self, by: str, reason: str) -> None:
         """Keep it, durably; raise OSError."""
         kept = {"by": by, "reason": reason, "at": datetime.now(UTC).isoformat(timespec="seconds")}
-        beside = self._path.with_suffix(".new")
-        with beside.open("w", encoding="utf-8") as file:
-            json.dump(kept, file)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(self._path)
+        write_whole(self._path, json.dumps(kept).encode())
 
     def clear(self) -> None:
-        """Forget it; raise OSError."""
+        """Forget it, durably; raise OSError."""
         self._path.unlink(missing_ok=True)
+        sync_folder(self._path.parent)
 
 
 class Operations:

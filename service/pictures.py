@@ -25,6 +25,7 @@ def write_overlay(path: Path, picture: NDArray[np.uint8], measurement: Measureme
         caption=caption(measurement),
         refused=refused,
         uncertainty_px=measurement.uncertainty_px,
+        others_px=measurement.other_blocks_px,
     )
     write_picture(path, drawn)
 

@@ -1,4 +1,4 @@
-"""The files of a configuration: calibration, templates of exports, table."""
+"""The files of a configuration: calibration, recipes, templates of exports, table."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from service.calibration_guard import CalibrationGuard
 from service.checkup.finding import Finding, fault, ok, warning
 from service.checkup.page import check_page
 from service.config import Config, Gcode
+from service.measure import step_doubt
 from service.recipe_exports import trial
 from service.wiring import WiringError, find_guard, find_table
 
@@ -27,8 +28,9 @@ def summary(config: Config) -> str:
 
 
 def check_files(config: Config) -> Iterator[Finding]:
-    """Calibration, exports, table, and what the operator's page needs."""
+    """Calibration, sizes of methods, exports, table, and what the operator's page needs."""
     yield from check_calibration(config)
+    yield from _sizes(config)
     yield from _exports(config)
     if config.table is not None:
         yield _table(config)
@@ -98,6 +100,13 @@ def _told(config: Config, guard: CalibrationGuard) -> str:
     )
     marks = guard.record.sentinels
     return text if marks is None else f"{text}; {len(marks.marks)} fixed marks"
+
+
+def _sizes(config: Config) -> Iterator[Finding]:
+    for recipe in config.recipes:
+        doubt = step_doubt(recipe)
+        if doubt:
+            yield warning("recipes", f"recipe {recipe.number}: {doubt}")
 
 
 def _exports(config: Config) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
+from service.cli.given_pictures import add_pictures_argument, pictures_of
 from service.cli.length_options import (
     accept_share,
     add_length_arguments,
@@ -50,7 +51,7 @@ Exit status: 0 written, 3 the verdict is not good: nothing written but the repor
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The three ways, and what they share."""
-    parser.add_argument("images", nargs="*", type=Path, metavar="IMAGE", help="pictures of the board")
+    add_pictures_argument(parser, what="pictures of the board", needed=False)
     parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="calibration file to write")
     board = parser.add_argument_group("from a board")
     add_board_arguments(board, required=False)
@@ -184,7 +185,7 @@ def _from_board(args: argparse.Namespace) -> int:
         camera_name=args.camera_name,
     )
     try:
-        gathered = gather_views(args.plane, args.images, board, _progress)
+        gathered = gather_views(args.plane, pictures_of(args.images), board, _progress)
         sentinels = _sentinels(args, gathered)
         result = calibrate_camera(gathered.views, board, gathered.size, setup, _progress)
     except (PlaneViewError, CalibrationFailed) as error:

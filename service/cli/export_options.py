@@ -46,7 +46,7 @@ class Exports:
             raise UserError(f"--{given[0][0]}: exports are in mm; name the calibration by --calibration or --config")
         paths = []
         for form, path in given:
-            folder = len(args.images) > 1 or path.is_dir()
+            folder = args.several or path.is_dir()
             if folder:
                 _make_folder(form, path)
                 files = {image: path / f"{stem}.{ENDINGS[form]}" for image, stem in distinct_stems(args.images).items()}

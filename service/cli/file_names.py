@@ -61,15 +61,18 @@ def distinct_stems(images: Sequence[Path]) -> dict[Path, str]:
 
     Pictures of one folder that differ in their suffix only keep it: `left-a`, `right-a`, `b.png`, `b.jpg`.
     """
-    whole = {image: image.resolve() for image in images}
+    # Not resolved: two links to one file are two names, and each gets its own.
+    whole = {image: Path(os.path.abspath(image)) for image in images}
     alike: dict[str, set[Path]] = {}
     for path in whole.values():
         alike.setdefault(path.stem, set()).add(path)
-    stems = {}
-    for image, path in whole.items():
-        group = alike[path.stem]
-        stems[image] = path.stem if len(group) == 1 else _distinct(path, group)
-    return stems
+    stems = {
+        path: stem if len(group) == 1 else _distinct(path, group) for stem, group in alike.items() for path in group
+    }
+    taken = Counter(stems.values())  # left-a.png may be called as left/a.png is told from right/a.png
+    return {
+        image: stems[path] if taken[stems[path]] == 1 else "_".join(path.parts[1:]) for image, path in whole.items()
+    }
 
 
 def _distinct(path: Path, group: set[Path]) -> str:

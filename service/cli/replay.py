@@ -97,6 +97,7 @@ def settings_of(changes: list[str]) -> Settings:
 
     from service.config import Recipe
     from service.replay import Settings
+    from service.yaml_mistakes import FileLoader
 
     recipe: dict[str, Any] = {}
     limits: dict[str, Any] = {}
@@ -105,7 +106,7 @@ def settings_of(changes: list[str]) -> Settings:
         key, equals, text = change.partition("=")
         part, _, name = key.partition(".")
         try:
-            value = yaml.safe_load(text)
+            value = yaml.load(text, Loader=FileLoader)
         except yaml.YAMLError as error:
             raise UserError(f"--set {change}: {text!r} is no value") from error
         known = name in Recipe.model_fields or name.startswith("parameters.")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
+from service.cli.given_pictures import add_pictures_argument, pictures_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -30,13 +31,7 @@ input."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Configuration, pictures, and the file."""
-    parser.add_argument(
-        "images",
-        nargs="*",
-        type=Path,
-        metavar="IMAGE",
-        help="pictures of the empty table; none = the camera takes them",
-    )
+    add_pictures_argument(parser, what="pictures of the empty table; none = the camera takes them", needed=False)
     parser.add_argument("--config", type=Path, metavar="FILE", help="configuration with the camera and table.file")
     parser.add_argument("--frames", type=int, default=8, metavar="N", help="pictures to take (1 to 100); default 8")
     parser.add_argument("--output", type=Path, metavar="FILE", help="write there instead of table.file")
@@ -55,6 +50,7 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(f"--frames {args.frames}: expected 1 to 100")
     if args.config is None and not (args.images and args.output):
         raise UserError("no configuration: give --config FILE, or pictures and --output FILE")
+    args.images = pictures_of(args.images)
     config = load_config_or_default(args.config)
     path = args.output or (config.table.file if config.table is not None else None)
     if path is None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.export_options import Exports, add_export_arguments
 from service.cli.file_names import check_outputs, distinct_stems, output_path
+from service.cli.given_pictures import add_pictures_argument, pictures_of
 from service.cli.json_output import json_output
 from service.cli.measuring import find_recipe, guard_of, load_config_or_default, thickness_of
 
@@ -35,7 +36,7 @@ METHODS = ("wall-tips", "sliding-matrix", "direct-scan", "find-contours")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Pictures, method and its sizes, configuration, outputs."""
-    parser.add_argument("images", nargs="+", type=Path, metavar="IMAGE", help="picture files")
+    add_pictures_argument(parser, what="picture files")
     parser.add_argument("--method", choices=METHODS)
     parser.add_argument("--core-px", type=int, metavar="PX", help="sliding-matrix: half the window's side")
     parser.add_argument("--step-px", type=int, metavar="PX", help="sliding-matrix: the window's step")
@@ -64,6 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Trace all pictures; the worst exit status."""
+    # A folder is several pictures, also where it holds one today: outputs go into a folder then, too.
+    args.several = len(args.images) > 1 or args.images[0].is_dir()
+    args.images = pictures_of(args.images)
     setup = _Setup.of(args)
     texts = sys.stderr if args.json == "-" else sys.stdout
     worst = EXIT_OK
@@ -103,7 +107,7 @@ class _Setup:
                 "in pixels. Name one by --calibration or --config",
                 file=sys.stderr,
             )
-        overlays = {} if args.overlay is None else _overlays(args.overlay, args.images)
+        overlays = {} if args.overlay is None else _overlays(args.overlay, args.images, several=args.several)
         exports = Exports.of(args, recipe, calibrated=guard is not None)
         told = [] if args.json in (None, "-") else [("--json", Path(args.json))]
         check_outputs(args.images, [*told, *(("--overlay", file) for file in overlays.values()), *exports.outputs])
@@ -120,9 +124,9 @@ class _Setup:
         )
 
 
-def _overlays(overlay: Path, images: list[Path]) -> dict[Path, Path]:
+def _overlays(overlay: Path, images: list[Path], *, several: bool) -> dict[Path, Path]:
     """The overlay file of each picture; the folder for several is made. Raise UserError."""
-    if len(images) == 1 and not overlay.is_dir():
+    if not several and not overlay.is_dir():
         files = {images[0]: overlay}
     else:
         _make_folder(overlay)

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
+from service.cli.given_pictures import add_pictures_argument, pictures_of
 from service.cli.measuring import Measuring, add_measuring_arguments, note_trend, now
 
 HELP = "measure a master part: deviation in mm, pass or fail"
@@ -24,7 +25,7 @@ refused, 2 unusable input."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Pictures, the master, and what all measuring commands take."""
-    parser.add_argument("images", nargs="+", type=Path, metavar="IMAGE", help="pictures of the master part")
+    add_pictures_argument(parser, what="pictures of the master part")
     parser.add_argument("--outline", type=Path, required=True, metavar="FILE", help="the master's outline, JSON")
     parser.add_argument("--fixed", action="store_true", help="compare in place: the part lies in a fixture")
     add_measuring_arguments(parser)
@@ -46,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
         raise UserError(f"--outline {error}") from error
     found: list[Deviation] = []
     failed = False
-    for image in args.images:
+    for image in pictures_of(args.images):
         try:
             seen = measuring.measurer.measure(read_picture(image), measuring.recipe, measuring.thickness_mm)
             if seen.findings or seen.millimetres is None:

@@ -92,3 +92,21 @@ def test_a_veil_covers_what_the_contour_may_be_off_by_where_it_is_wider_than_the
     assert near(plain, 400, 160, (100, 100, 100), reach=0)
     assert near(wide, 400, 160, tuple(round(0.65 * 100 + 0.35 * part) for part in VERTEX), reach=0)
     assert near(wide, 400, 175, (100, 100, 100), reach=0)
+
+
+def test_a_refusals_caption_stands_beside_the_picture_and_hides_nothing_of_it() -> None:
+    picture = np.random.default_rng(0).integers(100, 256, (600, 800)).astype(np.uint8)
+    drawn = draw_overlay(picture, None, caption=["refused: 111 touches_border", "wall-tips"], refused=True)
+    rows = len(drawn) - 600
+    assert 20 < rows < 100
+    np.testing.assert_array_equal(drawn[rows:], cv2.merge([picture] * 3))
+    assert near(drawn, 12, rows // 3, REFUSED, reach=10)
+    assert draw_overlay(picture, None, refused=True).shape == (600, 800, 3)
+
+
+def test_what_lies_beside_is_outlined_too_without_vertices() -> None:
+    beside = SQUARE * [5, 30] + [700.0, 150.0]
+    drawn = draw_overlay(np.zeros((600, 800), np.uint8), OUTLINE, refused=True, others_px=[beside])
+    assert near(drawn, 400, 150, REFUSED)
+    assert near(drawn, 725, 150, REFUSED)
+    assert not near(drawn, 700, 150, VERTEX, reach=4)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.geometry import area
+from contour.geometry import Contour, area
 from contour.pieces import pieces_beside
 from contour.tracing import TraceSettings, trace
 from tests.contour.scenes import block
@@ -35,6 +35,9 @@ def test_a_second_comb_is_a_piece_with_its_area_and_place() -> None:
     comb(mask, 350, 120, 8, 7)
     (piece,) = pieces_beside(mask, RING, PITCH)
     assert piece.area_px2 == pytest.approx(56 * 0.866 * PITCH**2, rel=0.25)
+    assert abs(area(Contour(piece.outline_px))) == pytest.approx(piece.area_px2, rel=0.1)
+    np.testing.assert_allclose(piece.outline_px.min(axis=0), piece.box_px[:2], atol=10)
+    np.testing.assert_allclose(piece.outline_px.max(axis=0), piece.box_px[2:], atol=10)
     left, top, right, bottom = piece.box_px
     assert 320 <= left <= 345
     assert 95 <= top <= 115

@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[2]
 TRANSFER, LINK, EXECUTOR, CYCLE = "service/transfer.py", "service/link.py", "service/executor.py", "service/cycle.py"
 JOURNAL, OWNERSHIP, CLOCK = "service/journal.py", "service/ownership.py", "service/controller_clock.py"
 IN_CLOCK, IN_DOUBT = "tests/service/test_controller_clock.py", "tests/service/test_transfer_in_doubt.py"
+TRIGGERS, IN_ANSWERS = "service/triggers.py", "tests/service/test_serial_answers.py"
 IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_RESUMING, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (
     f"tests/service/test_{name}.py"
     for name in (
@@ -698,6 +699,27 @@ RULES = (
         f"{IN_EXECUTOR}::test_a_trigger_that_a_lost_journal_held_is_not_taken_again",
         "if later:",
         "if False:",
+    ),
+    Rule(
+        "Always: who got an ACK on a serial line gets its DONE or FAIL, also after a restart",
+        f"{TRIGGERS}::SerialTrigger._tell_owed",
+        f"{IN_ANSWERS}::test_a_job_that_was_in_flight_at_a_kill_is_told_its_end_after_the_restart",
+        "if job.job_id <= self._of_before or job.job_id in self._acknowledged",
+        "if job.job_id in self._acknowledged",
+    ),
+    Rule(
+        "Always: who got an ACK hears the end also when the line was away",
+        f"{TRIGGERS}::SerialTrigger._serve",
+        f"{IN_ANSWERS}::test_what_ended_while_the_line_was_away_is_told_when_it_is_back",
+        "self._look.set()",
+        "pass",
+    ),
+    Rule(
+        "Always: measurement and evidence of a job are durable before its contour is sent",
+        f"{CYCLE}::Cycle._send",
+        f"{IN_CYCLE}::test_nothing_is_sent_before_measurement_and_evidence_are_durable",
+        "await self._drafted(job, drafted)",
+        "pass",
     ),
     Rule(
         "Always: losing the controller never ends the service",

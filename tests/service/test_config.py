@@ -38,6 +38,7 @@ def test_the_shipped_config_is_the_contracts_example_and_loads() -> None:
     assert isinstance(config.controller, ModbusTcp)
     controller = config.controller
     assert (controller.link_address, controller.service_address, controller.contour_address) == (0, 16, 32)
+    assert (controller.device_id, controller.single_write) == (1, "fc6")
     assert (controller.payload_capacity, controller.word_order, controller.handshake) == (1984, "big", "full")
     assert (controller.valid_for_s, controller.job_timeout_s, controller.max_repeats) == (30, 120, 3)
     assert config.recipes[0].name == "default"
@@ -64,6 +65,11 @@ def test_schema_and_reference_are_fresh() -> None:
     how = "run: python -m service.config_reference docs/configuration.md config.schema.json"
     assert (ROOT / "config.schema.json").read_text() == config_reference.schema_text(), how
     assert (ROOT / "docs" / "configuration.md").read_text() == config_reference.reference(), how
+
+
+def test_every_section_of_the_configuration_is_in_the_reference() -> None:
+    told = {model.__name__ for _, models in config_reference.SECTIONS for model in models}
+    assert told - {"Config"} == set(config_schema()["$defs"])
 
 
 def test_every_key_has_a_sentence_and_every_number_its_bounds() -> None:
@@ -136,12 +142,22 @@ def test_the_embedded_defaults_need_no_file() -> None:
         ),
         (SMALL.replace("modbus-tcp", "modbus-tcp, word_order: huge"), "controller.word_order: seen 'huge'"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, payload_capacity: 99"), "payload_capacity: is 99, expected an even"),
+        (SMALL.replace("modbus-tcp", "modbus-tcp, longest_write: 15"), "seen 15, expected 16 or more (Most registers"),
+        (SMALL.replace("modbus-tcp", "modbus-tcp, longest_read: 10"), "in one read; blocks of 16 go whole"),
+        (
+            SMALL.replace("modbus-tcp", "modbus-rtu, port: /dev/x, device_id: 0"),
+            "device_id: seen 0, expected 1 or more",
+        ),
+        (SMALL.replace("modbus-tcp", "modbus-rtu-over-tcp, device_id: 0"), "device_id: seen 0, expected 1 or more"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, link_address: 20"), "link_address (20 to 35) and service_address"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, contour_address: 65000"), "contour_address 65000 and 2016 registers"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, ack_timeout_s: 0.01"), "ack_timeout_s is 0.01, expected more than"),
         (SMALL + "triggers: [{kind: interval, period_s: soon}]\n", "triggers[0].period_s: seen 'soon'"),
         (SMALL + "triggers: [{period_s: 3}]\n", "triggers[0].kind: is missing"),
-        (SMALL + "triggers: [{kind: controller}, {kind: controller}]\n", "kind controller is there more than once"),
+        (
+            SMALL + "triggers: [{kind: controller}, {kind: controller}]\n",
+            "line 4: triggers[1]: kind controller is there more than once",
+        ),
         (
             SMALL.replace("modbus-tcp", "modbus-tcp, handshake: none") + "triggers: [{kind: controller}]\n",
             "kind controller needs a controller with handshake full",
@@ -154,9 +170,12 @@ def test_the_embedded_defaults_need_no_file() -> None:
         (SMALL + "recipes: [{number: 1, name: a, binarize: otsu}]\n", "wall-tips finds its own threshold"),
         (
             SMALL + "recipes: [{number: 1, name: a}, {number: 1, name: b}]\n",
-            "recipes: number 1 is there more than once",
+            "line 4: recipes[1].number: 1 is there more than once",
         ),
-        (SMALL + "recipes: [{number: 1, name: a}, {number: 2, name: a}]\n", "recipes: name a is there more than once"),
+        (
+            SMALL + "recipes: [{number: 1, name: a},\n {number: 2, name: a}]\n",
+            "line 5: recipes[1].name: a is there more than once",
+        ),
         (SMALL + "default_recipe: 7\n", "default_recipe is 7, but recipes have only the numbers 1"),
         (SMALL + "recipes: [{number: 1, name: a, binarize: 256}]\n", "recipes[0].binarize: seen 256"),
         (SMALL + "recipes: [{number: 1, name: a, binarize: no}]\n", "recipes[0].binarize: seen false, as no"),
@@ -254,7 +273,8 @@ def test_the_kinds_that_come_later_are_known_to_the_configuration_already(tmp_pa
     )
     config = load(tmp_path, text)
     assert isinstance(config.triggers[0], SerialTrigger)
-    assert mistakes(tmp_path, text.replace("ttyS1", "ttyS0"))[0] == "a serial port is named more than once"
+    expected = "line 4: triggers[0].port: /dev/ttyS0 is named more than once. A serial port serves one"
+    assert mistakes(tmp_path, text.replace("ttyS1", "ttyS0")) == [expected]
 
 
 def test_the_schema_is_json_and_names_its_dialect() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from drivers.controller.mailbox import Answer, Page, ServiceBlock
-from service.journal import Job, TriggerStamp
+from service.journal import Job, Terms, TriggerStamp
 from service.reasons import Outcome, Reason
 from tests.service.cycle_rig import QUICK, SETTINGS, Rig, rig
 from tests.service.scripted_controller import ScriptedController
@@ -38,6 +38,16 @@ async def test_a_sent_job_is_sent_again_bit_identical(tmp_path: Path) -> None:
         job = await resumed(built, lambda job_id: built.journal.store_pages(job_id, 9, (page(job_id),)))
         assert job.outcome is Outcome.ACCEPTED
         assert built.controller.accepted == [page(job.job_id)]
+
+
+async def test_what_was_known_of_a_job_before_the_restart_stays_its_own(tmp_path: Path) -> None:
+    report, figures, terms = {"vertices": 4, "area_mm2": 5000.0}, {"pages": 1}, Terms({"number": 1}, "sha256:aa")
+    async with rig(tmp_path) as built:
+        prepare = built.journal.store_pages
+        job = await resumed(built, lambda job_id: prepare(job_id, 9, (page(job_id),), terms, report, figures))
+        assert job.outcome is Outcome.ACCEPTED
+        assert (job.report, job.transfer, job.terms) == (report, figures, terms)
+        assert [(kept.job, kept.frame) for kept in built.keeper.kept] == [(job, None)], "the archive has the rest"
 
 
 async def test_a_job_that_was_accepted_before_the_crash_is_accepted_without_being_sent(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import socket
 import threading
 import time
@@ -92,7 +93,8 @@ class Systemd:
 
     def __init__(self, folder: Path) -> None:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
-        self._address = str(folder / "notify")
+        self._folder = os.open(folder, os.O_PATH)
+        self._address = f"/proc/self/fd/{self._folder}/notify"  # addresses hold 107 bytes, however long the path is
         self._heard: list[str] = []
 
     def __enter__(self) -> Systemd:
@@ -101,6 +103,7 @@ class Systemd:
 
     def __exit__(self, *_: object) -> None:
         self._socket.close()
+        os.close(self._folder)
 
     def joined(self, built: Built) -> Parts:
         """The parts, joined to this."""

@@ -54,6 +54,19 @@ def test_each_stage_is_timed_and_total_is_their_sum(rendered, measurer: Measurer
     assert times["total"] == pytest.approx(sum(value for name, value in times.items() if name != "total"))
 
 
+def test_a_step_above_twice_the_core_is_logged_once_a_recipe(
+    rendered, measurer: Measurer, caplog: pytest.LogCaptureFixture
+) -> None:
+    followed = Recipe(number=1, name="a", method="sliding-matrix", parameters={"step_px": 25})  # the core is 10
+    given = Recipe(number=2, name="b", method="sliding-matrix", parameters={"step_px": 25, "core_px": 12})
+    sound = Recipe(number=3, name="c", method="sliding-matrix", parameters={"step_px": 24, "core_px": 12})
+    measurer = Measurer(None)
+    for recipe in (followed, given, sound, followed, given):
+        measurer.measure(rendered.picture, recipe, THICKNESS_MM)
+    assert [record.getMessage().split(":")[0] for record in caplog.records] == ["recipe 1", "recipe 2"]
+    assert "step_px is 25, expected up to 24, twice core_px" in caplog.text
+
+
 def test_the_clock_is_the_callers(rendered) -> None:
     ticks = iter(range(100))
     times = Measurer(None, clock=lambda: next(ticks)).measure(rendered.picture, RECIPE, 20).timings_ms

@@ -21,9 +21,9 @@ from tests.soak.promises import Evidence, Findings, Rings, Side, judge_twins, mi
 from tests.soak.restored_cell import copy_journal, put_back
 from tests.system.processes import free_port, jobs
 
-NOTICED_S = 6.0  # watching the own number (1.5 s), then two heartbeats of the other's, and a busy machine
+NOTICED_S = 5.0  # watching the own number (1.5 s), then two heartbeats of the other's, and a busy machine
 PATIENCE_S = 5.0  # for a commit
-SEEN_S = 3.0  # how long it is looked at who goes on
+SEEN_S = 2.0  # how long it is looked at who goes on
 
 
 class ForeignCell(FaultedCell):

@@ -44,11 +44,11 @@ SIZES = {  # of a piece
     **dict.fromkeys(LINE, 125),
     **dict.fromkeys(BLOWS, 25),
     "small-disks": 10,
-    "restored-journals": 200,
+    "restored-journals": 150,
     "copied-journals": 5,
-    "foreign-owners": 50,
+    "foreign-owners": 40,
     "spare-controllers": 60,
-    "changed-settings": 100,
+    "changed-settings": 40,
     "torn-values": 70,
     "fuzz": 25_000,
 }
@@ -68,12 +68,12 @@ class Amounts:
     controller_kills: int = 100
     service_stops: int = 100
     controller_stops: int = 50
-    restored_journals: int = 2400
+    restored_journals: int = 1200
     copied_journals: int = 40
-    foreign_owners: int = 300
-    spare_controllers: int = 480
-    changed_settings: int = 600
-    torn_values: int = 420
+    foreign_owners: int = 240
+    spare_controllers: int = 360
+    changed_settings: int = 200
+    torn_values: int = 350
     small_disks: int = 40
     serial_answers: int = 100
     fuzz: int = 100_000

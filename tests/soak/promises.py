@@ -113,8 +113,12 @@ def _contours(evidence: Evidence, findings: Findings) -> None:
     for pair, count in pairs.items():
         if count > max(1, given[pair]):
             findings.add("accepted-twice", f"session and trigger {pair}, {count} times")
+    # A job that a restored journal left unsent is taken back in whatever session there is then.
+    sessions = {(row["job_id"], row["session"]) for row in evidence.jobs}
     for taken in evidence.taken:
-        _contour(taken, rows.get(taken.job_id), evidence, findings)
+        row = rows.get(taken.job_id)
+        same = (taken.job_id, taken.session) in sessions
+        _contour(taken, {**row, "session": taken.session} if row and same else row, evidence, findings)
 
 
 def _accepted_once(times: Counter[int], findings: Findings) -> None:

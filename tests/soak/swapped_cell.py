@@ -83,6 +83,8 @@ class SpareCell(FaultedCell):
 class SettingsCell(FaultedCell):
     """The link's settings are changed and the service started while a job is on its way; later they are put back."""
 
+    valid_for_s = 3.0  # so that most wait for their settings, and are not taken back
+    seconds_a_job = 15.0
     pause_s = (0.1, 0.8)
 
     def __init__(self, folder: Path, terms: Terms) -> None:

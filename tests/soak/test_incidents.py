@@ -23,11 +23,11 @@ from tests.system.small_disk import CannotMount
 
 # What must have happened in each, by the names that the report gives it.
 SLICES: list[tuple[type[FaultedCell], Terms, set[str]]] = [
-    (RestoredCell, Terms(seed=910, jobs=20, risk=0.0, incidents=3), {"journal put back"}),
+    (RestoredCell, Terms(seed=910, jobs=12, risk=0.0, incidents=3), {"journal put back"}),
     (ForeignCell, Terms(seed=912, jobs=4, risk=0.0, incidents=1), {"foreign owner after the commit"}),
     (SpareCell, Terms(seed=914, jobs=8, risk=0.0, incidents=1), set()),
     (SettingsCell, Terms(seed=915, jobs=8, risk=0.0, incidents=1), set()),
-    (TornCell, Terms(seed=916, jobs=14, risk=0.0, incidents=1), {"last_job half written", "clock half written"}),
+    (TornCell, Terms(seed=916, jobs=12, risk=0.0, incidents=1), {"last_job half written", "clock half written"}),
 ]
 
 

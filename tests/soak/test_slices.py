@@ -211,6 +211,14 @@ def test_a_denied_job_is_forgiven_another_service_only_below_a_job_that_had_ende
     assert set(judge(given).counts) == {"falsely-denied"}
 
 
+def test_a_job_that_was_taken_back_later_counts_in_the_session_in_which_it_was_accepted() -> None:
+    given = evidence()
+    given.jobs.append(row(1, "accepted", session=10))
+    assert judge(given).counts == Counter()
+    given.jobs[0] = row(1, "accepted", session=11)
+    assert set(judge(given).counts) == {"stale"}
+
+
 def test_a_denied_job_is_forgiven_a_controller_that_was_taken_away() -> None:
     given = evidence()
     given.jobs[0] = row(1, "failed", 156)
@@ -269,12 +277,12 @@ def test_the_pieces_amount_to_what_was_asked_and_each_has_its_own_terms() -> Non
         "controller-kills": 100,
         "service-stops": 100,
         "controller-stops": 50,
-        "restored-journals": 2400,
+        "restored-journals": 1200,
         "copied-journals": 40,
-        "foreign-owners": 300,
-        "spare-controllers": 480,
-        "changed-settings": 600,
-        "torn-values": 420,
+        "foreign-owners": 240,
+        "spare-controllers": 360,
+        "changed-settings": 200,
+        "torn-values": 350,
         "small-disks": 40,
         "serial-answers": 100,
         "fuzz": 100_000,

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from drivers.controller.simulated import SimulatedController, TriggerNotPossible
+from service.config import Config
 from service.journal import Journal
 from tests.soak.faulted_cell import FaultedCell, Incident, Terms
 from tests.soak.promises import Evidence
@@ -96,6 +97,10 @@ class TornCell(FaultedCell):
 
     def more_options(self) -> dict[str, Any]:
         return {"chance": self.chance, "torn": self.restarts, "scan_s": self.chance.choice(SLOW_SCANS_S)}
+
+    def config(self, folder: Path | None = None, **changed: Any) -> Config:
+        """With patience for an answer that takes many slow scans."""
+        return super().config(folder, **{"ack_timeout_s": 2.0, "ready_timeout_s": 2.0, **changed})
 
     def incidents(self) -> list[Incident]:
         return [self.near_the_next_boundaries] * 3 + [self.restart_program]

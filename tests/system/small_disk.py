@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -15,7 +16,9 @@ class CannotMount(Exception):
 
 @contextmanager
 def mounted(disk: Path, megabytes: int) -> Iterator[Path]:
-    """The folder `disk`, made a file system of that size; raise CannotMount, where root's rights are missing."""
+    """The folder `disk`, made a file system of that size; raise CannotMount, where root's rights or mount are."""
+    if shutil.which("mount") is None:
+        raise CannotMount("mount is not here. Install it: apt-get install mount")
     disk.mkdir()
     done = subprocess.run(
         ["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "combtrace-test", disk],

@@ -94,6 +94,21 @@ def test_parameters_of_the_command_line_reach_the_method() -> None:
     assert coarse["area_px2"] > fine["area_px2"]
 
 
+def test_a_step_above_twice_the_core_is_told_once_and_traced_nevertheless() -> None:
+    sizes = ("--method", "sliding-matrix", "--core-px", "10", "--step-px")
+    done = combtrace("trace", RECTANGLE, RECTANGLE, *sizes, "21", "--json", "-")
+    assert len(done.stdout.splitlines()) == 2
+    assert done.stderr.count("step_px is 21, expected up to 20, twice core_px") == 1
+    assert "step_px is" not in combtrace("trace", RECTANGLE, *sizes, "20").stderr
+
+
+def test_a_core_by_hand_is_accepted_like_the_one_that_follows() -> None:
+    """The threshold follows from the cells, whoever gives the core."""
+    (by_hand,) = traced(RECTANGLE, "--method", "sliding-matrix", "--core-px", "10", "--step-px", "10")
+    (followed,) = traced(RECTANGLE, "--method", "sliding-matrix")
+    assert by_hand["area_px2"] == pytest.approx(followed["area_px2"], rel=0.01)
+
+
 def test_the_thickness_moves_the_plane() -> None:
     """Under a camera 1.2 m up, a plane 60 mm higher is seen 5 % nearer: the same pixels are fewer millimetres."""
     low = traced(RECTANGLE, "--calibration", CALIBRATION, "--thickness-mm", "0")[0]["area_mm2"]
@@ -374,3 +389,68 @@ def test_a_refusal_is_told_in_russian_with_what_was_measured(tmp_path: Path) -> 
     assert told.returncode == 3
     assert "отказ: 102 image_quality: Снимок нерезкий" in told.stdout
     assert "brightest parts reach 0 of 255" in told.stdout
+
+
+def test_a_refusal_for_several_blocks_shows_both_outlines_below_its_caption(tmp_path: Path) -> None:
+    small = cv2.resize(cv2.imread(str(RECTANGLE)), (640, 480), interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(tmp_path / "two.png"), np.concatenate([small, small], axis=1))
+    (record,) = traced(tmp_path / "two.png", "--overlay", tmp_path / "seen.png", status=3)
+    assert record["reason"] == "several_blocks"
+    seen = cv2.imread(str(tmp_path / "seen.png"))
+    picture = seen[len(seen) - 480 :].astype(int)
+    assert len(seen) > 480
+    red = (picture[:, :, 2] - picture[:, :, :2].max(axis=2)) > 120
+    # Both lie alike in their halves, so both lines enclose the same box.
+    left, right = (np.argwhere(half) for half in (red[:, :640], red[:, 640:]))
+    for side in ("min", "max"):
+        np.testing.assert_allclose(getattr(left, side)(axis=0), getattr(right, side)(axis=0), atol=6)
+
+
+def test_two_links_to_one_picture_each_get_their_outputs(tmp_path: Path) -> None:
+    links = [tmp_path / name for name in ("monday.jpg", "tuesday.jpg")]
+    for link in links:
+        link.symlink_to(RECTANGLE)
+    out = tmp_path / "out"
+    records = traced(*links, "--overlay", out, "--calibration", CALIBRATION, "--svg", out)
+    assert [record["image"] for record in records] == [str(link) for link in links]
+    names = {path.name for path in out.iterdir()}
+    assert names == {f"{day}{end}" for day in ("monday", "tuesday") for end in ("-contour.png", ".svg")}
+
+
+def test_a_folder_stands_for_its_pictures_in_order_and_counts_what_it_passes_over(tmp_path: Path) -> None:
+    folder = tmp_path / "day"
+    (folder / "older").mkdir(parents=True)
+    small = cv2.imread(str(RECTANGLE), cv2.IMREAD_GRAYSCALE)[::2, ::2]
+    for name in ("block10.png", "block9.PNG", "older/block1.png"):
+        cv2.imwrite(str(folder / name), small)
+    for name in ("notes.txt", "calibration.yaml", ".hidden.png"):
+        (folder / name).write_text("")
+    done = combtrace("trace", folder, "--json", "-", "--overlay", tmp_path / "seen")
+    assert done.returncode == 0, done.stderr
+    seen = [json.loads(line)["image"] for line in done.stdout.splitlines()]
+    assert seen == [str(folder / "block9.PNG"), str(folder / "block10.png")]
+    assert f"{folder}: 2 pictures, 2 other files are passed over" in done.stderr
+    assert {path.name for path in (tmp_path / "seen").iterdir()} == {"block9-contour.png", "block10-contour.png"}
+
+
+def test_a_folder_with_one_picture_has_its_outputs_in_a_folder_too(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "block.jpg").symlink_to(RECTANGLE)
+    traced(tmp_path / "in", "--overlay", tmp_path / "seen")
+    assert (tmp_path / "seen" / "block-contour.png").is_file()
+
+
+@pytest.mark.parametrize(("content", "told"), [((), "but nothing"), (("notes.txt",), "but 1 other files")])
+@pytest.mark.parametrize("command", ["trace", "teach-table --output {0}/table.npz", "verify --outline {0}/o.json"])
+def test_a_folder_without_a_picture_is_an_error(
+    command: str, content: tuple[str, ...], told: str, tmp_path: Path
+) -> None:
+    (tmp_path / "o.json").write_text('{"exterior": [[0, 0], [9, 0], [9, 9]]}')
+    folder = tmp_path / "in"
+    folder.mkdir()
+    for name in content:
+        (folder / name).write_text("")
+    name, *options = command.format(tmp_path).split()
+    done = combtrace(name, folder, *options, *(["--calibration", CALIBRATION] if name == "verify" else []))
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert f"{folder}: holds no picture, {told}" in done.stderr

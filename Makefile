@@ -4,17 +4,18 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page accuracy refusals rules soak soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page accuracy methods refusals rules soak soak-daemon hil check format clean
 
 install: $(STAMP)
 
 $(STAMP): pyproject.toml constraints.txt
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
-	touch $(STAMP)
+	@echo "Installing into $(VENV): a minute or two"
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	@touch $(STAMP)
 
 demo: install
-	$(BIN)/combtrace demo --output demo-output
+	@$(BIN)/combtrace demo --output demo-output
 
 # Three at a time on two cores: most of the time a test waits for a process. A file's tests stay together, in their order.
 test: install
@@ -49,7 +50,11 @@ bench-page: install
 accuracy: install
 	$(BIN)/python -m benchmarks.bench --random 300 --first 998000 --write
 
-# Each rule of the protocol taken out of a copy of the code: its test must fail then. Some minutes.
+# Every figure and table of docs/methods.md; a test redraws them.
+methods: install
+	$(BIN)/python -m benchmarks.methods
+
+# Each rule of the protocol taken out of a copy of the code: its test must fail then. Four minutes on two cores.
 rules: install
 	$(BIN)/python -m tests.rules.mutate
 

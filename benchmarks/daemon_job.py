@@ -1,7 +1,7 @@
 """From a trigger to the controller's acceptance with a 12 MP frame, without the time of decoding and tracing.
 
 The daemon's parts run in this process, so that a trigger by hand and its end are on one clock; the simulated controller
-is a process on loopback. The archive is on: it begins when the controller has answered.
+is a process on loopback. The archive is on: a job waits for its draft, and the rest begins when it has ended.
 """
 
 from __future__ import annotations

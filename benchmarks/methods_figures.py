@@ -1,168 +1,167 @@
-"""Draws the figures of docs/methods.md: what the paper's methods see, and where each of them fails.
-
-Run it as `python -m benchmarks.methods_figures [FOLDER]`; the folder is docs/pictures by default.
-"""
+"""The figures of docs/methods.md: what the paper's methods see, and where each of them fails."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.binarize import binarize
-from contour.geometry import Contour, area, densified
+from benchmarks.methods_blocks import CORE_AND_STEP, HEIGHT, WIDTH, block, cells, traced, walls
+from contour._cv import enclosed_area
+from contour.direct_scan import default_gap_px, default_width_px, scan_pairs
+from contour.geometry import Contour
 from contour.overlay import draw_overlay
-from contour.segments import distances_to_ring
-from contour.sliding_matrix import default_core_px, fill_windows
-from contour.synthetic import (
-    CellGeometry,
-    Clutter,
-    Light,
-    Rendered,
-    Scene,
-    Sensor,
-    Table,
-    camera_above,
-    convex,
-    crescent,
-    disc_ring,
-    l_shape,
-    render,
-    u_shape,
-    with_holes,
-)
-from contour.tracing import TraceSettings, trace
+from contour.sliding_matrix import default_core_px, default_threshold, fill_windows
+from contour.tracing import TraceSettings
 
 Picture = NDArray[np.uint8]
+Colour = tuple[int, int, int]
 
-WIDTH, HEIGHT, MM_PER_PX = 500, 430, 0.6
-MIDDLE = (WIDTH * MM_PER_PX / 2, HEIGHT * MM_PER_PX / 2 - 11.0)
-"""A little low: the caption stands above the block."""
+LEFT, RIGHT, NOISE, TRUTH = (40, 150, 255), (255, 190, 40), (220, 60, 230), (255, 160, 60)
+"""Blue, green, red: orange, light blue, magenta, blue."""
 
-TRUTH = (255, 160, 60)
+_BLACK, _WHITE = (0, 0, 0), (255, 255, 255)
+_CELLS = ((80, 220, 60), (40, 200, 250), (240, 120, 200), (250, 180, 60), (90, 90, 250))
 _GREY_STEPS = 21
 """Grey levels are rounded to steps of these: the figures compress to a third, and look the same."""
+_LINE_PX = 20
+_BORDER_PX = 3
+CAPTION_PX = 2 * _LINE_PX + 8
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One picture of a figure: a rendering, what is drawn on it, and the lines above it."""
+    """One picture of a figure, and the lines above it, each in its colour."""
 
     picture: Picture
-    contour: Contour | None
-    caption: Sequence[str]
-    truth: Contour | None = None
+    caption: Sequence[tuple[str, Colour]]
 
 
-def scene(outline: Contour, seed: int, clutter: Clutter | None = None) -> Rendered:
-    """An easy picture of a block, 22 px a pitch: little noise, so that the methods fail by their nature alone."""
-    return render(
-        Scene(
-            outline,
-            camera_above(WIDTH, HEIGHT, MM_PER_PX),
-            CellGeometry(pitch_mm=13.2, wall_mm=1.2, ribbon_deg=20.0),
-            table=Table(texture=0.004),
-            light=Light(gradient=0.2),
-            clutter=clutter or Clutter(),
-            sensor=Sensor(shot_noise=0.003, read_noise=0.002),
-            seed=seed,
-        )
-    )
-
-
-def traced(block: Rendered, settings: TraceSettings, label: str) -> Panel:
-    """A panel with the method's contour, its mean distance from the truth and its error of area."""
-    found = trace(block.picture, settings).contour
-    off = mean_distance(found, block.truth_px)
-    share = 100 * (area(found) / area(block.truth_px) - 1)
-    return Panel(block.picture, found, [label, f"mean error {off:.1f} px, area {share:+.0f} %"], block.truth_px)
-
-
-def mean_distance(found: Contour, truth: Contour) -> float:
-    """Mean distance between two outlines' exteriors, both ways, px."""
-    there = distances_to_ring(densified(found.exterior, 1.0), truth.exterior)
-    back = distances_to_ring(densified(truth.exterior, 1.0), found.exterior)
-    return float((there.mean() + back.mean()) / 2)
-
-
-def drawn(panel: Panel) -> Picture:
-    picture = (panel.picture // _GREY_STEPS * _GREY_STEPS).astype(np.uint8)
-    canvas = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
-    if panel.truth is not None:
-        for ring in panel.truth.rings:
-            points = np.round(ring * 16).astype(np.int32).reshape(-1, 1, 2)
-            cv2.polylines(canvas, [points], True, TRUTH, 1, cv2.LINE_AA, 4)
-    return draw_overlay(np.asarray(canvas, np.uint8), panel.contour, caption=panel.caption, marks=False)
-
-
-def figure(path: Path, panels: Sequence[Panel], columns: int) -> None:
-    """Write the panels side by side, `columns` a row."""
-    pictures = [cv2.copyMakeBorder(drawn(panel), 3, 3, 3, 3, cv2.BORDER_CONSTANT, value=(255,) * 3) for panel in panels]
-    rows = [np.hstack(pictures[k : k + columns]) for k in range(0, len(pictures), columns)]
-    data = cv2.imencode(".png", np.vstack(rows), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1]
-    path.write_bytes(data.tobytes())
-    print(f"{path}: {len(data) / 1000:.0f} kB")
-
-
-def find_contours_figure(folder: Path) -> None:
-    block = scene(convex(MIDDLE, 100, 4), 5)
-    mask = binarize(block.picture).mask
-    found = traced(block, TraceSettings(method="find-contours"), "find-contours: the largest outer contour")
-    figure(folder / "methods-find-contours.png", [Panel(mask, None, ["The wall mask"]), found], 2)
-
-
-def direct_scan_figure(folder: Path) -> None:
-    settings = TraceSettings(method="direct-scan")
-    blocks = {
-        "convex: right": scene(convex(MIDDLE, 100, 4), 5),
-        "L: rows that cross it twice lose an arm": scene(l_shape(MIDDLE, 205, 155, 68, 200.0), 6),
-        "U: one arm is lost": scene(u_shape(MIDDLE, 220, 170, 65, 60, 0.0), 7),
-        "crescent: one horn is lost": scene(crescent(MIDDLE, 100, 85, 70, 90.0), 8),
+def figures() -> dict[str, Picture]:
+    """Each figure's picture by its file name, BGR."""
+    return {
+        "methods-find-contours.png": _joined(_find_contours(), 3),
+        "methods-direct-scan-points.png": _joined(_points(), 2),
+        "methods-direct-scan.png": _joined(_direct_scan(), 2),
+        "methods-core-and-step.png": _joined(_core_and_step(), 3),
+        "methods-concave.png": _joined(_concave(), 2),
     }
-    panels = [traced(block, settings, f"direct-scan, {label}") for label, block in blocks.items()]
-    figure(folder / "methods-direct-scan.png", panels, 2)
 
 
-def core_and_step_figure(folder: Path) -> None:
-    block = scene(l_shape(MIDDLE, 205, 155, 68, 20.0), 6)
-    tries = [(5, 5), (10, 10), (25, 25), (10, 20), (10, 5), (10, 1)]
-    panels = [
-        traced(
-            block,
+def panels(figure: Picture) -> list[Picture]:
+    """The panels' pictures as they lie in a figure, without what is written above them."""
+    below, wide = CAPTION_PX + _BORDER_PX, WIDTH + 2 * _BORDER_PX
+    tall = below + HEIGHT + _BORDER_PX
+    return [
+        figure[top + below : top + below + HEIGHT, left + _BORDER_PX : left + _BORDER_PX + WIDTH]
+        for top in range(0, figure.shape[0], tall)
+        for left in range(0, figure.shape[1], wide)
+    ]
+
+
+def _joined(panels: Sequence[Panel], columns: int) -> Picture:
+    """The panels side by side, `columns` a row, each below its caption."""
+    tiles = []
+    for panel in panels:
+        edges = (CAPTION_PX + _BORDER_PX, _BORDER_PX, _BORDER_PX, _BORDER_PX)
+        tile = cv2.copyMakeBorder(panel.picture, *edges, cv2.BORDER_CONSTANT, value=_WHITE)
+        for number, (line, colour) in enumerate(panel.caption, 1):
+            place = (_BORDER_PX + 4, number * _LINE_PX)
+            cv2.putText(tile, line, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
+        tiles.append(tile)
+    rows = [np.hstack(tiles[k : k + columns]) for k in range(0, len(tiles), columns)]
+    return np.asarray(np.vstack(rows), np.uint8)
+
+
+def _plain(picture: Picture) -> Picture:
+    grey = (picture // _GREY_STEPS * _GREY_STEPS).astype(np.uint8)
+    return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)
+
+
+def _rings(canvas: Picture, rings: Sequence[NDArray[np.float64]], colour: Colour) -> None:
+    for ring in rings:
+        cv2.polylines(canvas, [np.round(ring * 16).astype(np.int32).reshape(-1, 1, 2)], True, colour, 1, cv2.LINE_AA, 4)
+
+
+def _black(*lines: str) -> list[tuple[str, Colour]]:
+    return [(line, _BLACK) for line in lines]
+
+
+def _traced(name: str, settings: TraceSettings, label: str, specks: int = 0, chips: int = 0) -> Panel:
+    """A panel with the method's contour, its mean distance from the true outline and its error of area."""
+    found, mean_px, share = traced(settings, name, specks, chips)
+    return Panel(_drawn(name, found, specks, chips), _black(label, f"mean error {mean_px:.1f} px, area {share:+.1f} %"))
+
+
+def _drawn(name: str, found: Contour, specks: int, chips: int) -> Picture:
+    scene = block(name, specks, chips)
+    canvas = _plain(scene.picture)
+    _rings(canvas, scene.truth_px.rings, TRUTH)
+    return draw_overlay(canvas, found, marks=False)
+
+
+def _find_contours() -> list[Panel]:
+    mask = walls("convex").mask
+    rings = [ring for ring in cv2.findContours(mask, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)[0] if enclosed_area(ring)]
+    every = _plain((mask // 5).astype(np.uint8))
+    for number, ring in enumerate(rings):
+        cv2.polylines(every, [ring], True, _CELLS[number % len(_CELLS)], 1)
+    return [
+        Panel(_plain(mask), _black("The wall mask")),
+        Panel(every, _black("findContours: every contour", f"{len(rings)} of them, each in its colour")),
+        _traced("convex", TraceSettings(method="find-contours"), "find-contours: the largest outer one"),
+    ]
+
+
+def _points() -> list[Panel]:
+    """The scan's points and what it drops."""
+    return [_points_of("convex", 80, 12), _points_of("u", 0, 0)]
+
+
+def _points_of(name: str, specks: int, chips: int) -> Panel:
+    seen = cells(name, specks, chips)
+    kept, noise = scan_pairs(walls(name, specks, chips).mask, default_gap_px(seen), default_width_px(seen))
+    canvas = _plain(block(name, specks, chips).picture)
+    for y, left, right in noise.tolist():
+        cv2.line(canvas, (left, y), (right, y), NOISE, 2)
+    for y, left, right in kept.tolist():
+        cv2.circle(canvas, (left, y), 2, LEFT, -1)
+        cv2.circle(canvas, (right, y), 2, RIGHT, -1)
+    dropped = f"{len(noise)} pair{'s' * (len(noise) != 1)} dropped as noise"
+    return Panel(canvas, [(f"{len(kept)} rows: left points orange, right ones blue", _BLACK), (dropped, NOISE)])
+
+
+def _direct_scan() -> list[Panel]:
+    labels = {
+        "convex": "convex: right but for open cells",
+        "l, turned": "L: rows that cross it twice lose an arm",
+        "u": "U: one arm is lost",
+        "crescent": "crescent: one horn is lost",
+    }
+    settings = TraceSettings(method="direct-scan")
+    return [_traced(name, settings, f"direct-scan, {label}") for name, label in labels.items()]
+
+
+def _core_and_step() -> list[Panel]:
+    return [
+        _traced(
+            "l",
             TraceSettings("sliding-matrix", core_px=core, step_px=step),
             f"sliding-matrix, core {core}, step {step}",
         )
-        for core, step in tries
+        for core, step in CORE_AND_STEP
     ]
-    figure(folder / "methods-core-and-step.png", panels, 3)
 
 
-def concave_figure(folder: Path) -> None:
-    holed = with_holes(u_shape(MIDDLE, 225, 175, 68, 85, 10.0), disc_ring((MIDDLE[0] + 4.0, MIDDLE[1] - 42.0), 24.0))
-    block = scene(holed, 9, Clutter(specks=20, debris=4))
-    walls = binarize(block.picture)
-    if walls.cells is None:
-        raise SystemExit("The figure's block shows no cells: the renderer or the mask has changed.")
-    core = default_core_px(walls.cells)
-    filled = fill_windows(walls.mask, core, core, 40.0)
-    panels = [
-        Panel(filled, None, [f"The filled picture, core {core}, step {core}"]),
-        traced(block, TraceSettings("sliding-matrix"), "sliding-matrix, sizes from the picture"),
+def _concave() -> list[Panel]:
+    there = ("holed", 20, 4)
+    seen = cells(*there)
+    core = default_core_px(seen.pitch_px)
+    filled = fill_windows(walls(*there).mask, core, core, default_threshold(seen))
+    return [
+        Panel(_plain(filled), _black(f"The filled picture, core {core}, step {core}")),
+        _traced("holed", TraceSettings("sliding-matrix"), "sliding-matrix, sizes from the picture", 20, 4),
     ]
-    figure(folder / "methods-concave.png", panels, 2)
-
-
-def main() -> None:
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/pictures")
-    folder.mkdir(parents=True, exist_ok=True)
-    for draw in (find_contours_figure, direct_scan_figure, core_and_step_figure, concave_figure):
-        draw(folder)
-
-
-if __name__ == "__main__":
-    main()

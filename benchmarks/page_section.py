@@ -1,4 +1,4 @@
-"""Sections of docs/accuracy.md that other commands than the bench write: kept when the page is written anew."""
+"""Sections of pages that commands write: of docs/accuracy.md by others than the bench, kept when it is written anew."""
 
 from __future__ import annotations
 
@@ -16,6 +16,14 @@ def put_section(name: str, text: str, page: Path = PAGE) -> None:
     found = pattern.search(old)
     new = f"{old.rstrip()}\n\n{block}\n" if found is None else old[: found.start()] + block + old[found.end() :]
     page.write_text(new, encoding="utf-8")
+
+
+def section(name: str, page: Path = PAGE) -> str:
+    """The text of the section `name` as it stands in the page."""
+    found = _pattern(re.escape(name)).search(page.read_text(encoding="utf-8"))
+    if found is None:
+        raise LookupError(f"{page} has no section {name}")
+    return found.group(0).split("\n", 1)[1].rsplit("\n", 1)[0]
 
 
 def kept_sections(page: Path = PAGE) -> list[str]:

@@ -14,6 +14,7 @@ from contour.error_budget import ErrorBudget
 from contour.geometry import Contour, Ring, area, contour_defect
 from contour.pieces import Piece
 from contour.polygon import Polygon
+from contour.position_uncertainty import PositionUncertainty
 from contour.quality import QualityLimits, lost_in_noise, picture_faults, quality_faults
 from contour.region import Region
 from contour.segments import BoxTree, contains, first_meeting
@@ -54,8 +55,8 @@ class Refusal(IntEnum):
 class Limits:
     """What a contour must keep to. Limits in millimetres do not apply without a calibration.
 
-    `work_area_mm` is a polygon in the machine frame, None = not checked; `max_uncertainty_mm` and
-    `max_disagreement_pitches` None = not checked.
+    `work_area_mm` is a polygon in the machine frame, `sure` states the part of the picture that the calibration covers;
+    None = not checked, as are `max_uncertainty_mm` and `max_disagreement_pitches`.
     `pieces` one: no other block may be in view; largest: a smaller one may. `block_share` of the traced block's area
     makes another piece of comb a block, below that it is an offcut.
     """
@@ -65,6 +66,7 @@ class Limits:
     max_vertices: int = 4000
     border_px: float = 2.0
     work_area_mm: Ring | None = None
+    sure: PositionUncertainty | None = None
     max_uncertainty_mm: float | None = None
     max_disagreement_pitches: float | None = None
     pieces: Literal["one", "largest"] = "one"
@@ -112,6 +114,7 @@ def judge(
         _vague(traced),
         _uncertainty(polygon.millimetres, budget, limits.max_uncertainty_mm),
         _work_area(polygon.millimetres, limits.work_area_mm),
+        _uncovered(polygon.pixels, limits.sure),
         _several(traced, limits),
         _points(polygon.pixels, limits.max_vertices),
         _shape(polygon),
@@ -360,6 +363,19 @@ def _work_area(millimetres: Contour | None, work_area: Ring | None) -> Finding |
     return Finding(
         Refusal.OUTSIDE_WORK_AREA,
         f"The contour leaves the work area: {place}. Move the block, or check work_area_mm and the alignment.",
+    )
+
+
+def _uncovered(pixels: Contour, sure: PositionUncertainty | None) -> Finding | None:
+    outside = np.empty((0, 2)) if sure is None else sure.uncovered(pixels.exterior)
+    if not len(outside):
+        return None
+    x, y = outside[0]
+    return Finding(
+        Refusal.OUTSIDE_WORK_AREA,
+        f"The contour leaves the part of the picture that the calibration covers: vertex ({x:.0f}, {y:.0f}) px and "
+        f"{len(outside) - 1} more lie outside. Move the block towards the picture's middle, or calibrate again with "
+        "views that reach there.",
     )
 
 

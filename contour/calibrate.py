@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from contour.calibration import CameraCalibration
 from contour.calibration_spread import noise_px
 from contour.calibration_verdict import Verdict, judge_calibration
 from contour.errors import CalibrationError, CalibrationFailed
+from contour.length_check import REFUSE_SHARE, KnownLength, LengthCheck, board_length_check, camera_height_check
 from contour.lens_models import LensModel, Progress, Trial, choose_model, residuals, solve
 from contour.view_selection import (
     Dropped,
@@ -33,7 +34,6 @@ Floats = NDArray[np.float64]
 FOLDS = 5
 WIDEST_VIEW_DEG, NARROWEST_VIEW_DEG = 150.0, 2.0
 FARTHEST_MM, NEAREST_MM = 6000.0, 150.0
-HEIGHT_SLACK = 0.1
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,9 @@ class Setup:
 
     `plane` names the view whose board lies flat on the table; the pattern lies `board_thickness_mm` above it.
     `block_mm` is the height for which the verdict is given besides the table; `accept_mm` the largest 95 % figure that
-    counts as good. `camera_height_mm`, where it was measured, is compared with what the views say.
+    counts as good. `camera_height_mm` and `known_length`, where they were measured, are compared with what the views
+    say; from `accept_apart`, a share, the calibration is not good. `area_px` (left, top, right, bottom) is where blocks
+    will lie, and must be covered; with `accept_uncovered` neither that nor half of the picture must be.
     """
 
     plane: str
@@ -50,6 +52,10 @@ class Setup:
     block_mm: float = 60.0
     accept_mm: float = 0.1
     camera_height_mm: float | None = None
+    known_length: KnownLength | None = None
+    accept_apart: float = REFUSE_SHARE
+    area_px: tuple[float, float, float, float] | None = None
+    accept_uncovered: bool = False
     camera_name: str = ""
 
 
@@ -67,6 +73,7 @@ class CameraResult:
     noise_px: float
     turn_deg: float
     """The largest angle between two boards."""
+    lengths: tuple[LengthCheck, ...]
     verdict: Verdict
 
 
@@ -80,6 +87,8 @@ def calibrate_camera(
     """The calibration of the camera that took views of (width, height) px; raise CalibrationFailed with the reason."""
     if setup.plane not in {view.name for view in views}:
         raise CalibrationFailed(f"{setup.plane}, the --plane view, is not among the usable views. Take it again")
+    if setup.known_length is not None:
+        setup.known_length.check(size)
     on_progress(f"looking for outliers among {len(views)} views")
     sharp, blurred = without_blurred(views, setup.plane)
     single, twins = without_duplicates(sharp, setup.plane)
@@ -95,16 +104,28 @@ def calibrate_camera(
     turn_deg = check_turned(solved)
     check_plausible(solved, size, board, setup)
     plane = [view.name for view in kept].index(setup.plane)
-    verdict = judge_calibration(observed, size, model, solved, plane, setup, on_progress)
-    calibration = _calibration(solved, plane, size, setup, verdict)
+    calibration = _calibration(solved, plane, size, setup)
+    lengths = _lengths(calibration, board, setup)
+    verdict = judge_calibration(observed, size, model, solved, plane, setup, lengths, on_progress)
+    calibration = replace(calibration, uncertainty=verdict.uncertainty)
     misses = tuple(residuals(observed, solved))
     noise = noise_px(observed, solved, model)
-    return CameraResult(calibration, model, tuple(trials), tuple(kept), misses, dropped, noise, turn_deg, verdict)
+    return CameraResult(
+        calibration, model, tuple(trials), tuple(kept), misses, dropped, noise, turn_deg, lengths, verdict
+    )
 
 
-def _calibration(
-    solved: cv.Solved, plane: int, size: tuple[int, int], setup: Setup, verdict: Verdict
-) -> CameraCalibration:
+def _lengths(calibration: CameraCalibration, board: Board, setup: Setup) -> tuple[LengthCheck, ...]:
+    found = []
+    if setup.camera_height_mm is not None:
+        height_mm = float(calibration.camera_position[2])
+        found.append(camera_height_check(height_mm, setup.camera_height_mm, board.square_mm, setup.board_thickness_mm))
+    if setup.known_length is not None:
+        found.append(board_length_check(calibration, setup.known_length, board.square_mm))
+    return tuple(found)
+
+
+def _calibration(solved: cv.Solved, plane: int, size: tuple[int, int], setup: Setup) -> CameraCalibration:
     rotation = solved.rotations[plane]
     try:
         return CameraCalibration(
@@ -115,7 +136,6 @@ def _calibration(
             rotation_vector=rotation,
             translation_mm=table_translation(rotation, solved.translations[plane], setup.board_thickness_mm),
             camera_name=setup.camera_name,
-            uncertainty=verdict.uncertainty,
         )
     except CalibrationError as error:
         raise CalibrationFailed(f"the views give no usable camera: {error}") from error
@@ -139,19 +159,12 @@ def check_plausible(solved: cv.Solved, size: tuple[int, int], board: Board, setu
             f"of view, expected {NARROWEST_VIEW_DEG:g} to {WIDEST_VIEW_DEG:g}. Tilt the board more, to all sides"
         )
     distance = float(np.median(np.linalg.norm(solved.translations, axis=1)))
-    measured = setup.camera_height_mm
-    square = f"--square-mm {board.square_mm:g}"
-    if measured is not None:
-        if abs(distance / measured - 1) > 3 * HEIGHT_SLACK:
-            raise CalibrationFailed(
-                f"focal length and distance are implausible together: {focal:.0f} px puts the camera {distance:.0f} mm "
-                f"from the boards, --camera-height-mm says {measured:.0f}. Check {square}: measure ten squares"
-            )
-    elif not NEAREST_MM <= distance <= FARTHEST_MM:
+    # A height by tape tells more than these bounds: the verdict compares it.
+    if setup.camera_height_mm is None and not NEAREST_MM <= distance <= FARTHEST_MM:
         raise CalibrationFailed(
             f"focal length and square size are implausible together: {focal:.0f} px puts the camera {distance:.0f} mm "
-            f"from the boards, expected {NEAREST_MM:g} to {FARTHEST_MM:g}. Check {square} (ten times too large or "
-            "small?), or give the measured --camera-height-mm if it is right"
+            f"from the boards, expected {NEAREST_MM:g} to {FARTHEST_MM:g}. Check --square-mm {board.square_mm:g} (ten "
+            "times too large or small?), or give the measured --camera-height-mm if it is right"
         )
     _check_block(solved, setup)
 

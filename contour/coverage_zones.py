@@ -23,6 +23,15 @@ class Zones:
     hull_px: Floats
     covered_share: float
 
+    @property
+    def told(self) -> str:
+        """How much of the picture the corners enclose, and between which columns and rows."""
+        (left, top), (right, bottom) = self.hull_px.min(axis=0), self.hull_px.max(axis=0)
+        return (
+            f"{100 * self.covered_share:.0f} % of the picture, within x {left:.0f} to {right:.0f} and y {top:.0f} to "
+            f"{bottom:.0f} px"
+        )
+
     def inside(self, points_px: Floats) -> NDArray[np.bool_]:
         """True for each pixel within the hull of all corners."""
         return inside_ring(self.hull_px, points_px)

@@ -38,6 +38,18 @@ def scan_rows(mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int) -> ND
 
     `mask` is the binarised picture, shape (H, W), 0 = black. Raises ParameterError.
     """
+    y, left, right = scan_pairs(mask, max_gap_px, min_width_px)[0].T
+    x, y = np.concatenate([left, right[::-1]]), np.concatenate([y, y[::-1]])
+    return np.column_stack([x, y]).astype(np.float64)
+
+
+def scan_pairs(
+    mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The pair of each row that has one, and the pairs dropped as noise on the way to it: (y, left, right), (N, 3).
+
+    Behind its pair a row is not looked at. Raises ParameterError.
+    """
     for name, value in (("max_gap_px", max_gap_px), ("min_width_px", min_width_px)):
         if value < 0:
             raise ParameterError(f"{name} is {value}: expected 0 or more.")
@@ -45,7 +57,7 @@ def scan_rows(mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int) -> ND
     # Runs of white end where the pixel's neighbour differs: far fewer places to look at than white pixels.
     white = np.flatnonzero(mask != 0)
     if len(white) == 0:
-        return np.zeros((0, 2))
+        return np.zeros((0, 3), np.intp), np.zeros((0, 3), np.intp)
     begins = np.empty(len(white), np.bool_)
     np.greater(white[1:] - white[:-1], max_gap_px + 1, out=begins[1:])
     # The first white pixel of each row that has one begins a run, however near the row above ended.
@@ -54,12 +66,14 @@ def scan_rows(mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int) -> ND
     starts = np.flatnonzero(begins)
     left = white[starts]
     right = white[np.append(starts[1:], len(white)) - 1]
-    wide = right - left >= min_width_px
-    left, right = left[wide], right[wide]
-    rows, first = np.unique(left // width, return_index=True)
-    left, right = left[first] % width, right[first] % width
-    x, y = np.concatenate([left, right[::-1]]), np.concatenate([rows, rows[::-1]])
-    return np.column_stack([x, y]).astype(np.float64)
+    pairs = np.column_stack([left // width, left % width, right % width])
+    wide = np.flatnonzero(right - left >= min_width_px)
+    rows, first = np.unique(pairs[wide, 0], return_index=True)
+    kept = wide[first]
+    kept_at = np.full(height, len(pairs))
+    kept_at[rows] = kept
+    noise = np.arange(len(pairs)) < kept_at[pairs[:, 0]]
+    return pairs[kept], pairs[noise]
 
 
 def direct_scan_ring(mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int) -> NDArray[np.float64]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contour._cv_boards import inside_ring
 from contour.errors import CalibrationError
 
 Floats = NDArray[np.float64]
@@ -17,7 +18,8 @@ class PositionUncertainty:
     """A map over the picture at several heights: the distance from the truth that 95 % of such maps keep below.
 
     `map_mm` has shape (heights, rows, columns), its corners are the picture's corner pixels; `heights_mm` rise.
-    `figures_mm` holds one figure a height, for the part of the picture where the calibration's points lay.
+    `figures_mm` holds one figure a height, for the part of the picture where the calibration's points lay:
+    `covered_px`, a ring of pixels, shape (N, 2); None where nobody said, and then nothing is refused for it.
     """
 
     image_width: int
@@ -25,6 +27,7 @@ class PositionUncertainty:
     heights_mm: Floats
     figures_mm: Floats
     map_mm: Floats
+    covered_px: Floats | None = None
 
     def __post_init__(self) -> None:
         for name in ("heights_mm", "figures_mm", "map_mm"):
@@ -41,8 +44,27 @@ class PositionUncertainty:
                 f"uncertainty: {self.figures_mm.size} figures and a map of shape {shape} for {len(heights)} heights, "
                 "expected one figure a height, and a map of at least 2 x 2 places for each. Calibrate again."
             )
+        self._check_covered()
         if min(self.map_mm.min(), self.figures_mm.min()) < 0:
             raise CalibrationError("uncertainty: a figure is negative, expected 0 mm or more. Calibrate again.")
+
+    def _check_covered(self) -> None:
+        if self.covered_px is None:
+            return
+        ring = np.array(self.covered_px, dtype=np.float64)
+        if ring.ndim != 2 or ring.shape[1:] != (2,) or len(ring) < 3 or not np.isfinite(ring).all():
+            raise CalibrationError(
+                f"uncertainty: covered_px has shape {ring.shape}, expected three or more finite points. Calibrate "
+                "again."
+            )
+        ring.flags.writeable = False
+        object.__setattr__(self, "covered_px", ring)
+
+    def uncovered(self, points_px: Floats) -> Floats:
+        """The pixels that lie outside the covered part, shape (M, 2): none where it is not stated."""
+        if self.covered_px is None:
+            return np.empty((0, 2))
+        return np.asarray(points_px[~inside_ring(self.covered_px, points_px)])
 
     @classmethod
     def everywhere(cls, image_width: int, image_height: int, bound_mm: float) -> PositionUncertainty:

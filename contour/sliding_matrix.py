@@ -23,14 +23,16 @@ CORE_PITCHES = 0.4
 STEP_CORES = 1.0
 """Half the advised limit: at 2 windows miss walls between them and leave holes, below 1 the outline grows fat."""
 
-PAPER_THRESHOLD = 64.0
+WIDEST_STEP_CORES = 2
+"""As the paper advises: further apart, windows leave strips between them."""
+
 WALL_SHARES = 0.5
-"""A window half of which lies on the block is filled. Walls under an eighth of a pitch never reach 64 of 255."""
+"""A window half of which lies on the block is filled. The text names no number, and none suits thin walls and thick."""
 
 
-def default_core_px(cells: Cells) -> int:
+def default_core_px(pitch_px: float) -> int:
     """`core` for a cell pitch, px."""
-    return max(math.ceil(CORE_PITCHES * cells.pitch_px), 1)
+    return max(math.ceil(CORE_PITCHES * pitch_px), 1)
 
 
 def default_step_px(core_px: int) -> int:
@@ -38,9 +40,20 @@ def default_step_px(core_px: int) -> int:
     return max(round(STEP_CORES * core_px), 1)
 
 
-def default_threshold(cells: Cells | None) -> float:
-    """The paper's 64, or for thin walls half of what a window deep inside the block sees."""
-    return min(PAPER_THRESHOLD, 255 * cells.wall_share * WALL_SHARES) if cells else PAPER_THRESHOLD
+def default_threshold(cells: Cells) -> float:
+    """Half of what a window deep inside the block sees, 0 to 255."""
+    return 255 * cells.wall_share * WALL_SHARES
+
+
+def coarse_step(core_px: int, step_px: int) -> str | None:
+    """What a step above twice the core does, for people; None up to there."""
+    widest = WIDEST_STEP_CORES * core_px
+    if step_px <= widest:
+        return None
+    return (
+        f"step_px is {step_px}, expected up to {widest}, twice core_px: between windows lie strips that none fills, "
+        "and the contour may come in pieces. Lower step_px"
+    )
 
 
 def fill_windows(mask: NDArray[np.uint8], core_px: int, step_px: int, threshold: float) -> NDArray[np.uint8]:

@@ -193,12 +193,11 @@ def _direct_scan(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
 def _sliding_matrix(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
     core, step, threshold = settings.core_px, settings.step_px, settings.threshold
     if core is None:
-        core = sliding_matrix.default_core_px(_cells(walls, "core_px"))
+        core = sliding_matrix.default_core_px(_cells(walls, "core_px").pitch_px)
     if step is None:
         step = sliding_matrix.default_step_px(core)
     if threshold is None:
-        by_hand = settings.core_px is not None
-        threshold = sliding_matrix.PAPER_THRESHOLD if by_hand else sliding_matrix.default_threshold(walls.cells)
+        threshold = sliding_matrix.default_threshold(_cells(walls, "threshold"))
     filled = sliding_matrix.fill_windows(walls.mask, core, step, threshold)
     smallest_hole_px2 = walls.cells.cell_px2 if walls.cells else float((2 * core) ** 2)
     return sliding_matrix.sliding_matrix_contour(filled, smallest_hole_px2)

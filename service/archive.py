@@ -1,8 +1,9 @@
 """The archive: files of each job's evidence in a folder, bounded by bytes and by free space, oldest first.
 
 A file is written under another name, made durable and renamed, the job's document last: without it, what lies there is
-of a job whose writing was cut short, and is swept at the start. Names begin with the job's number, so that numbers go
-on above them where the journal is lost (`service.journal_recovery`).
+of a job whose writing was cut short, and is swept at the start. Of a job that has not ended there is a draft instead,
+with the frame as plain bytes: they stay over a restart, until the job has ended. Names begin with the job's number, so
+that numbers go on above them where the journal is lost (`service.journal_recovery`).
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from service.reasons import Outcome
 
 JOBS_A_FOLDER = 1000
 DOCUMENT = re.compile(r"(\d{1,10})-(accepted|written|refused|failed)\.json")
-OURS = re.compile(r"\.?(\d{1,10})-[a-z]+\.(?:json|png|jpg|dxf|svg|geojson|ngc)(?:\.new)?")
+DRAFT, PLAIN_FRAME = "draft.json", "frame.raw"
+OURS = re.compile(r"\.?(\d{1,10})-[a-z]+\.(?:json|raw|png|jpg|dxf|svg|geojson|ngc)(?:\.new)?")
 FOLDER = re.compile(r"\d{7}xxx")
 TABLES = "tables"
 BLOCK = 4096  # what a file takes of most disks is a multiple of it
@@ -51,18 +53,24 @@ class Archive:
         self.limits = limits
         self._good: OrderedDict[int, int] = OrderedDict()  # job: bytes, oldest first
         self._bad: OrderedDict[int, int] = OrderedDict()
+        self._unended: dict[int, int] = {}  # never let go for room: they are few, and their time is near
         self._good_bytes = self._bad_bytes = self._table_bytes = 0
         self.swept = 0
 
     @property
     def kept_bytes(self) -> int:
         """Bytes kept, each file rounded up to whole blocks."""
-        return self._good_bytes + self._bad_bytes + self._table_bytes
+        return self._good_bytes + self._bad_bytes + self._table_bytes + sum(self._unended.values())
 
     @property
     def jobs(self) -> int:
-        """Jobs kept."""
+        """Ended jobs kept."""
         return len(self._good) + len(self._bad)
+
+    @property
+    def drafts(self) -> list[int]:
+        """Jobs kept that have not ended, as far as the archive knows."""
+        return sorted(self._unended)
 
     def open(self) -> None:
         """Make the folder, sweep what was cut short, and count what is there; raise ArchiveError."""
@@ -77,7 +85,7 @@ class Archive:
             raise _cannot(self.path, error) from error
 
     def _found(self) -> Iterator[tuple[int, bool, int]]:
-        """Job, whether accepted or written, bytes; what has no document is deleted."""
+        """Ended jobs, whether accepted or written, bytes; drafts are counted, what has no document is deleted."""
         for folder in _folders(self.path):
             groups: dict[int, list[os.DirEntry[str]]] = {}
             with os.scandir(folder) as entries:
@@ -92,11 +100,14 @@ class Archive:
                         groups.setdefault(int(name[1]), []).append(entry)
             for job_id, files in groups.items():
                 outcomes = [found[2] for file in files if (found := DOCUMENT.fullmatch(file.name))]
+                unended = [file for file in files if file.name in (f"{job_id}-{DRAFT}", f"{job_id}-{PLAIN_FRAME}")]
                 if outcomes:
-                    size = sum(_on_disk(file.stat(follow_symlinks=False).st_size) for file in files)
+                    size = sum(_size(file) for file in files if file not in unended)
                     yield job_id, outcomes[-1] in GOOD, size
+                elif any(file.name == f"{job_id}-{DRAFT}" for file in unended):
+                    self._unended[job_id] = sum(_size(file) for file in files)
                     continue
-                for file in files:
+                for file in unended if outcomes else files:
                     Path(file.path).unlink()
                     self.swept += 1
 
@@ -110,25 +121,68 @@ class Archive:
 
     # --- writing ------------------------------------------------------------------------------------------------
 
+    def has(self, job_id: int, suffix: str) -> bool:
+        """True where DRAFT or PLAIN_FRAME of a job that has not ended is kept."""
+        return job_id in self._unended and (self.folder_of(job_id) / f"{job_id}-{suffix}").is_file()
+
+    def put(self, job_id: int, suffix: str, data: bytes) -> None:
+        """Keep DRAFT or PLAIN_FRAME, durable, of a job that has not ended; raise as `store`, and leave nothing then."""
+        if job_id in self._good or job_id in self._bad:
+            return  # it came late
+        self._write_all(job_id, {suffix: data})
+        self._unended[job_id] = self._unended.get(job_id, 0) + _on_disk(len(data))
+
     def store(self, job_id: int, outcome: Outcome, files: Mapping[str, bytes], document: bytes) -> None:
-        """Keep a job's files and, last, its document; raise ArchiveFull, ArchiveError, and leave nothing then."""
-        size = sum(_on_disk(len(data)) for data in (*files.values(), document))
+        """Keep a job's files and, last, its document, in the place of its draft; raise ArchiveFull, ArchiveError, and
+        leave nothing then.
+        """
+        written = {**files, f"{outcome}.json": document}
+        size = sum(_on_disk(len(data)) for data in written.values())
+        if job_id in self._unended and not self._has_room(size):
+            self.forget(job_id)  # all of it is in memory still
+        self._write_all(job_id, written)
+        self._count(job_id, outcome in GOOD, size)
+        if job_id not in self._unended:
+            return
+        try:
+            for suffix in (DRAFT, PLAIN_FRAME):
+                (self.folder_of(job_id) / f"{job_id}-{suffix}").unlink(missing_ok=True)
+        except OSError as error:
+            raise _cannot(self.folder_of(job_id), error) from error
+        del self._unended[job_id]
+
+    def _has_room(self, size: int) -> bool:
+        try:
+            self._make_room(size)
+        except (ArchiveFull, OSError):
+            return False
+        return True
+
+    def _write_all(self, job_id: int, files: Mapping[str, bytes]) -> None:
         folder = self.folder_of(job_id)
         try:
             self._drop(job_id)
-            self._make_room(size)
-            folder.mkdir(exist_ok=True, mode=0o750)
-            try:
-                for suffix, data in files.items():
-                    _write(folder / f"{job_id}-{suffix}", data)
-                _write(folder / f"{job_id}-{outcome}.json", document)
-                _sync_folder(folder)
-            except OSError:
-                self._delete_files(job_id)
-                raise
+            self._make_room(sum(_on_disk(len(data)) for data in files.values()))
+            if not folder.exists():
+                folder.mkdir(mode=0o750)
+                _sync_folder(self.path)
+            for suffix, data in files.items():
+                _write(folder / f"{job_id}-{suffix}", data)
+            _sync_folder(folder)
         except OSError as error:
+            self.forget(job_id)
             raise _cannot(folder, error) from error
-        self._count(job_id, outcome in GOOD, size)
+        except ArchiveFull:
+            self.forget(job_id)
+            raise
+
+    def forget(self, job_id: int) -> None:
+        """Delete what is kept of a job that has not ended; raise ArchiveError."""
+        try:
+            self._delete_files(job_id)
+        except OSError as error:
+            raise _cannot(self.folder_of(job_id), error) from error
+        self._unended.pop(job_id, None)
 
     def store_table(self, digest: str, make: Callable[[], bytes]) -> str:
         """Keep a taught table once for all jobs that used it; its place in the archive. Raise ArchiveError."""
@@ -265,6 +319,10 @@ def _folders(archive: Path) -> Iterator[Path]:
 def _files_of(folder: Path, job_id: int, *, also_unfinished: bool = False) -> list[Path]:
     patterns = [f"{job_id}-*", *([f".{job_id}-*"] if also_unfinished else [])]
     return [path for pattern in patterns for path in folder.glob(pattern) if OURS.fullmatch(path.name)]
+
+
+def _size(file: os.DirEntry[str]) -> int:
+    return _on_disk(file.stat(follow_symlinks=False).st_size)
 
 
 def _on_disk(size: int) -> int:

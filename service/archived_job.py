@@ -15,17 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from contour.error_budget import ErrorBudget
 from contour.geometry import Contour
+from contour.quality import Quality
+from drivers.camera import Frame
 from drivers.controller.mailbox import Page
-from service.archive import TABLES, document_of
+from service.archive import DRAFT, PLAIN_FRAME, TABLES, document_of, folder_of
 from service.calibration_file import CalibrationFileError, record_of
 from service.calibration_guard import CalibrationGuard, GuardLimits
 from service.config import Recipe
 from service.config_mistakes import describe
-from service.evidence import FRAME, VERSION
+from service.evidence import FRAME, VERSION, Evidence
 from service.job_pages import Envelope
-from service.journal import pages_from_text
-from service.measure import Measurer
+from service.journal import Job, pages_from_text
+from service.measure import Measurement, Measurer
+from service.reasons import Reason
 from service.table_file import TableFileError, TableRecord, load_table
 
 LARGEST_DOCUMENT = 200_000_000
@@ -139,6 +143,67 @@ def load_archived(archive: Path, job_id: int) -> ArchivedJob:
         raise EvidenceError(
             f"{archive}: holds nothing of job {job_id}. It was let go, or was never kept: see archive.max_bytes"
         )
+    return _loaded(path, job_id)
+
+
+def load_draft(archive: Path, job_id: int) -> ArchivedJob:
+    """What was kept of a job before it had ended; raise EvidenceError."""
+    return _loaded(folder_of(archive, job_id) / f"{job_id}-{DRAFT}", job_id)
+
+
+def drafted_evidence(draft: ArchivedJob, job: Job) -> Evidence:
+    """A job's evidence as it was in memory before the restart, read back from its draft; raise EvidenceError."""
+    document = draft.document
+    try:
+        settings = document["recipe"]
+        return Evidence(
+            job,
+            None,
+            None if settings is None else Recipe.model_validate(settings),
+            document["thickness_mm"],
+            _plain_frame(draft),
+            _measurement(draft),
+            draft.envelope,
+            draft.pages,
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise EvidenceError(f"{draft.path}: is no draft that can be completed: {error}") from error
+
+
+def _plain_frame(draft: ArchivedJob) -> Frame:
+    known = draft.document["frame"]
+    path = draft.path.with_name(f"{draft.job_id}-{PLAIN_FRAME}")
+    try:
+        pixels = np.frombuffer(path.read_bytes(), np.uint8).reshape(known["shape"])
+    except OSError as error:
+        raise EvidenceError(f"{path}: cannot be read: {error.strerror}") from error
+    if _sha256(pixels) != known["sha256"]:
+        raise EvidenceError(f"{path}: is not the frame that was kept")
+    return Frame(pixels, 0.0, known["simulated"], known["source"], known["sequence"], known["camera"])
+
+
+def _measurement(draft: ArchivedJob) -> Measurement:
+    known = draft.document["measurement"]
+    quality, uncertainty = known["quality"], known["uncertainty"]
+    return Measurement(
+        method=known["method"],
+        polarity=known["polarity"],
+        pitch_px=known["pitch_px"],
+        pixels=draft.contour("pixels"),
+        millimetres=draft.contour("millimetres"),
+        area_px2=known["area_px2"],
+        area_mm2=known["area_mm2"],
+        uncertainty_px=known["uncertainty_px"],
+        uncertainty=None if uncertainty is None else ErrorBudget(**uncertainty),
+        thickness_mm=known["thickness_mm"],
+        aligned=known["aligned"],
+        quality=None if quality is None else Quality(**quality),
+        findings=tuple((Reason(entry["code"]), entry["text"]) for entry in known["reasons"]),
+        timings_ms=known["timings_ms"],
+    )
+
+
+def _loaded(path: Path, job_id: int) -> ArchivedJob:
     try:
         if path.stat().st_size > LARGEST_DOCUMENT:
             raise EvidenceError(f"{path}: {path.stat().st_size} bytes, expected {LARGEST_DOCUMENT} at most")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
@@ -65,10 +66,14 @@ class UncertaintyPlane(_Model):
 
 
 class UncertaintyEntry(_Model):
-    """How sure positions are, 95 %: one figure for everywhere, or maps, plane by plane from the lowest."""
+    """How sure positions are, 95 %: one figure for everywhere, or maps, plane by plane from the lowest.
+
+    A contour that leaves the ring `covered_px` is refused; without it none is for that.
+    """
 
     plane_mm: Annotated[Number, Field(ge=0)] | None = None
     planes: tuple[UncertaintyPlane, ...] = ()
+    covered_px: Annotated[tuple[tuple[Number, Number], ...], Field(min_length=3)] | None = None
 
     @model_validator(mode="after")
     def _alike(self) -> UncertaintyEntry:
@@ -188,14 +193,17 @@ def _uncertainty(file: AnyFile) -> PositionUncertainty | None:
     if file.uncertainty is None:
         return None
     planes = file.uncertainty.planes
+    covered = None if file.uncertainty.covered_px is None else np.array(file.uncertainty.covered_px)
     if file.uncertainty.plane_mm is not None:
-        return PositionUncertainty.everywhere(file.image_width, file.image_height, file.uncertainty.plane_mm)
+        everywhere = PositionUncertainty.everywhere(file.image_width, file.image_height, file.uncertainty.plane_mm)
+        return replace(everywhere, covered_px=covered)
     return PositionUncertainty(
         file.image_width,
         file.image_height,
         np.array([plane.height_mm for plane in planes]),
         np.array([plane.figure_mm for plane in planes]),
         np.stack([plane.map.array() for plane in planes]),
+        covered,
     )
 
 
@@ -267,12 +275,14 @@ def _matrix_data(matrix: Array) -> dict[str, Any]:
 
 
 def _uncertainty_data(sure: PositionUncertainty) -> dict[str, Any]:
+    covered = {} if sure.covered_px is None else {"covered_px": sure.covered_px.round(1).tolist()}
     if sure.map_mm.shape[0] == 1 and (sure.map_mm == sure.figures_mm[0]).all():
-        return {"plane_mm": float(sure.figures_mm[0])}
+        return {"plane_mm": float(sure.figures_mm[0]), **covered}
     planes = zip(sure.heights_mm, sure.figures_mm, sure.map_mm, strict=True)
     return {
         "planes": [
             {"height_mm": float(height), "figure_mm": round(float(figure), 5), "map": _matrix_data(plane.round(5))}
             for height, figure, plane in planes
-        ]
+        ],
+        **covered,
     }

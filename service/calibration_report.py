@@ -52,6 +52,7 @@ def write_report(
     verdict = result.verdict
     sections = [
         f'<p class="verdict {"good" if verdict.good else "bad"}">{html.escape(verdict.sentence)}</p>',
+        *(f'<p class="verdict bad">{html.escape(text)}</p>' for text in _warnings(result, setup)),
         "<h2>The numbers</h2>",
         _table(_numbers(result, board, setup, sentinels)),
         "<h2>Pictures</h2>",
@@ -70,6 +71,11 @@ def write_report(
         f"<style>{STYLE}</style></head><body>{HATCH}<h1>{title}</h1>{''.join(sections)}</body></html>\n"
     )
     path.write_text(text, encoding="utf-8")
+
+
+def _warnings(result: CameraResult, setup: Setup) -> list[str]:
+    told = [check.warning(setup.accept_apart) for check in result.lengths]
+    return [text for text in told if text is not None]
 
 
 def _numbers(result: CameraResult, board: Board, setup: Setup, sentinels: Sentinels | None) -> list[tuple[str, str]]:
@@ -95,12 +101,18 @@ def _numbers(result: CameraResult, board: Board, setup: Setup, sentinels: Sentin
         ("board", f"{board.kind}, {board.name_of_size} squares of {board.square_mm:g} mm"),
         ("board's pattern above the table", f"{setup.board_thickness_mm:g} mm"),
         ("views", f"{len(result.views)} used, turned against each other by up to {result.turn_deg:.0f}°"),
-        ("corners enclose", f"{100 * verdict.zones.covered_share:.0f} % of the picture"),
+        ("corners enclose", verdict.zones.told),
+        (
+            "contours outside of what corners enclose",
+            "are taken, too" if sure.covered_px is None else "are refused (115 outside_work_area)",
+        ),
         ("lens model", result.model.name),
         ("focal length", f"{matrix[0, 0]:.2f}, {matrix[1, 1]:.2f} px"),
         ("principal point", f"{matrix[0, 2]:.2f}, {matrix[1, 2]:.2f} px"),
         ("distortion", lens),
         ("camera stands at", f"x {x:.1f}, y {y:.1f}, z {z:.1f} mm in the work frame"),
+        *(("measured by hand", str(check)) for check in result.lengths),
+        *([] if result.lengths else [("measured by hand", "nothing: sizes are taken as they were told")]),
         ("fixed marks", ", ".join(str(mark.id) for mark in sentinels.marks) if sentinels else "none"),
     ]
     return rows

@@ -135,8 +135,18 @@ class ModbusController(Model):
     )
     contour_address: Register = Field(32, description="First register of header and payload (PDU address).")
     payload_capacity: int = Field(1984, ge=8, le=REGISTERS, description="Registers of payload, an even number.")
-    longest_write: int = Field(123, ge=32, le=123, description="Most registers in one write, the standard's 123.")
-    longest_read: int = Field(125, ge=32, le=125, description="Most registers in one read, the standard's 125.")
+    longest_write: int = Field(
+        123,
+        ge=16,
+        le=123,
+        description="Most registers in one write; blocks of 16 go whole, the standard's most is 123.",
+    )
+    longest_read: int = Field(
+        125, ge=16, le=125, description="Most registers in one read; blocks of 16 go whole, the standard's most is 125."
+    )
+    single_write: Literal["fc6", "fc16"] = Field(
+        "fc6", description="How `transfer` is written; fc16 (of one register): for a controller without FC6."
+    )
     timeout_s: Seconds = Field(1.0, description="Longest wait for the reply to one request, s.")
     poll_period_s: float = Field(0.05, ge=0.001, le=0.5, description="Period of looking at the controller's block, s.")
     heartbeat_timeout_s: float = Field(
@@ -182,6 +192,9 @@ class ModbusTcp(ModbusController):
     """A controller over Modbus TCP."""
 
     kind: Literal["modbus-tcp"]
+    device_id: int = Field(
+        1, ge=0, le=255, description="Modbus device id (unit); 0 and 255: the device itself, behind no gateway."
+    )
     host: Host = Field("127.0.0.1", description="Host name or address of the controller.")
     port: Port = Field(502, description="TCP port.")
 

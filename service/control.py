@@ -19,6 +19,8 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mappin
 from pathlib import Path
 from typing import Any
 
+from service.whole_file import REFUSALS
+
 log = logging.getLogger("combtrace.control")
 
 SOCKET_NAME = "control.sock"
@@ -26,6 +28,7 @@ MODE = 0o660
 LONGEST_LINE = 4096
 LONGEST_REASON = 200
 IDLE_S = 10.0
+RETRY_S = 1.0
 MOST_CLIENTS = 16
 MOST_STREAMS = 8  # of them, those that wait for the end of a job: a halt has to find a place
 PEER_CREDENTIALS = struct.Struct("3i")  # process, user, group: unix(7), SO_PEERCRED
@@ -59,7 +62,19 @@ class ControlServer:
         self._clients: set[asyncio.Task[Any]] = set()
 
     async def run(self) -> None:
-        """Serve for ever."""
+        """Serve for ever, from when the disk lets the socket be made."""
+        told = False
+        while True:
+            try:
+                await self._run()
+            except OSError as error:
+                if error.errno not in REFUSALS:
+                    raise
+                log.log(logging.DEBUG if told else logging.WARNING, "no control socket, tried again: %s", error)
+                told = True
+            await asyncio.sleep(RETRY_S)
+
+    async def _run(self) -> None:
         with _bound(self._folder) as listener:
             server = await asyncio.start_unix_server(self._serve, sock=listener, limit=LONGEST_LINE)
             try:

@@ -5,34 +5,35 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import Executor as ThreadPool
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import Any, ParamSpec, TypeVar
 
 from contour.errors import ParameterError, PictureError
 from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
 from drivers.controller import ControllerError
-from drivers.controller.mailbox import ContourTooLarge, MailboxError, Page, crc32_of, withdrawal
+from drivers.controller.mailbox import ContourTooLarge, MailboxError, Page, crc32_of, decode_header, withdrawal
 from service.config import Recipe
-from service.evidence import Evidence
+from service.controller_clock import Stamp
+from service.evidence import Evidence, Keeper, KeepsNothing
 from service.health import Fault, Health, journal_fault
 from service.job_pages import Envelope, contour_pages
 from service.journal import Job, Journal, JournalError, Terms
-from service.link import Link, Stamp
+from service.link import Link
 from service.measure import Measurement, Measurer
 from service.reasons import Outcome, Reason
-from service.transfer import Settlement, Transfer, TransferCounter, TransferSettings
+from service.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
 
 log = logging.getLogger("combtrace.cycle")
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-STAMP_WAIT_S = 1.5  # a lost connection is back within that
+STAMP_WAIT_S = 3.0  # a lost connection is back within that, and a clock has held over two heartbeats
+EVIDENCE_WAIT_S = 2.0  # a slow disk has written a frame by then; one that hangs must not hold contours up
 JOURNAL_PAUSE_S = 1.0
-NO_LIMIT = (0, 0)
-VALID_FOR = slice(27, 29)  # in a page's header, which begins with offset 1
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class CycleSettings:
     """Bounds of one job. valid_for_s 0 = no limit by the controller's clock; job_timeout_s bounds it then.
 
     observe: the pages are made and not sent.
+    target: which controller it is and how it is laid out, by configuration key: a job in flight is settled there only.
     """
 
     default_recipe: int = 1
@@ -57,6 +59,7 @@ class CycleSettings:
     observe: bool = False
     mailbox: MailboxFormat = field(default_factory=MailboxFormat)
     transfer: TransferSettings = field(default_factory=TransferSettings)
+    target: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def lifetime_s(self) -> float:
@@ -98,6 +101,19 @@ class _Course:
     transfer: dict[str, Any] = field(default_factory=dict)
     terms: Terms | None = None
 
+    def evidence(self, job: Job) -> Evidence:
+        """What it leaves behind."""
+        return Evidence(
+            job,
+            self.plan.measurer,
+            self.recipe,
+            self.thickness_mm,
+            self.frame,
+            self.measurement,
+            self.envelope,
+            self.pages,
+        )
+
 
 class _Stop(Exception):
     """The job ends here, before anything was sent."""
@@ -123,11 +139,11 @@ class Cycle:
         pool: ThreadPool,
         *,
         observe: Callable[[Observation], None] = lambda _observation: None,
-        keep: Callable[[Evidence], None] = lambda _evidence: None,
+        keeper: Keeper | None = None,
         beat: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """keep: is handed what an ended job leaves behind; called in the loop, so it must not block."""
+        """keeper: is handed what a job leaves behind; None = nothing is kept."""
         self._camera = camera
         self._plan = Plan(measurer, recipes, settings.default_recipe)
         self._journal = journal
@@ -137,7 +153,7 @@ class Cycle:
         self._settings = settings
         self._pool = pool
         self._observe = observe
-        self._keep = keep
+        self._keeper = KeepsNothing() if keeper is None else keeper
         self._beat = beat
         self._now = now
 
@@ -164,49 +180,52 @@ class Cycle:
         except _Stop as stop:
             settlement = stop.settlement
         except asyncio.CancelledError:
-            self._abort(job)
+            self._abort(course)
             raise
         except Exception as error:  # the one owner of defects: a job that was taken always ends
             log.exception("job %d: internal error", job.job_id)
             settlement = await self._end_defect(job, error)
         self._health.report("in-flight", None)  # the controller has decided, however long it took
         course.report["total_ms"] = self._since(started)
-        settled = await self._settle(job, settlement, course)
-        self._keep(
-            Evidence(
-                settled,
-                course.plan.measurer,
-                course.recipe,
-                course.thickness_mm,
-                course.frame,
-                course.measurement,
-                course.envelope,
-                course.pages,
-            )
-        )
-        return settled
+        return await self._settle(job, settlement, course)
 
     async def resume(self, job: Job) -> Job:
         """A job that a restart found in flight, settled: sent again bit-identical, or withdrawn (154)."""
+        course = _Course(job, self._plan, job.report, transfer=job.transfer)  # what is known of it stays its own
         handshake = self._settings.transfer.handshake
         if not job.sent or self._link is None or not handshake:
             detail = "nothing of it was sent" if not job.sent else "whether it was taken cannot be known"
-            return await self._settle(
-                job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), _Course(job, self._plan)
-            )
+            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), course)
         assert job.session is not None
-        expires_at_s = self._now() + self._settings.lifetime_s
-        transfer = self._transfer(self._link, job, job.session, job.pages, expires_at_s, sent=True)
+        validity = self._validity(job.pages)
+        lasts_s = validity.valid_for / 1000 or self._settings.lifetime_s
+        lifetime = Lifetime(self._now() + lasts_s, job.taken_at_s, lasts_s, self._now)
+        transfer = self._transfer(self._link, job, job.session, job.pages, lifetime)
         if job.withdraw_reason is not None:
-            settlement = await transfer.withdraw(job.withdraw_reason, "a withdrawal that the restart cut short")
+            detail = "a withdrawal that the restart cut short" if job.pages else "whether it was sent is not known"
+            settlement = await transfer.withdraw(job.withdraw_reason, detail)
         elif not job.pages:
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, "its pages cannot be read in the journal")
-        elif job.pages[0].header[VALID_FOR] == NO_LIMIT:
+        elif not validity.valid_for:
             detail = "how old the contour is cannot be known after a restart, and the controller would not look"
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
         else:
             settlement = await transfer.run()
-        return await self._settle(job, settlement, _Course(job, self._plan))
+        return await self._settle(job, settlement, course)
+
+    def hindrance(self, job: Job) -> str | None:
+        """Why a job found in flight cannot be settled as the service is configured now; None where it can."""
+        if not job.sent:
+            return None
+        target = self._settings.target
+        text = "it is in flight at a controller that the configuration does not name as it was. Put back "
+        if job.target and job.target != dict(target):
+            keys = [key for key in {**job.target, **target} if job.target.get(key) != target.get(key)]
+            was = ", ".join(f"controller.{key}: {job.target[key]}" for key in keys if key in job.target)
+            return f"{text}{was}, and start again; once the job has ended, it may be changed"
+        if self._link is None or self._settings.observe:
+            return f"{text}the controller with mode: send, and start again; once the job has ended, it may be changed"
+        return None
 
     # --- the steps ----------------------------------------------------------------------------------------------
 
@@ -232,13 +251,35 @@ class Cycle:
         course.report["pages_ms"] = self._since(before)
         if self._settings.observe:
             return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
-        expires_at_s = stamped_at + self._settings.lifetime_s
-        transfer = self._transfer(self._link, job, stamp.session, pages, expires_at_s, terms=course.terms)
+        lasts_s = self._settings.lifetime_s
+        lifetime = Lifetime(stamped_at + lasts_s, job.taken_at_s, lasts_s, self._now)
+        return await self._send(self._link, course, stamp, lifetime)
+
+    async def _send(self, link: Link, course: _Course, stamp: Stamp, lifetime: Lifetime) -> Settlement:
+        """Bring the pages to the controller, all that is known of the job being durable before anything is sent."""
+        job, pages, target = course.job, course.pages, self._settings.target
+        course.transfer = _figures(stamp, pages)
+        drafted = self._keeper.draft(course.evidence(job))
+
+        async def before_sending() -> None:
+            await self._drafted(job, drafted)  # first: with its pages in the journal a restart would send it
+            known = course.terms, course.report, course.transfer
+            await self._durably(self._journal.store_pages, job.job_id, stamp.session, pages, *known, target=target)
+
+        transfer = self._transfer(link, job, stamp.session, pages, lifetime, before_sending=before_sending)
         before = self._now()
         settlement = await transfer.run()
         course.report["transfer_ms"] = self._since(before)
-        course.transfer = _figures(stamp, pages)
         return settlement
+
+    async def _drafted(self, job: Job, drafted: Future[None] | None) -> None:
+        """Return once its evidence is durable, or cannot be: a contour does not wait for a disk that hangs."""
+        self._beat()
+        if drafted is not None:
+            _, waiting = await asyncio.wait([asyncio.wrap_future(drafted)], timeout=EVIDENCE_WAIT_S)
+            if not waiting:
+                return
+            log.warning("job %d goes on without its evidence: the archive's disk is slow", job.job_id)
 
     def _since(self, started: float) -> float:
         """Milliseconds from then on, as they are told."""
@@ -345,13 +386,11 @@ class Cycle:
         job: Job,
         session: int,
         pages: tuple[Page, ...],
-        expires_at_s: float,
+        lifetime: Lifetime,
         *,
-        sent: bool = False,
-        terms: Terms | None = None,
+        before_sending: Callable[[], Awaitable[None]] | None = None,
     ) -> Transfer:
-        async def before_sending() -> None:
-            await self._durably(self._journal.store_pages, job.job_id, session, pages, terms)
+        """before_sending: None where the job was sent before."""
 
         async def before_withdrawal(reason: Reason) -> None:
             await self._durably(self._journal.store_withdrawal, job.job_id, reason)
@@ -367,19 +406,25 @@ class Cycle:
             session=session,
             pages=pages,
             withdrawal=withdrawal(job.job_id, session, self._settings.mailbox.word_order),
-            expires_at_s=expires_at_s,
-            before_sending=before_sending,
+            lifetime=lifetime,
+            validity=self._validity(pages),
+            before_sending=before_sending or _nothing,
             before_withdrawal=before_withdrawal,
             on_stuck=on_stuck,
-            sent=sent,
+            sent=before_sending is None,
             beat=self._beat,
-            now=self._now,
         )
+
+    def _validity(self, pages: tuple[Page, ...]) -> Validity:
+        if not pages:
+            return Validity()
+        header = decode_header(pages[0], self._settings.mailbox.word_order)
+        return Validity(header["captured_at"], header["valid_for"])
 
     # --- the end ------------------------------------------------------------------------------------------------
 
     async def _settle(self, job: Job, settlement: Settlement, course: _Course) -> Job:
-        return await self._durably(
+        settled = await self._durably(
             self._journal.settle,
             job.job_id,
             settlement.outcome,
@@ -389,6 +434,8 @@ class Cycle:
             course.terms,
             course.transfer,
         )
+        self._keeper.keep(course.evidence(settled))
+        return settled
 
     async def _durably(self, write: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Read or write the journal, again and again until it is done: no step goes on without it."""
@@ -407,12 +454,15 @@ class Cycle:
                 self._health.report("journal", None)
                 return result
 
-    def _abort(self, job: Job) -> None:
+    def _abort(self, course: _Course) -> None:
         """At shutdown: a job of which nothing was sent ends here, one that was sent is settled by the next start."""
+        job = course.job
         try:
             known = self._journal.find(job.job_id)
             if known is not None and known.outcome is None and not known.sent:
-                self._journal.settle(job.job_id, Outcome.FAILED, Reason.ABORTED, "the service was stopped", {})
+                end = Outcome.FAILED, Reason.ABORTED, "the service was stopped"
+                settled = self._journal.settle(job.job_id, *end, course.report, course.terms, course.transfer)
+                self._keeper.keep(course.evidence(settled))
                 log.warning("job %d failed: %d aborted", job.job_id, Reason.ABORTED)
                 return
         except JournalError as error:
@@ -427,8 +477,12 @@ class Cycle:
         if known is None or not known.sent or known.session is None or never_answered:
             return Settlement(Outcome.FAILED, Reason.INTERNAL_ERROR, detail)
         assert self._link is not None
-        transfer = self._transfer(self._link, job, known.session, known.pages, self._now(), sent=True)
+        transfer = self._transfer(self._link, job, known.session, known.pages, Lifetime(self._now()))
         return await transfer.withdraw(Reason.INTERNAL_ERROR, detail)
+
+
+async def _nothing() -> None:
+    return
 
 
 def _figures(stamp: Stamp, pages: tuple[Page, ...]) -> dict[str, Any]:

@@ -23,7 +23,8 @@ from service.executor import Executor
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link
-from service.lock import Held
+from service.lock import Held, LockError
+from service.opening import DiskRefuses, Opening
 from service.operations import CONTROL_PART, Halt, Operations
 from service.reasons import Reason
 from service.reload import Reloader
@@ -79,6 +80,8 @@ class Parts:
     metrics: Closeable | None = None
     page: Page | None = None
     state_dir: Path | None = None
+    opening: Opening | None = None  # a disk refuses writes: all that is to be done is to wait until this succeeds
+    begin_anew: bool = False  # it did: the parts have ended, to be built as they should be
 
 
 class Daemon:
@@ -89,13 +92,15 @@ class Daemon:
         self._parts = parts
         self._on_stop = on_stop
         self._stop = asyncio.Event()
+        self._asked_to_stop = False
         self.supervisor = Supervisor(parts.health, beat=parts.watchdog.beat)
         self.abandoned = False  # a call that hangs was left behind: the process must not wait for its thread
 
     def stop(self) -> None:
         """Ask for the end: no new trigger, the running job gets a bounded time."""
-        if not self._stop.is_set():
+        if not self._asked_to_stop:
             self._on_stop()
+        self._asked_to_stop = True
         self._stop.set()
 
     async def run(self, *, on_signals: Iterable[signal.Signals] = ()) -> None:
@@ -113,8 +118,9 @@ class Daemon:
         notifier.send(READY=1, STATUS=_status(self._parts.health.state, self._parts.health.reason))
         try:
             await self._stopped_or_dead(keeping)
-            notifier.send(STOPPING=1)
-            await self._let_the_job_end()
+            if self._asked_to_stop:
+                notifier.send(STOPPING=1)
+                await self._let_the_job_end()
         finally:
             await self._end(keeping)
 
@@ -193,6 +199,8 @@ class Daemon:
     async def _watch_journal(self) -> None:
         """Try the journal again after it could not be written; until then no trigger is taken."""
         parts = self._parts
+        if parts.opening is not None:
+            await self._wait_for_disk(parts.opening)
         while True:
             if parts.health.fault("journal") is not None and parts.health.job is None:
                 try:
@@ -202,6 +210,23 @@ class Daemon:
                 else:
                     parts.health.report("journal", None)
             await asyncio.sleep(until_beat(asyncio.get_running_loop().time(), JOURNAL_RETRY_S))
+
+    async def _wait_for_disk(self, opening: Opening) -> None:
+        """Try until there are locks and a journal; then have the parts end, which did without. Never returns."""
+        while not self._stop.is_set():
+            await asyncio.sleep(until_beat(asyncio.get_running_loop().time(), JOURNAL_RETRY_S))
+            try:
+                await asyncio.to_thread(opening.journal)
+            except DiskRefuses as refused:
+                fault = refused.fault
+            except (LockError, JournalError) as error:
+                fault = Fault(Reason.INTERNAL_ERROR, str(error))
+            else:
+                log.info("the disk accepts writes: beginning anew")
+                self._stop.set()
+                break
+            self._parts.health.report("journal", fault)
+        await asyncio.Event().wait()
 
     async def _watch_link(self, link: Link) -> None:
         """Let health follow the link: some faults show by silence, so looking at each reply would not find them."""
@@ -269,7 +294,9 @@ class Daemon:
     async def _end(self, keeping: asyncio.Task[None]) -> None:
         parts = self._parts
         if parts.health.state is not State.HALTED:
-            parts.health.halt("the service is being stopped")
+            parts.health.halt(
+                "the service is being stopped" if parts.opening is None else "its disk is waited for no longer"
+            )
         if parts.link is not None and parts.link.fault() is None:
             await parts.link.flush(1.0)
         keeping.cancel()
@@ -281,9 +308,12 @@ class Daemon:
         if parts.metrics is not None:
             await asyncio.to_thread(parts.metrics.close)
         if parts.archive is not None:
+            await self._freed(parts.archive.drafting, "archive's disk")
             await asyncio.to_thread(parts.archive.close)
         parts.journal.close()
-        parts.lock.release()
+        parts.begin_anew = parts.opening is not None and not self._asked_to_stop
+        if not parts.begin_anew:
+            parts.lock.release()
 
     async def _freed(self, pool: ThreadPoolExecutor, what: str) -> bool:
         """True once the pool's threads have ended; one that hangs in a call is left behind, and told."""

@@ -9,8 +9,9 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
+from concurrent.futures import Future
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -37,10 +38,13 @@ PNG_LEVEL = 1  # on photographs higher levels take four times as long for 3 % le
 
 @dataclass(frozen=True)
 class Evidence:
-    """A settled job and what it was carried out with; what it did not come to is None."""
+    """A job and what it was carried out with; what it did not come to is None.
+
+    measurer: None where all was read back, and with it the document.
+    """
 
     job: Job
-    measurer: Measurer
+    measurer: Measurer | None
     recipe: Recipe | None = None
     thickness_mm: float = 0.0
     frame: Frame | None = None
@@ -49,9 +53,33 @@ class Evidence:
     pages: tuple[Page, ...] = ()
 
 
+class Keeper(Protocol):
+    """Keeps evidence; none of the calls blocks. `service.archive_writer.ArchiveWriter` in the daemon."""
+
+    def draft(self, evidence: Evidence) -> Future[None] | None:
+        """Keep what a restart would need to end the job with all its evidence.
+
+        It is done once that is durable, or cannot be; None where nothing of it will be kept.
+        """
+
+    def keep(self, evidence: Evidence) -> None:
+        """Keep it for good: the job has ended. Of one that a restart found the draft is completed."""
+
+
+class KeepsNothing:
+    """Where there is no archive."""
+
+    def draft(self, evidence: Evidence) -> None:
+        """Nothing."""
+
+    def keep(self, evidence: Evidence) -> None:
+        """Nothing."""
+
+
 def document(evidence: Evidence, table_file: str | None) -> dict[str, Any]:
     """The job's document, JSON's types only. table_file: where in the archive the taught table is."""
     measurer, frame = evidence.measurer, evidence.frame
+    assert measurer is not None
     return {
         "version": VERSION,
         "combtrace": importlib.metadata.version("combtrace"),
@@ -70,9 +98,9 @@ def document(evidence: Evidence, table_file: str | None) -> dict[str, Any]:
     }
 
 
-def document_bytes(evidence: Evidence, table_file: str | None) -> bytes:
+def document_bytes(document: dict[str, Any]) -> bytes:
     """The document as it stands in its file."""
-    return (json.dumps(document(evidence, table_file), default=str, ensure_ascii=False) + "\n").encode()
+    return (json.dumps(document, default=str, ensure_ascii=False) + "\n").encode()
 
 
 def job_fields(job: Job) -> dict[str, Any]:
@@ -97,6 +125,10 @@ def measurement_fields(measurement: Measurement) -> dict[str, Any]:
     """What was measured, with the polygon to the last bit."""
     return {
         **measurement.summary(),
+        "aligned": measurement.aligned,
+        "area_px2": measurement.area_px2,
+        "uncertainty_px": measurement.uncertainty_px,
+        "uncertainty": None if measurement.uncertainty is None else asdict(measurement.uncertainty),
         "reasons": [{"code": int(reason), "text": text} for reason, text in measurement.findings],
         "pixels": contour_fields(measurement.pixels),
         "millimetres": contour_fields(measurement.millimetres),
@@ -108,6 +140,11 @@ def contour_fields(contour: Contour | None) -> dict[str, Any] | None:
     if contour is None:
         return None
     return {"exterior": contour.exterior.tolist(), "holes": [hole.tolist() for hole in contour.holes]}
+
+
+def plain_bytes(frame: Frame) -> bytes:
+    """The frame's pixels as they are in memory, row by row."""
+    return np.ascontiguousarray(frame.pixels).tobytes()
 
 
 def frame_bytes(frame: Frame) -> bytes:
@@ -159,5 +196,5 @@ def _frame_fields(frame: Frame) -> dict[str, Any]:
         "simulated": frame.simulated,
         "sequence": frame.sequence,
         "shape": list(frame.pixels.shape),
-        "sha256": hashlib.sha256(np.ascontiguousarray(frame.pixels).tobytes()).hexdigest(),
+        "sha256": hashlib.sha256(plain_bytes(frame)).hexdigest(),
     }

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import secrets
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from typing import ParamSpec, Protocol, TypeVar
 
 from drivers.controller.mailbox import TEST_VALUE, ServiceBlock
 from service.health import Fault, Health, journal_fault
 from service.job_log import log_end
-from service.journal import Job, Journal, JournalError, TriggerStamp
+from service.journal import GoneOn, Job, Journal, JournalError, TriggerStamp
 from service.link import Link
 from service.reasons import Reason
 from service.state import State
@@ -25,6 +27,7 @@ R = TypeVar("R")
 JOURNAL_PAUSE_S = 1.0
 QUEUE_LOOK_S = 0.25  # how often those that wait are looked at where nothing else wakes the loop
 IDLE_LOOK_S = 1.0  # a loop that turns shows that it lives
+ROOM = 1000  # protocol: a start numbers from at least so far above all it finds, for another may hold the same journal
 COUNTER_VALUES = 65535  # a trigger counter runs 1…65535; 0 means none yet
 
 
@@ -36,6 +39,9 @@ class JobRunner(Protocol):
 
     async def resume(self, job: Job) -> Job:
         """Bring a job found in flight after a start to its end; the settled job."""
+
+    def hindrance(self, job: Job) -> str | None:
+        """Why a job found in flight cannot be settled as the service is configured now; None where it can."""
 
 
 def missed_between(last: tuple[int, int], session: int, counter: int) -> int:
@@ -79,10 +85,14 @@ class Executor:
         self.last_settled: Job | None = None
         self._last_pair = journal.last_controller_trigger()
         self._found = False
+        self._begun = link is None or not link.settings.handshake or link.settings.observe
+        self._numbered_above_last_job = False
+        # Two that start at once with one journal find the same: by chance they number differently.
+        self._room = ROOM + secrets.randbelow(ROOM)
         self._observing_since: tuple[int, int] | None = None
         self._restore_published()
         if link is not None:
-            link.on_found = self._go_on_after
+            link.on_found = self._begin_at
 
     def _restore_published(self) -> None:
         """What the service block said before the restart: it is true still."""
@@ -99,30 +109,44 @@ class Executor:
             reject_reason=int(settled.reason) if settled and settled.reason else 0,
             owner=self._journal.owner,
         )
+        self._link.highest_known = taken.job_id if taken else 0
 
-    async def _go_on_after(self, block: ServiceBlock) -> None:
-        """Go on where a service of another journal ended: its last trigger is not taken again, its job is settled.
+    async def _begin_at(self, block: ServiceBlock) -> None:
+        """Go on where the service block ends that stands at the controller, whoever wrote it.
 
-        So it is with our own former life too, where its journal was lost.
+        It may be another's, or our own of a journal that was lost or is older than it: a trigger that it shows as taken
+        is not taken again, a job that had not ended there is taken back, and numbers go on well above.
         """
         assert self._link is not None
+        ours = block.owner == self._journal.owner
         if (block.protocol_version, block.test_value) != (ServiceBlock().protocol_version, TEST_VALUE):
-            return  # whatever stands there, it is no service's
-        pair = (block.session_ack, block.trigger_ack)
+            block = replace(block, job_id=0, settled_job=0, trigger_ack=0)  # whatever stands there, it is no service's
         session = self._link.view.session if self._link.view else 0
-        in_flight = session if block.job_id > block.settled_job and session else None
-        log.warning("job numbers go on above %d, which another journal's service gave here", block.job_id)
-        await self._until_done(self._journal.adopt, block.job_id, pair, in_flight)
+        gone_on = await self._until_done(self._journal.go_on_above, block, session, self._room)
+        self._numbered_above_last_job = False
         self._last_pair = await self._until_done(self._journal.last_controller_trigger)
         taken = await self._until_done(self._journal.last_taken)
         if taken is None or taken.job_id <= block.job_id:
             self.settled_job = max(self.settled_job, block.settled_job)
             self._link.publish(job_id=block.job_id, settled_job=self.settled_job, reject_reason=block.reject_reason)
+        self._link.highest_known = max(self._link.highest_known, block.job_id, block.settled_job)
         self._link.publish(trigger_ack=self._last_pair[1], session_ack=self._last_pair[0])
-        if in_flight is not None:
-            self._report_in_flight(block.job_id)
-            self._found = True
-            self._wake.set()
+        self._tell_found(gone_on, ours)
+        if gone_on.in_flight is not None:
+            self._report_in_flight(gone_on.in_flight)
+        self._begun = self._found = True
+        self._wake.set()
+
+    def _tell_found(self, gone_on: GoneOn, ours: bool) -> None:
+        """An alarm where our own number stands beside what our journal does not know: it is an old one."""
+        whose = (
+            "the journal is older than what this service last told the controller" if ours else "another service ran"
+        )
+        level = logging.CRITICAL if ours else logging.WARNING
+        if gone_on.pair is not None:
+            log.log(level, "%s: trigger %d of session %d counts as taken", whose, gone_on.pair[1], gone_on.pair[0])
+        if gone_on.in_flight is not None:
+            log.log(level, "%s: job %d, which had not ended, is taken back", whose, gone_on.in_flight)
 
     async def _until_done(self, access: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         while True:
@@ -148,6 +172,10 @@ class Executor:
     def ignore_controller(self) -> None:
         """Take no triggers of the controller; they stay pending."""
         self._controller_triggers = False
+
+    def confirm(self) -> list[str]:
+        """A person's word for what waits for one at the controller: what that was, as sentences."""
+        return [] if self._link is None else self._link.confirm()
 
     @property
     def idle(self) -> bool:
@@ -227,20 +255,27 @@ class Executor:
         return Ticket(job, self._tickets[job.job_id])
 
     async def _take(self, trigger: TriggerStamp) -> Job:
-        view = self._link.view if self._link else None
         try:
-            job = await asyncio.to_thread(self._journal.take, trigger, above=view.last_job if view else 0)
+            job = await asyncio.to_thread(self._journal.take, trigger, above=self._above())
         except JournalError as error:
             fault = journal_fault(error)
             self._health.report("journal", fault)
             raise TriggerRefused(fault.reason, fault.text) from error
         self._health.report("journal", None)
+        self._numbered_above_last_job = True
         self._told.clear()
         self.counts[trigger.kind, "taken"] += 1
         log.debug("job %d taken: trigger %s, recipe %s", job.job_id, trigger.kind, trigger.recipe or "default")
         if self._link is not None:
             self._link.publish(job_id=job.job_id)
         return job
+
+    def _above(self) -> int:
+        """What the controller's `last_job` has a new number be above."""
+        last_job = self._link.last_job if self._link else None
+        if not last_job:
+            return 0
+        return last_job if self._numbered_above_last_job else last_job + self._room
 
     def _count_missed(self, count: int) -> None:
         self._missed = (self._missed + count) & 0xFFFF
@@ -324,8 +359,15 @@ class Executor:
         for job in await self._unsettled():
             if self._submitted is not None and job.job_id == self._submitted.job.job_id:
                 continue
+            hindrance = self._runner.hindrance(job)
+            if hindrance is not None:  # no trigger is taken until the service is started again with what settles it
+                log.error("job %d: %s", job.job_id, hindrance)
+                self._health.report("in-flight", Fault(Reason.SERVICE_RESTARTED, hindrance))
+                return
             log.warning("job %d was in flight when the service ended", job.job_id)
             self._report_in_flight(job.job_id)
+            if not job.sent and not self._begun:  # the block at the controller may know more of it than the journal
+                return
             await self._finish(await self._runner.resume(job))
         self._health.report("in-flight", None)
 
@@ -350,7 +392,7 @@ class Executor:
         if self._health.state is not State.READY or self._taking:
             return None
         view = self._link.view
-        if view.session == 0 or self._link.fault() is not None:
+        if view.session == 0 or self._link.fault() is not None or self._link.number_in_doubt() is not None:
             return None
         pair = (view.session, view.trigger_counter)
         if self._link.settings.observe and self._observing_since is None:
@@ -389,9 +431,10 @@ class Executor:
         """Tell how the job ended: register block, log, and whoever asked to be told."""
         assert job.outcome is not None
         log_end(log, job)
-        self.settled_job, self.last_settled = job.job_id, job
-        if self._link is not None:
-            self._link.publish(settled_job=job.job_id, reject_reason=int(job.reason or 0))
+        if job.job_id >= self.settled_job:  # one that another service left may be lower
+            self.settled_job, self.last_settled = job.job_id, job
+            if self._link is not None:
+                self._link.publish(settled_job=job.job_id, reject_reason=int(job.reason or 0))
         waited_for = self._tickets.pop(job.job_id, None)
         if waited_for is not None and not waited_for.done():
             waited_for.set_result(job)

@@ -13,7 +13,7 @@ import sqlite3
 import sys
 import threading
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -21,7 +21,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from drivers.controller.mailbox import Page
+from drivers.controller.mailbox import Page, ServiceBlock
 from service.journal_schema import COLUMNS, SCHEMA_VERSION, TABLES, migration
 from service.reasons import Outcome, Reason
 
@@ -29,9 +29,10 @@ HEADER_REGISTERS = 31
 PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
 LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
 LARGEST_OWNER = 0xFFFF
+LATER = 32768  # a trigger counter that is less ahead than this is later, one that is more is earlier
 RESTORED = (
-    "job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
-    " withdraw_reason"
+    "job_id, taken_at, trigger_kind, line, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
+    " target, withdraw_reason"
 )
 UNSETTLED = "outcome IS NULL"
 PRUNED_AT_ONCE = 500  # rows: some milliseconds, for a job may wait behind it
@@ -60,6 +61,7 @@ class JournalConflict(Exception):
 class TriggerStamp:
     """Where a job came from. `session` and `counter` are set for triggers of the controller only.
 
+    line: the serial port over which it is acknowledged and told its end, as configured; None where nobody is told.
     recipe 0 means the configured default, thickness_um 0 the recipe's.
     """
 
@@ -68,6 +70,7 @@ class TriggerStamp:
     thickness_um: int = 0
     session: int | None = None
     counter: int | None = None
+    line: str | None = None
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,7 @@ class Job:
 
     session: set once any request of a transfer may have been sent, and pages with it, until the job has ended.
     terms: None where it came to no recipe. transfer: figures of it, empty where nothing was to be sent.
+    target: at which controller it was sent and how laid out there, by configuration key; empty where that is not known.
     """
 
     job_id: int
@@ -99,11 +103,25 @@ class Job:
     report: dict[str, Any] = field(default_factory=dict)
     terms: Terms | None = None
     transfer: dict[str, Any] = field(default_factory=dict)
+    target: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def taken_at_s(self) -> float:
+        """When it was taken, Unix time by the machine's own clock."""
+        return datetime.fromisoformat(self.taken_at).timestamp()
 
     @property
     def sent(self) -> bool:
         """True where a request of a transfer may have been sent: such a job is never called failed by ourselves."""
         return self.session is not None
+
+
+@dataclass(frozen=True)
+class GoneOn:
+    """What was learnt from the service block at the controller: a trigger that counts as taken, a job to take back."""
+
+    pair: tuple[int, int] | None = None
+    in_flight: int | None = None
 
 
 class Journal:
@@ -234,6 +252,11 @@ class Journal:
                     self._db.execute("ROLLBACK")
                 raise
 
+    def refuse_writes(self) -> None:
+        """From here on each write raises JournalError."""
+        with self._lock:
+            self._db.execute("PRAGMA query_only = ON")
+
     def close(self) -> None:
         """Close the file."""
         with self._lock:
@@ -254,7 +277,8 @@ class Journal:
         taken_at = self._stamp()
         with self._transaction() as db:
             highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
-            job_id = max(highest, above, self._number("above"), self._number("adopted_job")) + 1
+            found = max(self._number(key) for key in ("above", "adopted_job", "begin_above"))
+            job_id = max(highest, above, found) + 1
             if job_id == 1:  # nothing is known of any job of before
                 job_id = self._number("otherwise_from") or 1
             if job_id > LARGEST_JOB:
@@ -263,7 +287,7 @@ class Journal:
                 )
             db.execute(
                 "INSERT INTO jobs (job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe,"
-                " thickness_um) VALUES (?, ?, ?, ?, ?, ?, ?)",
+                " thickness_um, line, owed) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
                 (
                     job_id,
                     taken_at,
@@ -272,46 +296,84 @@ class Journal:
                     trigger.counter,
                     trigger.recipe,
                     trigger.thickness_um,
+                    trigger.line,
+                    int(trigger.line is not None),
                 ),
             )
         return Job(job_id, taken_at, trigger)
 
-    def adopt(self, job_id: int, pair: tuple[int, int], in_flight_in: int | None) -> None:
-        """Go on after a service whose journal is not this one, from what its block at the controller says.
+    def go_on_above(self, found: ServiceBlock, session: int, room: int) -> GoneOn:
+        """Begin at a controller whose service block shows `found` in its session `session`; durable on return.
 
-        job_id: the last job it took; ours are above. pair: session and trigger_counter it took last.
-        in_flight_in: the session in which to take the job back, where it had not ended; it becomes a job of ours.
+        New jobs are numbered from more than `room` above all that is known. The block's trigger counts as taken where
+        it is later than ours, and its job, where it had not ended there and is not in the journal, becomes one of ours
+        that is to be taken back: the block may be another service's, and the journal may be an old one.
         """
         with self._transaction() as db:
             highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
-            values = {"adopted_job": max(job_id, self._number("adopted_job"))}
-            if pair[1]:
+            adopted = max(found.job_id, found.settled_job, self._number("adopted_job"))
+            known = max(highest, adopted, self._number("above")) or self._number("otherwise_from") - 1
+            values = {"adopted_job": adopted, "begin_above": min(known + room, LARGEST_JOB - 1)}
+            pair = (found.session_ack, found.trigger_ack)
+            later = _is_later(pair, self._last_pair(), session)
+            if later:
                 values |= {"adopted_above": highest, "adopted_session": pair[0], "adopted_counter": pair[1]}
             for key, value in values.items():
                 db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, str(value)))
-            if in_flight_in is not None and job_id > highest:
+            if session:  # one that this journal calls unsent may have been sent in a life that it does not know
+                db.execute(
+                    "UPDATE jobs SET session = ?, withdraw_reason = ?"
+                    f" WHERE {UNSETTLED} AND session IS NULL AND job_id <= ?",
+                    (session, int(Reason.SERVICE_RESTARTED), found.job_id),
+                )
+            unknown = (
+                found.job_id > found.settled_job
+                and session
+                and not db.execute("SELECT 1 FROM jobs WHERE job_id = ?", (found.job_id,)).fetchone()
+            )
+            if unknown:
                 db.execute(
                     "INSERT INTO jobs (job_id, taken_at, trigger_kind, recipe, thickness_um, session, withdraw_reason)"
                     " VALUES (?, ?, 'found', 0, 0, ?, ?)",
-                    (job_id, self._stamp(), in_flight_in, int(Reason.SERVICE_RESTARTED)),
+                    (found.job_id, self._stamp(), session, int(Reason.SERVICE_RESTARTED)),
                 )
+        return GoneOn(pair if later else None, found.job_id if unknown else None)
 
     def restore(self, rows: list[tuple[Any, ...]], pair: tuple[int, int]) -> None:
         """Take over from a damaged journal: jobs that had not ended (columns as in RESTORED), and the last trigger."""
         marks = ", ".join("?" * len(RESTORED.split(",")))
         with self._transaction() as db:
             db.executemany(f"INSERT INTO jobs ({RESTORED}) VALUES ({marks})", rows)
-        if pair[1]:
-            self.adopt(max((row[0] for row in rows), default=0), pair, None)
+            db.execute(f"UPDATE jobs SET owed = 1 WHERE line IS NOT NULL AND {UNSETTLED}")
+            if pair[1]:
+                highest = max((row[0] for row in rows), default=0)
+                values = {"adopted_above": highest, "adopted_session": pair[0], "adopted_counter": pair[1]}
+                for key, value in values.items():
+                    db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, str(value)))
 
     def _number(self, key: str) -> int:
         """A number of `meta`, 0 where it is not there; within a transaction or the lock."""
         row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         return int(row[0]) if row else 0
 
-    def store_pages(self, job_id: int, session: int, pages: tuple[Page, ...], terms: Terms | None = None) -> None:
-        """Make the pages durable, before the first request of theirs is sent."""
-        self._update(job_id, "session = ?, pages = ?", (session, pages_to_text(pages)), terms)
+    def store_pages(
+        self,
+        job_id: int,
+        session: int,
+        pages: tuple[Page, ...],
+        terms: Terms | None = None,
+        report: dict[str, Any] | None = None,
+        transfer: dict[str, Any] | None = None,
+        *,
+        target: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Make the pages durable, before the first request of theirs is sent, and all that is known of the job.
+
+        target: at which controller they are to be sent and how laid out there, by configuration key.
+        """
+        texts = pages_to_text(pages), json.dumps(report or {}), json.dumps(transfer) if transfer else None
+        values = session, *texts, json.dumps(dict(target or {}))
+        self._update(job_id, "session = ?, pages = ?, report = ?, transfer = ?, target = ?", values, terms)
 
     def store_withdrawal(self, job_id: int, reason: Reason) -> None:
         """Make durable that the job is being withdrawn, and why; the first reason stands."""
@@ -399,6 +461,15 @@ class Journal:
         """Jobs without a final state, oldest first: after a crash at most the one in flight."""
         return self._jobs(f"WHERE {UNSETTLED} ORDER BY job_id")
 
+    def owed(self, line: str) -> tuple[Job, ...]:
+        """Jobs that have ended, and whose end this line has not been told, oldest first."""
+        return self._jobs("WHERE owed = 1 AND line = ? AND outcome IS NOT NULL ORDER BY job_id", (line,))
+
+    def told(self, job_ids: Iterable[int]) -> None:
+        """Make durable that the ends of these jobs are owed to their line no more."""
+        with self._transaction() as db:
+            db.executemany("UPDATE jobs SET owed = 0 WHERE job_id = ?", [(job_id,) for job_id in job_ids])
+
     def last_settled(self) -> Job | None:
         """The settled job with the highest id."""
         return next(iter(self._jobs("WHERE outcome IS NOT NULL ORDER BY job_id DESC LIMIT 1")), None)
@@ -410,12 +481,15 @@ class Journal:
     def last_controller_trigger(self) -> tuple[int, int]:
         """(session, trigger_counter) last taken from the controller; (0, 0) where there was none."""
         with self._lock, self._translated():
-            row = self._db.execute(
-                "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL AND job_id > ?"
-                " ORDER BY job_id DESC LIMIT 1",
-                (self._number("adopted_above"),),
-            ).fetchone()
-            row = row or (self._number("adopted_session"), self._number("adopted_counter"))
+            return self._last_pair()
+
+    def _last_pair(self) -> tuple[int, int]:
+        row = self._db.execute(
+            "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL AND job_id > ?"
+            " ORDER BY job_id DESC LIMIT 1",
+            (self._number("adopted_above"),),
+        ).fetchone()
+        row = row or (self._number("adopted_session"), self._number("adopted_counter"))
         return int(row[0]), int(row[1])
 
     def _one(self, query: str) -> Any:
@@ -429,6 +503,13 @@ class Journal:
 
     def _stamp(self) -> str:
         return self._now().isoformat(timespec="milliseconds")
+
+
+def _is_later(pair: tuple[int, int], than: tuple[int, int], session: int) -> bool:
+    """True where `pair`, as (session, trigger_counter), was taken in this session after `than` was."""
+    if pair[0] != session or 0 in pair:
+        return False
+    return than[0] != session or 0 < (pair[1] - than[1]) % 65536 < LATER
 
 
 def readable_text(stored: bytes) -> str:
@@ -446,13 +527,14 @@ def job_of(row: tuple[Any, ...]) -> Job:
 
 def _job_of(row: tuple[Any, ...]) -> Job:
     job_id, taken_at, kind, recipe, thickness_um, trigger_session, counter, session, pages = row[:9]
-    withdraw_reason, outcome, reason, detail, settled_at, report, settings, calibration, transfer = row[9:]
+    withdraw_reason, outcome, reason, detail, settled_at, report, settings, calibration, transfer = row[9:18]
+    line, target = row[18:]
     for moment in (taken_at, settled_at or taken_at):
         datetime.fromisoformat(moment)
     return Job(
         job_id=job_id,
         taken_at=taken_at,
-        trigger=TriggerStamp(kind, recipe, thickness_um, trigger_session, counter),
+        trigger=TriggerStamp(kind, recipe, thickness_um, trigger_session, counter, line),
         session=session,
         pages=pages_from_text(pages or ""),
         withdraw_reason=None if withdraw_reason is None else Reason(withdraw_reason),
@@ -463,6 +545,7 @@ def _job_of(row: tuple[Any, ...]) -> Job:
         report=_fields(report),
         terms=None if settings is None else Terms(_fields(settings), calibration),
         transfer=_fields(transfer),
+        target=_fields(target),
     )
 
 

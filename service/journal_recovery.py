@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import re
@@ -135,7 +136,7 @@ def _restore(kept: Path, journal: Journal) -> str:
     """Bring over what had not ended, where it can be read; a sentence of what that was."""
     try:
         with closing(_reading(kept)) as old:
-            rows = old.execute(f"SELECT {RESTORED} FROM jobs WHERE {UNSETTLED}").fetchall()
+            rows = old.execute(f"SELECT {_there(old)} FROM jobs WHERE {UNSETTLED}").fetchall()
             pairs = "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL"
             pair = old.execute(f"{pairs} ORDER BY job_id DESC LIMIT 1").fetchone() or (0, 0)
         journal.restore([_sound(row) for row in rows], pair)
@@ -145,15 +146,25 @@ def _restore(kept: Path, journal: Journal) -> str:
     return f"Jobs in it that had not ended: {', '.join(str(row[0]) for row in rows) or 'none'}. "
 
 
+def _there(old: sqlite3.Connection) -> str:
+    """The columns of RESTORED, those that a journal of an earlier version has not as NULL."""
+    known = {str(row[1]) for row in old.execute("PRAGMA table_info(jobs)")}
+    return ", ".join(name if name in known else "NULL" for name in RESTORED.split(", "))
+
+
 def _sound(row: tuple[Any, ...]) -> tuple[Any, ...]:
     """Columns as in RESTORED, with what no job can hold put right: this job is to be settled, not to be understood."""
-    *columns, pages, withdraw_reason = row
+    *columns, pages, target, withdraw_reason = row
     known = withdraw_reason is None or withdraw_reason in set(Reason)
     try:
         datetime.fromisoformat(str(columns[1]))
     except ValueError:
         columns[1] = datetime.fromtimestamp(0, UTC).isoformat(timespec="milliseconds")
-    return (*columns, pages, withdraw_reason if known else int(Reason.SERVICE_RESTARTED))
+    try:
+        target = target if isinstance(json.loads(target or "{}"), dict) else None
+    except ValueError:
+        target = None
+    return (*columns, pages, target, withdraw_reason if known else int(Reason.SERVICE_RESTARTED))
 
 
 def _reading(path: Path) -> sqlite3.Connection:

@@ -1,12 +1,13 @@
 """The journal's tables, and the steps by which a journal of an earlier version becomes one of this.
 
 Version 2 added what a job was carried out with (its recipe's whole settings, the calibration's hash) and its transfer.
-Version 3 added who asked for what from the operator's page.
+Version 3 added who asked for what from the operator's page. Version 4 added on which serial line a job was
+acknowledged, whether its end is still to be told there, and at which controller, how laid out there, it was sent.
 """
 
 from __future__ import annotations
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 
 AUDIT = """
 CREATE TABLE audit (
@@ -18,6 +19,13 @@ CREATE TABLE audit (
     detail TEXT,
     result TEXT
 ) STRICT;
+"""
+
+LINE_AND_TARGET = """
+ALTER TABLE jobs ADD COLUMN target TEXT;
+ALTER TABLE jobs ADD COLUMN line TEXT;
+ALTER TABLE jobs ADD COLUMN owed INTEGER NOT NULL DEFAULT 0;
+CREATE INDEX jobs_owed ON jobs (job_id) WHERE owed = 1;
 """
 
 TABLES = f"""
@@ -45,7 +53,7 @@ CREATE TABLE jobs (
 ) STRICT;
 CREATE INDEX jobs_unsettled ON jobs (job_id) WHERE outcome IS NULL;
 CREATE INDEX jobs_by_controller ON jobs (job_id) WHERE trigger_counter IS NOT NULL;
-{AUDIT}"""
+{AUDIT}{LINE_AND_TARGET}"""
 
 # Each from the version that is its key to the next.
 MIGRATIONS = {
@@ -56,18 +64,24 @@ ALTER TABLE jobs ADD COLUMN calibration TEXT;
 ALTER TABLE jobs ADD COLUMN transfer TEXT;
 """,
     2: AUDIT,
+    3: LINE_AND_TARGET,
 }
 
 COLUMNS_OF_1 = (
     "job_id, taken_at, trigger_kind, recipe, thickness_um, trigger_session, trigger_counter,"
     " session, pages, withdraw_reason, outcome, reason, detail, settled_at, report"
 )
-COLUMNS = f"{COLUMNS_OF_1}, (SELECT settings FROM recipe_settings WHERE digest = recipe_digest), calibration, transfer"
+COLUMNS_OF_2 = (
+    f"{COLUMNS_OF_1}, (SELECT settings FROM recipe_settings WHERE digest = recipe_digest), calibration, transfer"
+)
+COLUMNS = f"{COLUMNS_OF_2}, line, target"
 
 
 def columns(version: int) -> str:
     """What to select of `jobs` in a journal of this version, for `service.journal.job_of`."""
-    return COLUMNS if version > 1 else f"{COLUMNS_OF_1}, NULL, NULL, NULL"
+    if version > 3:
+        return COLUMNS
+    return f"{COLUMNS_OF_2}, NULL, NULL" if version > 1 else f"{COLUMNS_OF_1}, NULL, NULL, NULL, NULL, NULL"
 
 
 def migration(version: int) -> str | None:

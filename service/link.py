@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import secrets
 import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
@@ -17,7 +18,8 @@ from typing import Any
 from drivers.controller import Controller, ControllerError, ControllerUnavailable
 from drivers.controller.mailbox import LinkBlock, ServiceBlock
 from service.beat import off_beat, until_beat
-from service.ownership import Ownership
+from service.controller_clock import BEATS_TO_HOLD, ControllerClock, Stamp
+from service.ownership import WATCH_OWN_S, Ownership
 from service.reasons import Reason
 
 log = logging.getLogger("combtrace.link")
@@ -27,10 +29,10 @@ RETRY_PAUSES_S = (0.1, 0.2, 0.5)
 HEARTBEAT_PERIOD_S = 0.5  # the protocol wants a change at least once a second
 BEAT_DUE_S = 1.0  # within which the protocol wants the controller's heartbeat to change
 REMINDER_S = 60.0  # how often a loss that lasts is told again
-CLOCK_TOLERANCE_MS = 1000  # protocol: a clock reading counts only if it fits the one before within 1 s
 READS_FOR_TWO_ALIKE = 20
-CLOCK_MODULUS = 1 << 32
 LARGEST_JOB = (1 << 32) - 1
+LARGEST_STEP = 1_000_000  # protocol: a last_job further above all that is known is a fault of the controller
+HEARTBEATS = 1 << 16
 STEADY_FIELDS = attrgetter(
     *(field.name for field in fields(LinkBlock) if field.name not in ("controller_heartbeat", "clock", "test_echo"))
 )
@@ -58,14 +60,6 @@ async def _nothing(_block: ServiceBlock) -> None:
     return
 
 
-@dataclass(frozen=True)
-class Stamp:
-    """What the controller's clock said, and in which session; clock_ms 0 where it has no clock."""
-
-    session: int
-    clock_ms: int
-
-
 def steady(block: LinkBlock) -> tuple[int, ...]:
     """The part of a block that two reads in a row must show alike: all but heartbeat, clock and test echo."""
     return STEADY_FIELDS(block)
@@ -75,7 +69,8 @@ class Link:
     """Keeps one connection to the controller, reads its block, writes ours.
 
     view: the controller's block as two reads in a row showed it, None while there is none to act on.
-    on_found: told of the service block that another service, which runs no more, left behind; before it is overwritten.
+    last_job: as it last held, None until it did.
+    on_found: told of the service block that stands there at the start, whoever wrote it; before it is overwritten.
     """
 
     def __init__(
@@ -98,7 +93,9 @@ class Link:
         self._wake = asyncio.Event()
         self._timer: asyncio.TimerHandle
         self._written = asyncio.Event()
-        self._block = ServiceBlock()
+        self._block = ServiceBlock(service_heartbeat=secrets.randbelow(HEARTBEATS))
+        # Of two services with one number none falls into the other's step: each sees what it did not write.
+        self._beat_step = 2 * secrets.randbelow(HEARTBEATS // 2) + 1
         self._dirty = True
         self._written_at = -1e9
         self._trouble: str | None = "not connected yet"
@@ -110,8 +107,11 @@ class Link:
         self._lost_at: float | None = None
         self._told_at = 0.0
         self._failing = ""
-        self._clock_ran_in = 0  # the session in which the clock was seen at another value than 0
-        self._zero: tuple[int, float] = (0, 0.0)  # session, and when its clock was first seen at 0
+        self._clock = ControllerClock()
+        self.last_job: int | None = None
+        self.highest_known = 0  # job number in the journal, or found in the service block
+        self._confirmed_last_job: int | None = None
+        self._session_written = 0  # the session in which the service block was last written
         self._well_or_failed = False
         self._since: float | None = None
         self._turn = 0
@@ -124,8 +124,8 @@ class Link:
         self._unsteady: str | None = None
         self._beat_at: float | None = None
         self._beat: int | None = None
-        self._clock: tuple[int, int, float] | None = None  # session, clock in ms, when it was read
-        self._clock_fits = False
+        self._beats_alike = 0  # changes of the heartbeat over which all reads showed the same
+        self._clock.disconnected()
         self.ownership.disconnected()
 
     # --- what it says -------------------------------------------------------------------------------------------
@@ -135,7 +135,7 @@ class Link:
         """True until the link was well or failed for the first time, or that takes too long."""
         if self._well_or_failed or self._since is None or self.ownership.conflict:
             return not (self._well_or_failed or self.ownership.conflict)
-        return self._now() - self._since < self.settings.heartbeat_timeout_s
+        return self._now() - self._since < self.settings.heartbeat_timeout_s + WATCH_OWN_S
 
     def fault(self) -> str | None:
         """Why nothing can be sent now, as a sentence; None when contours can be sent."""
@@ -152,10 +152,9 @@ class Link:
         view = self.view
         if view is None or view.session == 0:
             return self._unsteady or "the controller's program is starting (session 0)"
-        if view.last_job >= LARGEST_JOB:
-            return f"last_job is {view.last_job}: no higher job number is left. Correct it at the controller"
-        echo_fault = None if self.settings.observe else self._echo_fault(view)  # it echoes what we never wrote
-        return self._beat_fault() or echo_fault or self._clock_fault()
+        # What is observed echoes what we never wrote, and numbers nothing of ours.
+        of_ours = None if self.settings.observe else self.echo_fault(view) or self._number_fault()
+        return self._beat_fault() or of_ours or self._clock.fault(view.session)
 
     @property
     def fault_reason(self) -> Reason:
@@ -177,18 +176,34 @@ class Link:
         """How long the controller's heartbeat has not changed."""
         return self._now() - (self._connected_at if self._beat_at is None else self._beat_at)
 
-    def _clock_fault(self) -> str | None:
-        undecided = self._clock is not None and self._clock_runs(self._clock) is None
-        return "the controller's clock shows 0: whether it runs is not known yet" if undecided else None
+    def _number_fault(self) -> str | None:
+        """Why no job can be numbered above `last_job`."""
+        if self.last_job is None:
+            return "last_job has not held over two changes of the controller's heartbeat yet"
+        known = self.highest_number
+        if self.last_job >= LARGEST_JOB:
+            return f"last_job is {self.last_job}: no higher job number is left. Correct it at the controller"
+        if self.last_job > known + LARGEST_STEP and self.last_job != self._confirmed_last_job:
+            return (
+                f"last_job is {self.last_job}, expected {known} or little more: this looks like a fault of the "
+                "controller. Correct it there; where it is right, `combtrace confirm`"
+            )
+        return None
 
-    def _clock_runs(self, reading: tuple[int, int, float]) -> bool | None:
-        """True, False where it has shown 0 for longer than a clock can, None where that is not known yet."""
-        session, clock_ms, read_at = reading
-        if clock_ms or session == self._clock_ran_in:
-            return True
-        return False if (read_at - self._zero[1]) * 1000 > CLOCK_TOLERANCE_MS else None
+    def number_in_doubt(self) -> str | None:
+        """Why a number that is given now may not be above `last_job`, as a sentence; None where it is."""
+        view = self.view
+        if view is None or self.last_job is None or view.last_job <= max(self.highest_number, self.last_job):
+            return None
+        return f"last_job seems to be {view.last_job}: whether that holds is being watched"
 
-    def _echo_fault(self, view: LinkBlock) -> str | None:
+    @property
+    def highest_number(self) -> int:
+        """The highest job number that is known on our side."""
+        return max(self.highest_known, self._block.job_id)
+
+    def echo_fault(self, view: LinkBlock) -> str | None:
+        """Why what is read is misread, as a sentence; None where it is read as it is meant."""
         expected = self._block.test_value + 1
         if view.test_echo == expected:
             return None
@@ -206,6 +221,8 @@ class Link:
         fault = self.fault()
         if fault is not None or not self.settings.handshake or self.settings.observe:
             return fault
+        if (doubt := self.number_in_doubt()) is not None:
+            return doubt
         assert self.view is not None
         states = {0: "not ready", 2: "busy", 3: "in fault"}
         state = self.view.controller_state
@@ -215,18 +232,17 @@ class Link:
         """Session and clock as last read, None where the reading does not count (no session, or the clock jumped)."""
         if not self.settings.handshake:
             return Stamp(0, 0)
-        if self.view is None or self.view.session == 0 or self._clock is None:
-            return None
-        session, clock_ms, _ = self._clock
-        if session != self.view.session:
-            return None
-        runs = self._clock_runs(self._clock)
-        if not runs:
-            return Stamp(session, 0) if runs is False else None
-        # A running clock that wraps to 0 is told as 1 ms earlier: 0 would say that there is none.
-        return Stamp(session, clock_ms or CLOCK_MODULUS - 1) if self._clock_fits else None
+        return None if self.view is None or self.view.session == 0 else self._clock.stamp(self.view.session)
 
     # --- reading ------------------------------------------------------------------------------------------------
+
+    @property
+    def holds(self) -> bool:
+        """True where all reads over two changes of the controller's heartbeat showed the view: nothing is half written.
+
+        What rests on `last_job` needs that; two reads alike may show a 32-bit value between its halves.
+        """
+        return self.view is not None and self._beats_alike >= BEATS_TO_HOLD
 
     async def look(self) -> LinkBlock:
         """The controller's block, as two reads in a row show it; raise ControllerError."""
@@ -246,38 +262,31 @@ class Link:
 
     def _shows_the_same(self, block: LinkBlock, asked_at: float) -> bool:
         """True where `block` is like the one read before it, so that it is the view."""
-        self._heard(block)
+        beat_changed = self._heard(block)
         self.round_trip_s = self._heard_at - asked_at
         shown = steady(block)
         previous, self._previous = self._previous, shown
         if previous is None or previous != shown:
+            self._beats_alike = 0
             return False
+        self._beats_alike += beat_changed
         before, self.view = self.view, block
+        if self.holds and block.session and self.echo_fault(block) is None:
+            self.last_job = block.last_job
         self._unsteady = None
         if before is None or steady(before) != shown:
             self.on_look()
         return True
 
-    def _heard(self, block: LinkBlock) -> None:
+    def _heard(self, block: LinkBlock) -> bool:
+        """Take note of heartbeat and clock; True where the heartbeat has changed."""
         now = self._heard_at = self._now()
-        if self._beat is not None and block.controller_heartbeat != self._beat:
+        changed = self._beat is not None and block.controller_heartbeat != self._beat
+        if changed:
             self._beat_at = now
         self._beat = block.controller_heartbeat
-        self._heard_clock(block, now)
-
-    def _heard_clock(self, block: LinkBlock, now: float) -> None:
-        before, self._clock = self._clock, (block.session, block.clock, now)
-        if block.clock:
-            self._clock_ran_in = block.session
-        elif self._zero[0] != block.session:
-            self._zero = (block.session, now)
-        if before is None or before[0] != block.session:
-            self._clock_fits = False
-            return
-        passed_ms = (block.clock - before[1]) % CLOCK_MODULUS
-        off_ms = passed_ms - (now - before[2]) * 1000
-        off_ms = (off_ms + CLOCK_MODULUS / 2) % CLOCK_MODULUS - CLOCK_MODULUS / 2
-        self._clock_fits = abs(off_ms) <= CLOCK_TOLERANCE_MS
+        self._clock.heard(block, now)
+        return changed
 
     # --- writing ------------------------------------------------------------------------------------------------
 
@@ -307,12 +316,17 @@ class Link:
             return False
         return True
 
-    async def owner_stands(self) -> bool:
-        """True where `owner`, read now, is ours or nobody's; a foreign one must show in two reads in a row."""
-        for _ in range(2):
-            if not self.ownership.is_foreign(await self.controller.read_service()):
-                return True
-        return False
+    def confirm(self) -> list[str]:
+        """A person's word for what this link waits for with: what that was, as sentences."""
+        said = []
+        if self.ownership.conflict:
+            said.append("the controller is watched anew, and written to if no other service is seen")
+            self.ownership.begin()
+        if self.last_job is not None and self._number_fault() is not None and self.last_job < LARGEST_JOB:
+            said.append(f"last_job {self.last_job} is taken as right: jobs are numbered above it")
+            self._confirmed_last_job = self.last_job
+        self._wake.set()
+        return said
 
     def _service_due(self) -> bool:
         if self.settings.observe or self.ownership.conflict:
@@ -327,20 +341,27 @@ class Link:
         if not self._service_due():
             return
         found = await self.controller.read_service()
+        session = self.view.session if self.view is not None else self._session_written
+        if session != self._session_written:
+            self.ownership.controller_restarted()
         if not self.ownership.saw(found):
             return
-        if self.ownership.is_foreign(found):
-            if self.settings.handshake and self.view is None:
-                return  # in which session its job is to be taken back is not known: watch anew
+        if not self.ownership.begun:
+            if self.settings.handshake and not session and found.owner:
+                return  # in which session its job is to be taken back is not known: go on watching
             await self.on_found(found)
             if await self.controller.read_service() != found:  # making that durable may have taken long
                 return
         await self._write_service()
+        self._session_written = session
 
     async def _write_service(self) -> None:
-        self._block = replace(self._block, service_heartbeat=(self._block.service_heartbeat + 1) & 0xFFFF)
+        beat = (self._block.service_heartbeat + self._beat_step) % HEARTBEATS
+        self._block = replace(self._block, service_heartbeat=beat)
         writing = self._block
+        self.ownership.writing(beat)
         await self.controller.write_service(writing)
+        self.ownership.wrote()
         self._written_at = self._now()
         if writing is self._block:  # nothing was published while it was on its way
             self._dirty = False

@@ -7,14 +7,17 @@ controller computes from `test_value`, and in which registers move.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 from drivers.controller.mailbox import MailboxLayout, WordOrder
 
 SHIFTS = (0, 1, -1)
-STATE, HEARTBEAT, ECHO, CLOCK = 0, 1, 8, 14  # offsets in the link block
+ORDERS: tuple[WordOrder, ...] = ("big", "little")
+STATE, HEARTBEAT, ACK_RESULT, ECHO, LAST_RESULT, SESSION, CLOCK = 0, 1, 7, 8, 12, 13, 14  # offsets in the link block
+HIGHEST_STATE = 3
+ANSWERS = range(12)  # 0 is none
 TEST_VALUE = 8  # offset in the service block
 FEWEST_BEATS = 2  # a state may change once in the meantime
 Registers = Mapping[int, int]
@@ -32,17 +35,34 @@ class Signature:
 def from_echo(registers: Registers, layout: MailboxLayout) -> list[Signature]:
     """Every way of seeing in which `test_echo` is `test_value` + 1, from one look at both blocks."""
     ways: list[Signature] = []
-    orders: tuple[WordOrder, ...] = ("big", "little")
     for shift in SHIFTS:
-        for order in orders:
-            value = _u32(registers, layout.service_address + TEST_VALUE + shift, order)
-            echo = _u32(registers, layout.link_address + ECHO + shift, order)
-            if value is not None and echo == (value + 1) % 2**32:
-                ways.append(Signature(shift, order))
+        values, echoes = layout.service_address + TEST_VALUE + shift, layout.link_address + ECHO + shift
+        ways += [Signature(shift, order) for order in ORDERS if _echoes(registers, values, echoes, order)]
     return ways
 
 
-def from_movement(looks: Sequence[Registers], layout: MailboxLayout) -> list[Signature]:
+def from_mailbox(known: Registers, layout: MailboxLayout) -> list[Signature]:
+    """Every way of seeing in which link and service block hold what a mailbox holds, wherever they lie."""
+    ways = []
+    for address in known:
+        shift = address - layout.link_address
+        if known[address] <= HIGHEST_STATE and _may_be_link(known, address):
+            values, echoes = layout.service_address + shift + TEST_VALUE, address + ECHO
+            ways += [Signature(shift, order) for order in ORDERS if _echoes(known, values, echoes, order)]
+    return ways
+
+
+def _may_be_link(known: Registers, link: int) -> bool:
+    results = (known.get(link + ACK_RESULT), known.get(link + LAST_RESULT))
+    return bool(known.get(link + SESSION)) and all(result in ANSWERS for result in results)
+
+
+def _echoes(registers: Registers, values: int, echoes: int, order: WordOrder) -> bool:
+    value, echo = _u32(registers, values, order), _u32(registers, echoes, order)
+    return value is not None and echo == (value + 1) % 2**32
+
+
+def from_movement(looks: Sequence[Registers], layout: MailboxLayout, shifts: Iterable[int] = SHIFTS) -> list[Signature]:
     """Every way of seeing in which the heartbeat moves and `controller_state` hardly does, from looks over some time.
 
     The word order follows from `clock`, of which the lower half moves fast, the higher one hardly ever.
@@ -52,7 +72,7 @@ def from_movement(looks: Sequence[Registers], layout: MailboxLayout) -> list[Sig
         for address in looks[0]
     }
     ways = []
-    for shift in SHIFTS:
+    for shift in shifts:
         start = layout.link_address + shift
         beats = moves.get(start + HEARTBEAT, 0)
         if beats >= FEWEST_BEATS and 2 * moves.get(start + STATE, 0) < beats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
@@ -18,12 +19,15 @@ from contour.geometry import Contour, Ring, densified
 from contour.polygon import Finish, Polygon, cutting_polygon
 from contour.quality import Quality
 from contour.region import Region
+from contour.sliding_matrix import coarse_step, default_core_px
 from contour.taught_table import TableLimits, look_at
 from contour.tracing import Trace, TraceSettings, check_picture, trace
 from service.calibration_guard import CalibrationGuard
 from service.config import Recipe
 from service.reasons import Reason
 from service.table_file import TableRecord
+
+log = logging.getLogger("combtrace.measure")
 
 _ROI_STEPS = 12
 
@@ -124,6 +128,7 @@ class Measurer:
         self._work_area_mm = work_area_mm
         self._table = table
         self._clock = clock
+        self._doubted: set[int] = set()
 
     @property
     def guard(self) -> CalibrationGuard | None:
@@ -172,6 +177,10 @@ class Measurer:
             findings = (*result.findings, *self._guard.findings(picture, camera))
             result = replace(result, findings=tuple(sorted(findings, key=lambda finding: finding[0])))
             watch.lap("guard")
+        doubt = step_doubt(recipe, result.pitch_px)
+        if doubt and recipe.number not in self._doubted:
+            self._doubted.add(recipe.number)
+            log.warning("recipe %d: %s", recipe.number, doubt)
         total = sum(watch.milliseconds.values())
         return replace(result, timings_ms={**watch.milliseconds, "total": total})
 
@@ -277,6 +286,7 @@ class Measurer:
             max_area_mm2=recipe.max_area_mm2,
             max_vertices=recipe.max_vertices,
             work_area_mm=self._work_area_mm,
+            sure=None if self._calibration is None else self._calibration.uncertainty,
             pieces=recipe.pieces,
             max_uncertainty_mm=recipe.max_uncertainty_mm or None,
             max_disagreement_pitches=recipe.max_disagreement_pitches or None,
@@ -299,6 +309,14 @@ def trace_settings(recipe: Recipe) -> TraceSettings:
         threshold=recipe.parameters.get("threshold"),
         **sizes,
     )
+
+
+def step_doubt(recipe: Recipe, pitch_px: float | None = None) -> str | None:
+    """What speaks against the recipe's step; None where nothing does, or where the core follows from a pitch."""
+    step, core = recipe.parameters.get("step_px"), recipe.parameters.get("core_px")
+    if core is None and pitch_px is not None:
+        core = default_core_px(pitch_px)
+    return None if step is None or core is None else coarse_step(int(core), int(step))
 
 
 def _rounded(value: float | None) -> float | None:

@@ -1,4 +1,4 @@
-"""What a person may ask of the running daemon: its status, to halt, to resume, and to start its parts anew."""
+"""What a person may ask of the running daemon: its status, to halt, to resume, to confirm, to start its parts anew."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from service.reasons import Reason
 from service.state import State
 from service.supervisor import Supervisor
 from service.trigger_queue import TriggerRefused
+from service.whole_file import sync_folder, write_whole
 
 log = logging.getLogger("combtrace.control")
 
@@ -51,16 +52,12 @@ class Halt:
     def set(self, by: str, reason: str) -> None:
         """Keep it, durably; raise OSError."""
         kept = {"by": by, "reason": reason, "at": datetime.now(UTC).isoformat(timespec="seconds")}
-        beside = self._path.with_suffix(".new")
-        with beside.open("w", encoding="utf-8") as file:
-            json.dump(kept, file)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(self._path)
+        write_whole(self._path, json.dumps(kept).encode())
 
     def clear(self) -> None:
-        """Forget it; raise OSError."""
+        """Forget it, durably; raise OSError."""
         self._path.unlink(missing_ok=True)
+        sync_folder(self._path.parent)
 
 
 class Operations:
@@ -88,7 +85,13 @@ class Operations:
 
     def commands(self) -> dict[str, Handler]:
         """By name."""
-        return {"status": self.status, "halt": self.halt, "resume": self.resume, "reset": self.reset}
+        return {
+            "status": self.status,
+            "halt": self.halt,
+            "resume": self.resume,
+            "confirm": self.confirm,
+            "reset": self.reset,
+        }
 
     def _changed(self, _state: State, _reason: str | None) -> None:
         self._since_s = self._now()
@@ -144,6 +147,15 @@ class Operations:
         self._health.resume()
         self._executor.wake()
         return {"state": self._health.state.label}
+
+    async def confirm(self, _request: Mapping[str, Any], who: str) -> dict[str, Any]:
+        """A person's word for what the service must not decide alone: another service, a `last_job` that leaps."""
+        said = self._executor.confirm()
+        if not said:
+            raise CommandRefused(f"the service is {self._health.state.label}: nothing waits for a person's word")
+        for text in said:
+            log.warning("confirmed by %s: %s", who, text)
+        return {"state": self._health.state.label, "confirmed": said}
 
     async def reset(self, _request: Mapping[str, Any], who: str) -> dict[str, Any]:
         """Start all parts anew: connections, camera, ports. A halt stays."""

@@ -1,126 +1,172 @@
 """Whether this service may write to the controller: the protocol's "One service per controller", as a state machine.
 
-It is told every reading of the service block and says whether the next write is allowed; it does no I/O.
+It is told every reading of the service block and every write of it, and says whether the next write is allowed; it does
+no I/O.
 """
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from enum import Enum
 
 from drivers.controller import ControllerError, ServiceBlock
 
 WATCH_S = 3.0  # how long a foreign heartbeat must stand still, and then how long our own owner must stand
-NOT_ANOTHERS = 0  # registers that nobody has written yet
+WATCH_OWN_S = 1.5  # how long a heartbeat beside our own number must stand still: a former life's does
+NOBODY = 0  # in `owner`: registers that nobody has written yet
+OWN_BEATS_KEPT = 16  # of writes without a reply, one of which may land late
 
 
 class ForeignOwner(ControllerError):
-    """Another service's number stands in `owner`: nothing may be written."""
+    """Another service writes here, or may: nothing may be written."""
 
 
 class _Phase(Enum):
-    UNKNOWN = "whose the controller is has not been read yet"
-    OURS = ""
-    SUSPECT = "another service's number was read once in `owner`"
+    STARTING = "whose the controller is has not been read yet"
     WATCHING = "watching whether the other service still lives"
+    WATCHING_OWN = "watching whether another service with our number lives"
     CLAIMING = "watching whether our own number stands"
+    OURS = ""
     CONFLICT = "another service writes to this controller"
 
 
 class Ownership:
-    """The state of `owner`, reading by reading.
+    """The state of `owner` and `service_heartbeat`, reading by reading.
 
-    A foreign owner whose heartbeat moves is another service that lives: nothing is written from then on, until this
-    service is started again, which is a person's decision. One whose heartbeat stands still is what a service left
-    behind that runs no more, and is taken over.
+    At its start it watches what it finds. A heartbeat that moves is another service that lives: nothing is written. One
+    that stands still is what a service left behind that runs no more, and is taken over. Later, another number, or a
+    heartbeat that this service did not write, twice in a row, is another service too. Writing is resumed as at the
+    start, on a person's word.
     """
 
     def __init__(self, owner: int, *, now: Callable[[], float] = time.monotonic) -> None:
         self.owner = owner
         self._now = now
-        self._phase = _Phase.UNKNOWN
-        self._was_ours = False
-        self._other = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """As at the start: at the start, and on a person's word."""
+        self._phase = _Phase.STARTING
+        self._other = NOBODY
         self._beat: int | None = None
-        self._since: float | None = None
+        self._since_s: float | None = None
+        self._moved = False
+        self._taken_over = False  # from a number that is not ours: our own must stand for a while
+        self._doubted = False
+        self._beats: deque[int] | None = None  # that we may have written; None = whatever is found next
 
     @property
     def ours(self) -> bool:
         """True while contours may be sent."""
-        return self._phase is _Phase.OURS
+        return self._phase is _Phase.OURS and not self._doubted
 
     @property
     def conflict(self) -> bool:
-        """True from when another service was seen alive: nothing is written any more."""
+        """True from when another service was seen to write: nothing is written until a person says so."""
         return self._phase is _Phase.CONFLICT
+
+    @property
+    def begun(self) -> bool:
+        """True from the first write on that was confirmed."""
+        return self._phase in (_Phase.CLAIMING, _Phase.OURS)
 
     @property
     def decided(self) -> bool:
         """False while every look counts: the block is then read at each poll, not only before writes."""
-        return self._phase in (_Phase.OURS, _Phase.CLAIMING, _Phase.CONFLICT)
+        return self.conflict or (self.begun and not self._doubted)
 
     @property
     def foreign(self) -> bool:
-        """True while another service's number is known to stand in `owner`, or stood there a moment ago."""
+        """True while another service is known to have written last, or is being watched."""
         return self._phase in (_Phase.WATCHING, _Phase.CLAIMING, _Phase.CONFLICT)
-
-    @property
-    def lost(self) -> bool:
-        """True where the job in flight fails with 155: another lives, or came while the controller was ours."""
-        return self._phase is _Phase.CONFLICT or (self._was_ours and self._phase is _Phase.WATCHING)
 
     def fault(self) -> str | None:
         """Why nothing may be sent, as a sentence; None where it may."""
-        if self._phase in (_Phase.OURS, _Phase.UNKNOWN, _Phase.SUSPECT):
+        if self._phase in (_Phase.STARTING, _Phase.OURS):
             return self._phase.value or None
+        if self._phase is _Phase.WATCHING_OWN:
+            return f"{self._phase.value} (owner {self.owner}), {WATCH_OWN_S:g} s"
         other = f"another service (owner {self._other}, this one is {self.owner})"
-        if self._phase is _Phase.CONFLICT:
-            return f"{other} writes to this controller. Stop one of the two, then start this one again"
+        if self._other == self.owner:
+            other = f"another service with the same number (owner {self.owner}: a copied journal, or card)"
+        if self.conflict:
+            return f"{other} writes to this controller. Stop one of the two, then `combtrace confirm`"
         return f"{other} was the last to write to this controller: {self._phase.value}, {WATCH_S:g} s"
 
     def is_foreign(self, block: ServiceBlock) -> bool:
         """True where another service's number stands in the block."""
-        return block.owner not in (NOT_ANOTHERS, self.owner)
+        return block.owner not in (NOBODY, self.owner)
 
     def check(self) -> None:
         """Raise ForeignOwner where no contour may be written now."""
         if not self.ours:
-            raise ForeignOwner(self.fault() or "")
+            raise ForeignOwner(self.fault() or "another service's mark was read once in the service block")
 
     def disconnected(self) -> None:
         """A pause without readings is no time of watching: begin it anew."""
-        self._beat = self._since = None
+        if self._phase is _Phase.CLAIMING:
+            self._phase = _Phase.WATCHING
+        self._beat = self._since_s = None
+
+    def controller_restarted(self) -> None:
+        """Its registers may show what was there at any time before: the next heartbeat beside our number is ours."""
+        self._beats = None
+
+    def writing(self, beat: int) -> None:
+        """The block is being written with this heartbeat: from here on it may be found."""
+        if self._beats is not None:
+            self._beats.append(beat)
+
+    def wrote(self) -> None:
+        """A write was confirmed."""
+        if not self.begun and not self.conflict:
+            self._phase = _Phase.CLAIMING if self._taken_over else _Phase.OURS
+            self._since_s = None
 
     def saw(self, block: ServiceBlock) -> bool:
         """Take note of the service block as the controller holds it; True where the block may be written now."""
-        if self._phase is _Phase.CONFLICT:
+        if self.conflict:
             return False
-        if not self.is_foreign(block):
-            return self._saw_ours()
-        if self._phase in (_Phase.SUSPECT, _Phase.WATCHING) and block.owner == self._other:
-            return self._watch(block)
-        # Once is not enough: either side acts on the other's block only when two reads in a row show the same.
-        self._phase, self._other = _Phase.SUSPECT, block.owner
-        self.disconnected()
-        return False
+        return self._saw_later(block) if self.begun else self._watch(block)
 
-    def _saw_ours(self) -> bool:
-        if self._phase is _Phase.CLAIMING:
-            self._since = self._now() if self._since is None else self._since
-            if self._now() - self._since < WATCH_S:
-                return True
-        self._phase, self._was_ours = _Phase.OURS, True
-        return True
+    def _saw_later(self, block: ServiceBlock) -> bool:
+        if self._beats is None and block.owner == self.owner:
+            self._beats = deque([block.service_heartbeat], OWN_BEATS_KEPT)
+        strange = self.is_foreign(block) or (
+            block.owner != NOBODY and self._beats is not None and block.service_heartbeat not in self._beats
+        )
+        if strange and self._doubted:
+            self._phase, self._other = _Phase.CONFLICT, block.owner
+            return False
+        self._doubted = strange
+        if self._phase is _Phase.CLAIMING and not strange:
+            self._since_s = self._now() if self._since_s is None else self._since_s
+            if self._now() - self._since_s >= WATCH_S:
+                self._phase = _Phase.OURS
+        return not strange
 
     def _watch(self, block: ServiceBlock) -> bool:
-        self._phase = _Phase.WATCHING
-        now = self._now()
-        if self._beat is None or self._since is None:
-            self._beat, self._since = block.service_heartbeat, now
-        if block.service_heartbeat != self._beat:
-            self._phase = _Phase.CONFLICT
-        elif now - self._since >= WATCH_S:
-            self._phase, self._since = _Phase.CLAIMING, now
+        """At the start: True where what stands there has stood still for as long as it must."""
+        if block.owner == NOBODY:
+            self._other, self._beats = NOBODY, deque(maxlen=OWN_BEATS_KEPT)
             return True
-        return False
+        now = self._now()
+        if block.owner != self._other:
+            self._other, self._beat, self._moved = block.owner, None, False
+        if self._beat is None or self._since_s is None:
+            self._beat, self._since_s = block.service_heartbeat, now
+        foreign = self.is_foreign(block)
+        self._phase = _Phase.WATCHING if foreign else _Phase.WATCHING_OWN
+        if block.service_heartbeat != self._beat:
+            # Beside our own number once may be a write of our former life that came late; a service moves it again.
+            if foreign or self._moved:
+                self._phase = _Phase.CONFLICT
+                return False
+            self._beat, self._since_s, self._moved = block.service_heartbeat, now, True
+        if now - self._since_s < (WATCH_S if foreign else WATCH_OWN_S):
+            return False
+        self._taken_over = self._taken_over or foreign
+        self._beats = deque([block.service_heartbeat], OWN_BEATS_KEPT)
+        return True

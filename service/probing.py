@@ -1,8 +1,9 @@
 """What a controller on the other end of the wire can do, measured for the one who puts it into operation.
 
-Reads stay within the configured blocks and one register beside the link block. Writes, only where they are asked for,
-stay within the service block and, under `transfer` = 0, the contour block; what stood there is put back. Nothing is
-written while another service is alive, nor while a page is being answered.
+Reads stay within the configured blocks and one register beside the link block; only where no program's heartbeat is
+seen there, the mailbox is looked for in all registers. Writes, only where they are asked for, stay within the service
+block and, under `transfer` = 0, the contour block; what stood there is put back. Nothing is written while another
+service is alive, nor while a page is being answered.
 """
 
 from __future__ import annotations
@@ -13,7 +14,13 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import dataclass, field, replace
 from statistics import median
 
-from drivers.controller import ControllerError, ControllerRefused, ControllerUnavailable
+from drivers.controller import (
+    ControllerError,
+    ControllerNonsense,
+    ControllerRefused,
+    ControllerTimeout,
+    ControllerUnavailable,
+)
 from drivers.controller.mailbox import BLOCK_REGISTERS, HEADER_REGISTERS, TEST_VALUE, MailboxLayout
 from drivers.controller.modbus import ModbusController
 from drivers.controller.requests import (
@@ -25,11 +32,11 @@ from drivers.controller.requests import (
     read_registers,
     registers_of,
     stream_of,
-    write_register,
     write_registers,
 )
 from service.beat import off_beat
-from service.link_signature import Registers, Signature, from_echo, from_movement
+from service.link_signature import Registers, Signature, from_echo, from_mailbox, from_movement
+from service.register_search import SURVEY_S, survey
 
 ROUND_TRIPS = 20
 OWNER_WATCH_S = 3.0  # as long as the protocol lets a service watch another's heartbeat
@@ -37,7 +44,11 @@ MOVEMENT_WATCH_S = 2.5  # a heartbeat changes at least once a second
 ECHO_WAIT_S = 3.0
 LOOK_PERIOD_S = 0.25
 HEADER = 1 + HEADER_REGISTERS
-NO_SUCH_REGISTER = 2  # exception code
+NO_SUCH_FUNCTION, NO_SUCH_REGISTER, NO_WAY_TO_IT = 1, 2, 10  # exception codes
+USUAL_UNITS = (255, 0, 1)  # over TCP: the device itself, by either name, and the first behind a gateway
+MOST_PLACES = 32  # that may hold a mailbox
+OTHER_VALUE = 0xFEFDFCFB  # as a test_value no half of its own or of its echo is one of the right value's
+TEAR_TURNS = 10
 
 
 @dataclass(frozen=True)
@@ -62,6 +73,8 @@ class Probe:
     sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
     now: Callable[[], float] = time.monotonic
     _trouble: ControllerError | None = None  # of the last read that failed
+    _searched: int = 0  # registers, for a mailbox that is elsewhere
+    _echoless: bool = False
 
     @property
     def layout(self) -> MailboxLayout:
@@ -73,6 +86,9 @@ class Probe:
         await self.controller.connect()
         yield Finding("connection", True, f"{self.controller}: it is open")
         linked = await self._reads(read_registers(self.layout.link_address, BLOCK_REGISTERS))
+        if not linked and (unit := await self._another_unit()):
+            yield unit
+            linked = await self._reads(read_registers(self.layout.link_address, BLOCK_REGISTERS))
         yield self._block("link block", self.layout.link_address, linked)
         served = await self._reads(read_registers(self.layout.service_address, BLOCK_REGISTERS))
         yield self._block("service block", self.layout.service_address, served)
@@ -80,11 +96,16 @@ class Probe:
             raise ControllerUnavailable("it answers nothing as it should; what else it can do was not tried")
         if linked:
             yield await self._round_trip()
+        ways = await self._movement()
+        if not ways and (elsewhere := await self._elsewhere()):
+            yield self._moving(elsewhere)
+            yield Finding("all else", False, "not tried: change the addresses, then probe again")
+            return
         longest_read = await self._longest_read()
         yield self._longest("read", longest_read, LONGEST_READ)
         readable = await self._readable(longest_read)
         yield self._window("readable", readable)
-        yield self._moving(await self._movement())
+        yield self._moving(ways)
         if not write:
             return
         if readable < HEADER or not served:
@@ -116,6 +137,30 @@ class Probe:
         if not self.controller.connected:
             await self.controller.connect()
         return await self.controller.run(requests)
+
+    async def _another_unit(self) -> Finding | None:
+        """The device id by which it answers, where it is another one; from here on it is asked by that."""
+        asked, trouble = self.controller.device_id, self._trouble
+        found: int | None = None
+        if isinstance(trouble, ControllerNonsense):
+            found = trouble.answered_as
+        elif isinstance(trouble, ControllerTimeout) or getattr(trouble, "code", None) == NO_WAY_TO_IT:
+            others = [] if self.controller.serial else [unit for unit in USUAL_UNITS if unit != asked]
+            found = await self._first_that_answers(others)
+        self.controller.device_id = asked if found is None else found
+        if found is None:
+            self._trouble = trouble
+            return None
+        self.changes["device_id"] = found
+        return Finding("device id", False, f"it answers as {found}, asked was {asked}")
+
+    async def _first_that_answers(self, units: list[int]) -> int | None:
+        for unit in units:
+            self.controller.device_id = unit
+            await self.controller.close()
+            if await self._reads(read_registers(self.layout.link_address, 1)) or self._lacks_registers:
+                return unit
+        return None
 
     def _block(self, name: str, address: int, registers: tuple[int, ...]) -> Finding:
         span = people(address, BLOCK_REGISTERS)
@@ -213,11 +258,31 @@ class Probe:
             await self.sleep(off_beat(len(looks)) * LOOK_PERIOD_S)
         return from_movement(looks, self.layout)
 
+    async def _elsewhere(self) -> list[Signature]:
+        """How the mailbox is seen at the one place in all registers where it is and its heartbeat moves, else []."""
+
+        async def read(first: int, count: int) -> tuple[int, ...]:
+            return await self._reads(read_registers(first, count))
+
+        until = self.now() + SURVEY_S
+        known = await survey(read, LONGEST_READ, self.layout.link_address, lambda: self.now() < until)
+        self._searched = len(known)
+        ways = from_mailbox(known, self.layout)[:MOST_PLACES]
+        blocks = [self.layout.link_address + way.shift for way in ways]
+        looks: list[Registers] = []
+        until = self.now() + MOVEMENT_WATCH_S
+        while blocks and self.now() < until:
+            looks.append({block + n: value for block in blocks for n, value in enumerate(await read(block, 16))})
+            await self.sleep(off_beat(len(looks)) * LOOK_PERIOD_S)
+        moving = from_movement(looks, self.layout, [way.shift for way in ways]) if looks else []
+        return [way for way in ways if len(moving) == 1 and way.shift == moving[0].shift]
+
     def _moving(self, ways: list[Signature]) -> Finding:
         if not ways:
             text = (
-                "nothing moves where the heartbeat should be: the controller's program does not run, or its blocks are "
-                "elsewhere. A controller that cannot answer at all takes handshake: none"
+                "nothing moves where the heartbeat should be, and no mailbox whose heartbeat moves is in the "
+                f"{self._searched} registers that can be read: the controller's program does not run, or does not fill "
+                "the link block. A controller that cannot answer at all takes handshake: none"
             )
             return Finding("heartbeat", False, text)
         return self._judged("heartbeat", ways[0], "moves")
@@ -226,7 +291,8 @@ class Probe:
         """What a signature asks to be changed."""
         texts = []
         if way.shift:
-            texts.append(f"it {verb} one register {self._shifted(way.shift)}")
+            distance = "one register" if abs(way.shift) == 1 else f"{abs(way.shift)} registers"
+            texts.append(f"it {verb} {distance} {self._shifted(way.shift)}")
         if way.word_order not in (None, self.layout.word_order):
             self.changes["word_order"] = way.word_order
             texts.append(f"32-bit values have the other order of words: {way.word_order}")
@@ -246,9 +312,8 @@ class Probe:
         if min(addresses.values()) < 0:
             return "below the configured 0, where no register is. Let its blocks begin one register later"
         self.changes.update(addresses)
-        if shift > 0:
-            return "higher than configured: the controller counts registers from 1"
-        return "lower than configured: the controller counts registers from 0"
+        why = {1: ": the controller counts registers from 1", -1: ": the controller counts registers from 0"}
+        return ("higher" if shift > 0 else "lower") + " than configured" + why.get(shift, "")
 
     # --- writing ------------------------------------------------------------------------------------------------
 
@@ -269,7 +334,10 @@ class Probe:
         try:
             yield await self._echo()
             if not self._renumbered:
-                await self.controller.write_transfer(0)
+                if "word_order" not in self.changes and not self._echoless:
+                    yield await self._tearing()
+                if single := await self._cleared():
+                    yield single
                 longest_write = await self._longest_write(longest_read, readable)
                 yield self._longest("write", longest_write, LONGEST_WRITE)
                 yield self._window("writable", await self._writable(longest_write, longest_read, readable))
@@ -302,6 +370,20 @@ class Probe:
         for start, count in _pieces(readable - 1, longest):
             registers += await self._reads(read_registers(self.layout.contour_address + 1 + start, count))
         return registers
+
+    async def _cleared(self) -> Finding | None:
+        """Write `transfer` = 0, by the function that the controller knows; a finding where it is another one."""
+        try:
+            await self.controller.write_transfer(0)
+        except ControllerRefused as error:
+            if error.code != NO_SUCH_FUNCTION or self.controller.single_write == "fc16":
+                raise
+        else:
+            return None
+        self.controller.single_write = "fc16"
+        await self.controller.write_transfer(0)
+        self.changes["single_write"] = "fc16"
+        return Finding("single write", False, "function code 6 is not known there; 16, of one register, is")
 
     async def _longest_write(self, longest_read: int, readable: int) -> int:
         most = min(LONGEST_WRITE, readable - 1)
@@ -355,16 +437,43 @@ class Probe:
             served = await self._reads(read_registers(layout.service_address, BLOCK_REGISTERS))
             known = {**dict(enumerate(served, start=layout.service_address)), **await self._look()}
             ways = from_echo(known, layout)
+        self._echoless = not ways
         if not ways:
             text = "test_echo never became test_value + 1, in any order of words or numbering known here"
             return Finding("test_echo", False, f"{text}. Check that the controller's program runs and computes it")
         return self._judged("test_echo", ways[0], "is computed")
 
+    async def _tearing(self) -> Finding:
+        """Whether 32-bit values are seen half written: `test_echo` is, as it follows a value of other halves."""
+        half_s, moved, beats, before = 0.0, False, set[int](), TEST_VALUE
+        for value in (OTHER_VALUE, TEST_VALUE) * (TEAR_TURNS // 2):
+            block = await self.controller.read_service()
+            await self.controller.write_service(replace(block, test_value=value))
+            until, torn_from = self.now() + ECHO_WAIT_S, None
+            while (link := await self.controller.read_link()).test_echo != value + 1:
+                if self.now() > until:
+                    text = f"test_echo does not follow, from {before + 1} to {value + 1}. Compute it as a 32-bit number"
+                    return Finding("32-bit values", False, text)
+                if link.test_echo != before + 1:
+                    torn_from = self.now() if torn_from is None else torn_from
+                    beats.add(link.controller_heartbeat)
+            if torn_from is not None:
+                half_s = max(half_s, self.now() - torn_from)
+                moved = moved or len(beats) > 1
+            beats.clear()
+            before = value
+        if not half_s:
+            return Finding("32-bit values", True, f"none was seen half written in {TEAR_TURNS} changes")
+        text = f"they stand half written for up to {1000 * half_s:.0f} ms"
+        if moved:
+            return Finding("32-bit values", False, f"{text}, and the heartbeat moves meanwhile. Let it wait for them")
+        return Finding("32-bit values", True, f"{text}, and the heartbeat waits for them, as it must")
+
     async def _put_back(self, held: tuple[int, ...], served: tuple[int, ...], longest: int) -> bool:
         """Write what stood there before, `transfer` stays 0; True where it reads back so."""
         alike = True
         if held and not self._renumbered:
-            await self._run(write_register(self.layout.contour_address, 0))
+            await self.controller.write_transfer(0)
             for start, count in _pieces(len(held), longest):
                 alike = await self._writes(1 + start, held[start : start + count], longest) and alike
         await self._run(write_registers(self.layout.service_address, stream_of(served)))

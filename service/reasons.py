@@ -167,8 +167,14 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
         Explanation("Погрешность контура больше, чем допускает рецепт.", "Проверьте свет, фокус и кромку заготовки."),
     ),
     Reason.OUTSIDE_WORK_AREA: (
-        Explanation("The contour leaves the machine's work area.", "Move the block into the work area."),
-        Explanation("Контур выходит за рабочую зону станка.", "Переложите заготовку в рабочую зону."),
+        Explanation(
+            "The contour leaves the machine's work area, or the part of the picture that the calibration covers.",
+            "Move the block into the work area, towards the middle of the camera's view.",
+        ),
+        Explanation(
+            "Контур выходит за рабочую зону станка или за часть снимка, охваченную калибровкой.",
+            "Переложите заготовку в рабочую зону, ближе к середине поля зрения камеры.",
+        ),
     ),
     Reason.SEVERAL_BLOCKS: (
         Explanation(

@@ -29,9 +29,10 @@ from service.state import State
 HEAD = """\
 # Register map
 
-All are holding registers: FC3 reads them, FC16 writes them, and FC6 the one named `transfer`. *Address* is the PDU
-address, counted from 0, as it goes on the wire; *4xxxxx* is the same register as most PLC programs number it. What each
-means in full, and in which order things are written, stands in the protocol; worked examples are in
+All are holding registers: FC3 reads them, FC16 writes them, and FC6 the one named `transfer` (`single_write: fc16` for
+controllers without FC6). *Address* is the PDU address, counted from 0, as it goes on the wire; *4xxxxx* is the same
+register as most PLC programs number it. What each means in full, and in which order things are written, stands in the
+protocol; worked examples are in
 [golden-vectors.json](golden-vectors.json). `combtrace register-map` prints this page for your configuration, and
 `combtrace probe` tells whether the controller is numbered as it says.
 """

@@ -47,6 +47,11 @@ class Reloader:
         self._use = use
         self._asked = asyncio.Event()
 
+    @property
+    def config(self) -> Config:
+        """The one in force."""
+        return self._config
+
     def ask(self) -> None:
         """Read it again soon."""
         self._asked.set()

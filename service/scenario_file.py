@@ -31,6 +31,15 @@ class Machine(Model):
     copy_scans: Annotated[int, Field(ge=1, le=10_000)] = Field(1, description="Scans over which a page is copied.")
     check_scans: Scans = Field(0, description="Scans from the copy to the answer: late answers.")
     stepwise: bool = Field(False, description="true: the fields of an answer are written one a scan.")
+    torn: bool = Field(
+        False,
+        description="true: `last_job`, `test_echo`, `clock` stand half written for a scan where both halves change.",
+    )
+    max_registers: int = Field(125, ge=16, le=125, description="Most registers in one request.")
+    write_single: bool = Field(True, description="false: no FC6; `transfer` comes by an FC16 of one register.")
+    answer_as: int | None = Field(
+        None, ge=0, le=255, description="Any device id is answered, as from this one; none = only its own."
+    )
 
 
 class Event(Model):

@@ -2,7 +2,8 @@
 
 Of one job, `before_sending` is called once, before the first request that carries any of it; `before_withdrawal` before
 the first request that takes it back. Both make it durable, so that a restart goes on where this left off. `on_stuck` is
-told why a withdrawal gets no decision; it goes on all the same.
+told why a withdrawal gets no decision; it goes on all the same. While another service writes to the controller, nothing
+is sent, and what the controller's block says is all that can end the job.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ from typing import NoReturn
 
 from drivers.controller import ControllerError, ControllerUnavailable
 from drivers.controller.mailbox import Answer, LinkBlock, Page
+from service.controller_clock import MODULUS
 from service.link import Link, LinkUnsteady
+from service.ownership import ForeignOwner
 from service.reasons import Outcome, Reason
 
 log = logging.getLogger("combtrace.transfer")
@@ -49,6 +52,42 @@ class Settlement:
     detail: str | None = None
 
 
+@dataclass(frozen=True)
+class Lifetime:
+    """Until when a job may be sent: by the monotonic clock, and by the machine's own, which a suspended machine keeps.
+
+    ends_at_s: monotonic. taken_at_s: Unix time, None where it is not known; lasts_s: from then on.
+    """
+
+    ends_at_s: float
+    taken_at_s: float | None = None
+    lasts_s: float = 0.0
+    now: Callable[[], float] = time.monotonic
+    unix: Callable[[], float] = time.time
+
+    @property
+    def left_s(self) -> float:
+        """Seconds that are left, 0 where it is over; so it is, too, where the machine's clock went back."""
+        left_s = self.ends_at_s - self.now()
+        if self.taken_at_s is not None:
+            age_s = self.unix() - self.taken_at_s
+            left_s = min(left_s, self.lasts_s - age_s if age_s >= 0 else 0.0)
+        return max(0.0, left_s)
+
+    @property
+    def over(self) -> bool:
+        """True where the job must not be sent, or sent again."""
+        return self.left_s == 0.0
+
+
+@dataclass(frozen=True)
+class Validity:
+    """What the controller accepts the contour by: `captured_at` and `valid_for`, ms on its clock; 0 = no limit."""
+
+    captured_at: int = 0
+    valid_for: int = 0
+
+
 class _Ended(Exception):
     """The controller's block settles the job: leaves the steps from wherever it was looked at."""
 
@@ -73,7 +112,7 @@ class TransferCounter:
 
 
 class Transfer:
-    """Brings one job to its end at the controller. `expires_at_s` is on the monotonic clock `now`."""
+    """Brings one job to its end at the controller. sent: a request of it may have been sent before."""
 
     def __init__(
         self,
@@ -85,13 +124,13 @@ class Transfer:
         session: int,
         pages: tuple[Page, ...],
         withdrawal: Page,
-        expires_at_s: float,
+        lifetime: Lifetime,
+        validity: Validity,
         before_sending: Callable[[], Awaitable[None]],
         before_withdrawal: Callable[[Reason], Awaitable[None]],
         on_stuck: Callable[[str], None] = lambda _why: None,
         sent: bool = False,
         beat: Callable[[], None] = lambda: None,
-        now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._link = link
         self._settings = settings
@@ -100,14 +139,17 @@ class Transfer:
         self._session = session
         self._pages = pages
         self._withdrawal = withdrawal
-        self._expires_at_s = expires_at_s
+        self._lifetime = lifetime
+        self._validity = validity
         self._before_sending = before_sending
         self._before_withdrawal = before_withdrawal
         self._on_stuck = on_stuck
         self._sent = sent
         self._beat = beat
-        self._now = now
+        self._now = lifetime.now
         self._withdrawn_for: tuple[Reason, str] | None = None
+        self._committed: int | None = None  # the last value that this transfer wrote, or may have written
+        self._overdue = False
         self._trouble = ""
 
     async def run(self) -> Settlement:
@@ -133,6 +175,9 @@ class Transfer:
                 try:
                     await self._gate()
                     await self._attempt(self._withdrawal)
+                except ForeignOwner as foreign:
+                    await self._stand_by(foreign)
+                    continue
                 except ControllerUnavailable:
                     await self._connected()
                 except ControllerError as error:
@@ -147,49 +192,76 @@ class Transfer:
     # --- step 7's conditions, "whenever else it looks" ----------------------------------------------------------
 
     async def _look(self) -> LinkBlock:
-        """The controller's block; raise _Ended where it settles the job."""
-        self._beat()
-        view = await self._link.look()
-        self._check_owner()
-        if view.session == 0:
-            return view
-        if view.last_job == self._job_id and view.last_result != 0:
-            if view.last_result == Answer.ACCEPTED and not await self._surely_ours():
-                return view
-            self._end_by(view.last_result)
-        if view.session != self._session:
-            raise _Ended(
-                Settlement(
-                    Outcome.FAILED,
-                    Reason.CONTROLLER_RESTARTED,
-                    f"session {view.session}, the job was for session {self._session}",
-                )
-            )
-        if view.last_job > self._job_id:
-            raise _Ended(
-                Settlement(
-                    Outcome.FAILED, Reason.OTHER_SERVICE, f"the controller's last job is {view.last_job} already"
-                )
-            )
+        """The controller's block, empty where it says nothing; raise _Ended by it, ForeignOwner by another service."""
+        view = await self._see()
+        if self._link.ownership.conflict:
+            self._link.ownership.check()
         return view
 
-    def _check_owner(self) -> None:
-        """Raise _Ended where another service writes to this controller: nothing more is sent, not even a withdrawal."""
-        ownership = self._link.ownership
-        if ownership.lost:
-            raise _Ended(Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, ownership.fault()))
+    async def _see(self) -> LinkBlock:
+        """The controller's block, empty where it says nothing; raise _Ended where it ends the job."""
+        self._beat()
+        view = await self._link.look()
+        if view.session == 0 or self._link.echo_fault(view) is not None:
+            return LinkBlock()  # it is being filled, or misread: nothing is concluded from it
+        if view.last_job == self._job_id and view.last_result != 0 and (self._link.holds or self._acknowledged(view)):
+            self._end_by(view.last_result)
+        if self._link.holds:
+            self._end_without(view)
+        return view
 
-    async def _surely_ours(self) -> bool:
-        """Whether `owner` lets the job be called accepted, False while it is being watched; raise _Ended by another's.
-
-        Two services may use the same number, and then `last_job` may speak of the other's contour.
-        """
-        if not self._link.ownership.ours:
+    def _acknowledged(self, view: LinkBlock) -> bool:
+        """True where the controller's answer to our own commit says the same as `last_result`: it was written after."""
+        if view.session != self._session or view.ack_transfer != self._committed:
             return False
-        if await self._link.owner_stands():
-            return True
-        detail = "another service's number stands in `owner`: whose contour was accepted is not known"
-        raise _Ended(Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, detail))
+        before = view.ack_result == Answer.ACCEPTED_BEFORE and view.last_result == Answer.ACCEPTED
+        return before or view.ack_result == view.last_result
+
+    def _end_without(self, view: LinkBlock) -> None:
+        """Raise _Ended where a block that holds says that the controller will never accept this job."""
+        foreign = self._link.ownership.fault() if self._link.ownership.conflict else None
+        if view.session != self._session:
+            text = f"session {view.session}, the job was for session {self._session}"
+            reason = Reason.CONTROLLER_RESTARTED if foreign is None else Reason.OTHER_SERVICE
+            raise _Ended(Settlement(Outcome.FAILED, reason, text))
+        if view.last_job > self._job_id:
+            text = f"the controller's last job is {view.last_job} already; it may have accepted this one before that"
+            raise _Ended(Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, text))
+        if foreign is None:
+            return
+        if self._overdue:
+            raise _Ended(Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, f"{foreign}; {self._why_over()}"))
+        self._overdue = self._is_over()  # `last_job` is read once more after that
+
+    def _is_over(self) -> bool:
+        """True where the controller will not accept what it holds of this job, by its clock; without one, by ours."""
+        if not self._validity.valid_for:
+            return self._lifetime.over
+        stamp = self._link.stamp()
+        if stamp is None or not stamp.clock_ms or stamp.session != self._session:
+            return False
+        passed_ms = (stamp.clock_ms - self._validity.captured_at) % MODULUS
+        return passed_ms > self._validity.valid_for + self._settings.ack_timeout_s * 1000
+
+    def _why_over(self) -> str:
+        if self._validity.valid_for:
+            return "the contour is too old to be accepted now"
+        return "it was waited for until job_timeout; the controller may have accepted it"
+
+    async def _stand_by(self, foreign: ForeignOwner) -> None:
+        """Only read until this service may write again; raise _Ended where the job's end is known before that."""
+        self._told(str(foreign))
+        ownership = self._link.ownership
+        while not ownership.ours:
+            if ownership.conflict and not self._sent:
+                raise _Ended(Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, ownership.fault()))
+            try:
+                await self._see()
+            except ControllerUnavailable:
+                await self._connected()
+            except ControllerError as error:
+                self._told(str(error))
+            await asyncio.sleep(self._settings.poll_period_s)
 
     def _end_by(self, last_result: int) -> NoReturn:
         if last_result == Answer.ACCEPTED:
@@ -217,13 +289,9 @@ class Transfer:
                 else:
                     self._told("the controller does not confirm the service block")
                     answer = None
-            except ControllerUnavailable as error:
-                self._told(str(error))
-                if not await self._reconnected():
+            except (ForeignOwner, ControllerUnavailable, LinkUnsteady) as error:  # it said nothing: no attempt in vain
+                if not await self._can_go_on(error):
                     return Reason.CONTROLLER_LOST, f"not back before the job expired: {error}"
-                continue
-            except LinkUnsteady as error:  # it said nothing: no attempt in vain; step 1 waits until it holds still
-                self._told(str(error))
                 continue
             except ControllerError as error:  # an exception response: a reply, so nothing was done
                 self._told(str(error))
@@ -240,36 +308,51 @@ class Transfer:
                     self._told(self._unconfirmed("answer 1 accepted"))
                 page = 0 if answer is Answer.PAGE_MISSING else page
                 in_vain += 1
-        reason = Reason.CONTROLLER_TIMEOUT if self._now() < self._expires_at_s else Reason.EXPIRED
+        reason = Reason.EXPIRED if self._lifetime.over else Reason.CONTROLLER_TIMEOUT
         return reason, f"{in_vain} attempts in vain, last: {self._trouble}"
+
+    async def _can_go_on(self, error: ControllerError) -> bool:
+        """True once it can be tried again; False where the job expired before that."""
+        if isinstance(error, ForeignOwner):
+            await self._stand_by(error)
+            return True
+        self._told(str(error))
+        return not isinstance(error, ControllerUnavailable) or await self._reconnected()
 
     async def _ready(self) -> tuple[Reason, str] | None:
         """Step 1: None when the controller is ready, else why the job is to be withdrawn."""
         give_up_at = self._now() + self._settings.ready_timeout_s
         while True:
             try:
-                await self._look()
-                why_not = self._link.controller_not_ready()
+                why_not = self._may_have_ended(await self._look()) or self._link.controller_not_ready()
             except LinkUnsteady as error:  # it said nothing: no attempt in vain
                 why_not = str(error)
-            now = self._now()
-            if now >= self._expires_at_s:
+            if not self._link.ownership.begun:  # what is watched at the start says nothing of the controller
+                give_up_at = self._now() + self._settings.ready_timeout_s
+            if self._lifetime.over:
                 return Reason.EXPIRED, why_not or "the contour became too old on its way"
             if why_not is None:
                 return None
-            if now >= give_up_at:
+            if self._now() >= give_up_at:
                 return Reason.CONTROLLER_TIMEOUT, f"{why_not} for {self._settings.ready_timeout_s:g} s"
             await asyncio.sleep(self._settings.poll_period_s)
 
     async def _gate(self) -> None:
         """Return when what is written will be read as it is meant; a controller that is not ready is no hindrance."""
         while True:
-            await self._look()
-            fault = self._link.fault()
+            fault = self._may_have_ended(await self._look()) or self._link.fault()
             if fault is None:
                 return
             self._told(fault)
             await asyncio.sleep(self._settings.poll_period_s)
+
+    def _may_have_ended(self, view: LinkBlock) -> str | None:
+        """Why nothing may be sent before the block holds: it seems to say that the job has ended."""
+        if view.session not in (0, self._session):
+            return f"session {view.session} instead of {self._session}: whether that holds is being watched"
+        if view.last_job > self._job_id or (view.last_job == self._job_id and view.last_result != 0):
+            return f"last_job is {view.last_job}: whether that holds is being watched"
+        return None
 
     async def _attempt(self, page: Page) -> Answer | None:
         """Steps 2 to 7 for one page: the controller's answer, None where there was none."""
@@ -286,6 +369,7 @@ class Transfer:
         view = self._link.view or await self._look()
         transfer = self._counter.next(view.ack_transfer)
         self._check_may_go_on(clean)
+        self._committed = transfer
         try:
             await controller.write_transfer(transfer)
         except ControllerUnavailable as error:  # it may have been done: go on with step 7
@@ -308,7 +392,7 @@ class Transfer:
 
     def _too_old(self) -> bool:
         """True where the contour must not be committed any more; a withdrawal never ages."""
-        if self._withdrawn_for is not None or self._now() < self._expires_at_s:
+        if self._withdrawn_for is not None or not self._lifetime.over:
             return False
         self._told("the contour became too old on its way")
         return True
@@ -367,7 +451,7 @@ class Transfer:
             await self._connected()
             return True
         try:
-            async with asyncio.timeout(max(0.0, self._expires_at_s - self._now())):
+            async with asyncio.timeout(self._lifetime.left_s):
                 await self._connected()
         except TimeoutError:
             return False
@@ -389,8 +473,7 @@ class Transfer:
         controller, page = self._link.controller, self._pages[0]
         transfer = self._counter.next(0)
         in_vain = 0
-        while in_vain < self._settings.max_repeats and self._now() < self._expires_at_s:
-            self._check_owner()
+        while in_vain < self._settings.max_repeats and not self._lifetime.over:
             try:
                 clean = await self._clear()
                 await self._about_to_send()
@@ -404,6 +487,10 @@ class Transfer:
                     return Settlement(Outcome.WRITTEN)
                 self._told("read-back differs from what was written: check contour_address and payload_capacity")
                 in_vain += 1
+            except ForeignOwner as foreign:
+                if self._link.ownership.conflict:
+                    return Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, str(foreign))
+                await asyncio.sleep(self._settings.poll_period_s)
             except ControllerUnavailable as error:
                 self._told(str(error))
                 if not await self._reconnected():

@@ -7,12 +7,12 @@ import logging
 import math
 from collections.abc import Awaitable, Callable, Coroutine
 from concurrent.futures import Executor as ThreadPool
-from typing import Any, Protocol, TypeVar
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 from drivers.trigger import LineTrigger, PulseTrigger, TriggerUnavailable
 from service.executor import Executor
 from service.health import Fault, Health
-from service.journal import Job, TriggerStamp
+from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.reasons import Outcome, Reason
 from service.trigger_lines import (
     Malformed,
@@ -33,7 +33,10 @@ log = logging.getLogger("combtrace.triggers")
 
 READ_TIMEOUT_S = 0.25  # how long a stop waits for the thread that reads
 RETRY_PAUSES_S = (0.2, 0.5, 1.0)
+MOST_OWED = 20  # ends told to a line that was away, the newest: whoever has missed more must look into the journal
 
+P = ParamSpec("P")
+R = TypeVar("R")
 T = TypeVar("T")
 
 
@@ -145,7 +148,11 @@ class SerialPulses:
 
 
 class SerialTrigger:
-    """Serves one serial line: `TRIG`, `STAT`, `PING`. The port may vanish and come back."""
+    """Serves one serial line: `TRIG`, `STAT`, `PING`. The port may vanish and come back, and so may the service.
+
+    The journal knows which jobs' ends are owed to the line: those of before a restart too, and those that ended while
+    the line was away. An end is crossed off once it is written: a kill in between has it told twice, never not at all.
+    """
 
     def __init__(
         self,
@@ -153,6 +160,7 @@ class SerialTrigger:
         name: str,
         executor: Executor,
         health: Health,
+        journal: Journal,
         status: Callable[[], str],
         pool: ThreadPool,
         *,
@@ -162,15 +170,28 @@ class SerialTrigger:
         self._name = name
         self._executor = executor
         self._health = health
+        self._journal = journal
         self._status = status
         self._pool = pool
         self._beat = beat
         self._replies: set[asyncio.Task[None]] = set()
+        self._look = asyncio.Event()
+        self._of_before = 0  # the highest number of jobs whose acknowledgement, if any, was somebody else's
+        self._acknowledged: set[int] = set()
+
+    def job_ended(self, job: Job) -> None:
+        """Told of each job's end, which may be owed to this line."""
+        if job.trigger.line == self._name:
+            self._look.set()
 
     async def run(self) -> None:
         """Serve the line for ever."""
+        last = await self._from_journal(self._journal.last_taken)
+        self._of_before = last.job_id if last else 0
         try:
-            await keep_open(self._port, self._name, self._health, self._pool, self._read, self._serve)
+            async with asyncio.TaskGroup() as group:
+                group.create_task(self._tell_ends())
+                await keep_open(self._port, self._name, self._health, self._pool, self._read, self._serve)
         finally:
             for task in self._replies:
                 task.cancel()
@@ -180,6 +201,7 @@ class SerialTrigger:
         return await asyncio.get_running_loop().run_in_executor(self._pool, self._port.read_line, READ_TIMEOUT_S)
 
     async def _serve(self, line: bytes | None) -> None:
+        self._look.set()
         while True:
             if line is not None:
                 await self._answer(line)
@@ -202,7 +224,7 @@ class SerialTrigger:
 
     async def _trigger(self, recipe: int | None) -> None:
         try:
-            taken = await self._executor.ask(TriggerStamp("serial", recipe or 0))
+            taken = await self._executor.ask(TriggerStamp("serial", recipe or 0, line=self._name))
         except TriggerRefused as refused:
             await self._send(nak(int(refused.reason), refused.reason.label))
             return
@@ -210,8 +232,15 @@ class SerialTrigger:
             await self._send(wait(taken.place))
             self._later(self._tell_its_turn(taken))
             return
-        await self._send(ack(taken.job.job_id))  # before the task exists that may tell the end
-        self._later(self._tell_the_end(taken))
+        await self._acknowledge(taken)
+
+    async def _acknowledge(self, ticket: Ticket) -> None:
+        """Only after that may its end be told, even where the acknowledgement found the line gone."""
+        try:
+            await self._send(ack(ticket.job.job_id))
+        finally:
+            self._acknowledged.add(ticket.job.job_id)
+            self._look.set()
 
     def _later(self, telling: Coroutine[Any, Any, None]) -> None:
         task = asyncio.get_running_loop().create_task(telling)
@@ -220,21 +249,57 @@ class SerialTrigger:
 
     async def _tell_its_turn(self, queued: Queued) -> None:
         try:
-            ticket = await asyncio.shield(queued.ticket)
-        except TriggerRefused as refused:
-            await self._send_if_there(nak(int(refused.reason), refused.reason.label))
-            return
-        await self._send_if_there(ack(ticket.job.job_id))
-        await self._tell_the_end(ticket)
-
-    async def _tell_the_end(self, ticket: Ticket) -> None:
-        await self._send_if_there(result_line(await asyncio.shield(ticket.settled)))
-
-    async def _send_if_there(self, text: str) -> None:
-        try:
-            await self._send(text)
+            try:
+                ticket = await asyncio.shield(queued.ticket)
+            except TriggerRefused as refused:
+                await self._send(nak(int(refused.reason), refused.reason.label))
+            else:
+                await self._acknowledge(ticket)
         except TriggerUnavailable as error:
-            log.warning("serial %s: could not tell %r: %s", self._name, text, error)
+            log.warning("serial %s: a trigger that waited could not be answered: %s", self._name, error)
+
+    async def _tell_ends(self) -> None:
+        """Tell the line, for ever, how its jobs have ended; what finds it gone is told when it is back."""
+        while True:
+            await self._look.wait()
+            self._look.clear()
+            try:
+                await self._tell_owed()
+            except TriggerUnavailable as error:
+                log.warning("serial %s: the end of a job could not be told yet: %s", self._name, error)
+
+    async def _tell_owed(self) -> None:
+        owed = [
+            job
+            for job in await self._from_journal(self._journal.owed, self._name)
+            if job.job_id <= self._of_before or job.job_id in self._acknowledged
+        ]
+        if given_up := [job.job_id for job in owed[:-MOST_OWED]]:
+            span = f"{given_up[0]} to {given_up[-1]}"
+            log.warning(
+                "serial %s: was away; %d ends are not told any more, of jobs %s", self._name, len(given_up), span
+            )
+            await self._cross_off(given_up)
+        for job in owed[-MOST_OWED:]:
+            await self._send(result_line(job))
+            await self._cross_off([job.job_id])
+
+    async def _cross_off(self, job_ids: list[int]) -> None:
+        await self._from_journal(self._journal.told, job_ids)
+        self._acknowledged.difference_update(job_ids)
+
+    async def _from_journal(self, access: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+        """Read or write the journal, again and again until it is done."""
+        trouble = ""
+        while True:
+            try:
+                return await asyncio.to_thread(access, *args, **kwargs)
+            except JournalError as error:
+                if str(error) != trouble:
+                    log.warning("serial %s: what is owed to it: %s", self._name, error)
+                trouble = str(error)
+                self._beat()
+                await asyncio.sleep(RETRY_PAUSES_S[-1])
 
     async def _send(self, text: str) -> None:
         await asyncio.get_running_loop().run_in_executor(None, self._port.write_line, text)

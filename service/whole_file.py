@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+
+# What a disk says that takes no writes now, which may pass: full, read-only, failing.
+REFUSALS = frozenset({errno.ENOSPC, errno.EROFS, errno.EDQUOT, errno.EIO, errno.ESTALE})
 
 
 def write_whole(path: Path, data: bytes, mode: int | None = None) -> None:
@@ -30,11 +34,16 @@ def write_whole(path: Path, data: bytes, mode: int | None = None) -> None:
     finally:
         with suppress(FileNotFoundError):
             os.unlink(beside)
-    folder = os.open(target.parent, os.O_RDONLY)
+    sync_folder(target.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make durable which files are in the folder, and under which names; raise OSError."""
+    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        os.fsync(folder)
+        os.fsync(number)
     finally:
-        os.close(folder)
+        os.close(number)
 
 
 def file_mode(target: Path) -> int:

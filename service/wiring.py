@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import logging
-import os
 import secrets
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -45,12 +44,12 @@ from service.config import SerialTrigger as SerialTriggerSettings
 from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation, Plan
 from service.daemon import Parts
 from service.executor import Executor
-from service.health import Fault, Health
+from service.health import Fault, Health, journal_fault
 from service.journal import Journal, JournalError, TriggerStamp
-from service.journal_recovery import open_journal
 from service.link import Link, LinkSettings
-from service.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
+from service.lock import LockError, network_names, serial_name
 from service.measure import Measurer
+from service.opening import DiskRefuses, Opening, stand_in
 from service.reasons import Reason
 from service.recipe_exports import trial
 from service.reload import BadPlan, Reloader
@@ -65,6 +64,10 @@ from service.triggers import SerialPulses, SerialTrigger, interval_trigger
 
 log = logging.getLogger("combtrace.daemon")
 
+TARGET_KEYS = {
+    *("kind", "host", "port", "device_id", "word_order", "handshake", "mode"),
+    *("link_address", "service_address", "contour_address", "payload_capacity"),
+}
 BURST_SILENCE_S = 0.2
 LEVEL_HOLDS_S = 0.05
 
@@ -88,22 +91,26 @@ def build(
     path: Path | None = None,
     observe: Callable[[Observation], None] = lambda _observation: None,
     instead: Instead | None = None,
+    opening: Opening | None = None,
 ) -> Parts:
     """The daemon's parts; raise WiringError. Must be called in the event loop's thread.
 
     path: the configuration's file, to be read again when asked; None = never.
+    opening: of this configuration; while its disk refuses writes the parts are those of a service that only tells so,
+    and ends once they can be built anew. None = that is an error.
     """
     if instead is None:
         (plan, calibration_fault), camera = _make_plan(config), make_camera(config)
     else:
         plan, calibration_fault = _plan_of(instead.measurer, config), None
         camera = instead.camera
-    lock, journal = _make_journal(config)
-    link = _make_link(config, instead.listen if instead else lambda controller: controller)
+    lock, journal, refused = _make_journal(config, opening)
+    link = None if refused else _make_link(config, instead.listen if instead else lambda controller: controller)
     health = Health(StateMachine(_publisher(link)))
     health.report("calibration", calibration_fault)
+    health.report("journal", refused.fault if refused else _not_written(journal))
     pool = ThreadPoolExecutor(1, "camera")
-    archive = _make_archive(config)
+    archive = _make_archive(config, journal)
     _tell_exports(config)
     notifier = Notifier()
     watchdog = Watchdog(notifier)
@@ -118,7 +125,7 @@ def build(
         cycle_settings(config),
         pool,
         observe=observe,
-        keep=archive.keep if archive is not None else lambda _evidence: None,
+        keeper=archive,
         beat=partial(watchdog.beat, "jobs"),
     )
     kinds = {type(trigger) for trigger in config.triggers}
@@ -137,6 +144,7 @@ def build(
     if link is not None:
         link.on_look = executor.wake
     parts = Parts(camera, journal, health, executor, link, pool, lock, notifier=notifier, watchdog=watchdog)
+    parts.opening = lock if refused else None
     parts.state_dir = config.service.state_dir
     parts.archive = archive
     parts.storage = StorageWatch(
@@ -262,37 +270,44 @@ def _tell_exports(config: Config) -> None:
                 log.warning("recipe %d will not be exported: %s", recipe.number, text)
 
 
-def _make_archive(config: Config) -> ArchiveWriter | None:
+def _make_archive(config: Config, journal: Journal) -> ArchiveWriter | None:
     settings = config.archive
     if not settings.max_bytes:
         return None
-    return ArchiveWriter(Archive(settings.path, ArchiveLimits(settings.max_bytes, settings.min_free_bytes)))
+    limits = ArchiveLimits(settings.max_bytes, settings.min_free_bytes)
+    in_flight = [job.job_id for job in journal.unsettled()]
+    return ArchiveWriter(Archive(settings.path, limits), journal.find, in_flight)
 
 
-def _make_journal(config: Config) -> tuple[Locks, Journal]:
-    locks = Locks()
-    state_lock = config.service.state_dir / "combtrace.lock"
-    ran_before = os.path.exists(state_lock)
-    state: Lock | None = None
+def opening_of(config: Config) -> Opening:
+    """What takes the configuration's locks and opens its journal."""
+    names = partial(controller_names, config)
+    return Opening(config.service.state_dir, config.journal.path, config.archive.path, names)
+
+
+def _make_journal(config: Config, opening: Opening | None) -> tuple[Opening, Journal, DiskRefuses | None]:
+    """The locks and the journal, or one that stands in for it while a disk refuses writes, and what it refused."""
+    held = opening or opening_of(config)
     try:
-        state = Lock(state_lock)
-        locks.add(state)
-        locks.add(journal_lock(config.journal.path))
-        for name in controller_names(config):
-            locks.add(NameLock(name))
-        journal = open_journal(config.journal.path, config.archive.path, ran_before=ran_before)
+        journal = held.journal()
+    except DiskRefuses as refused:
+        if opening is not None:
+            return held, stand_in(), refused
+        held.release()
+        raise WiringError(str(refused)) from refused
     except (LockError, JournalError) as error:
-        if state is not None and not ran_before:  # or the next start would take a journal that never was for lost
-            state.leave_no_file()
-        locks.release()
+        held.release()
         raise WiringError(str(error)) from error
+    return held, journal, None
+
+
+def _not_written(journal: Journal) -> Fault | None:
+    """The fault of a journal that can be read and, as on a full disk, not be written."""
     try:
-        _observe_settles_nothing(config, journal)
-    except WiringError:
-        journal.close()
-        locks.release()
-        raise
-    return locks, journal
+        journal.probe()
+    except JournalError as error:
+        return journal_fault(error)
+    return None
 
 
 def controller_names(config: Config) -> list[str]:
@@ -304,16 +319,6 @@ def controller_names(config: Config) -> list[str]:
         return []
     unit = settings.device_id if isinstance(settings, ModbusTcp) else None
     return network_names(settings.host, settings.port, unit)
-
-
-def _observe_settles_nothing(config: Config, journal: Journal) -> None:
-    """Raise WiringError where a job is in flight at the controller, which only a service that writes can settle."""
-    sent = [job.job_id for job in journal.unsettled() if job.sent]
-    if sent and not isinstance(config.controller, NoController) and config.controller.mode == "observe":
-        raise WiringError(
-            f"{config.journal.path}: job {sent[0]} is in flight at the controller, and mode observe cannot settle it. "
-            "Run once with mode send, or give this one its own journal.path and service.state_dir"
-        )
 
 
 def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:
@@ -370,7 +375,7 @@ def make_controller(config: Config) -> modbus.ModbusController | None:
     layout = mailbox_layout(config)
     assert layout is not None
     limits = modbus.RequestLimits(settings.longest_write, settings.longest_read)
-    shared = settings.device_id, layout, settings.timeout_s, limits
+    shared = settings.device_id, layout, settings.timeout_s, limits, settings.single_write
     if isinstance(settings, ModbusTcp):
         return modbus.ModbusTcpController(settings.host, settings.port, *shared)
     if isinstance(settings, ModbusRtuOverTcp):
@@ -400,7 +405,9 @@ def cycle_settings(config: Config) -> CycleSettings:
     """The bounds of a job."""
     settings = config.controller
     if isinstance(settings, NoController):
-        return CycleSettings(default_recipe=config.default_recipe, camera_timeout_s=config.camera.timeout_s)
+        return CycleSettings(
+            default_recipe=config.default_recipe, camera_timeout_s=config.camera.timeout_s, target=_target(config)
+        )
     return CycleSettings(
         camera_timeout_s=config.camera.timeout_s,
         default_recipe=config.default_recipe,
@@ -416,7 +423,13 @@ def cycle_settings(config: Config) -> CycleSettings:
             max_repeats=settings.max_repeats,
             poll_period_s=settings.poll_period_s,
         ),
+        target=_target(config),
     )
+
+
+def _target(config: Config) -> dict[str, str | int]:
+    """Which controller it is and how it is laid out: the keys that must not change while a job is in flight there."""
+    return config.controller.model_dump(mode="json", include=TARGET_KEYS)
 
 
 def find_table(config: Config) -> TableRecord | None:
@@ -489,14 +502,17 @@ def _serial(parts: Parts, trigger: SerialTriggerSettings) -> Callable[[], Awaita
     shared = parts.executor, parts.health
     parts.ports.append(trigger.port)
     if trigger.mode == "text":
-        return SerialTrigger(
+        line = SerialTrigger(
             SerialLineTrigger(trigger.port, trigger.baudrate),
             trigger.port,
             *shared,
+            parts.journal,
             lambda: status_line(parts.health, parts.executor.settled_job, parts.executor.missed),
             parts.serial_pool,
             beat=beat,
-        ).run
+        )
+        parts.executor.on_settled.append(line.job_ended)
+        return line.run
     stamp = TriggerStamp(trigger.mode)
     return SerialPulses(make_pulses(trigger), trigger.port, stamp, *shared, parts.serial_pool, beat=beat).run
 

@@ -63,7 +63,7 @@ class Controller(Protocol):
         """Write the service's block whole, one FC16."""
 
     async def write_transfer(self, transfer: int) -> None:
-        """Write the commit register alone, FC6."""
+        """Write the commit register alone."""
 
     async def write_page(self, page: Page) -> None:
         """Write payload and header without the commit register, in as few FC16 as the limit allows."""

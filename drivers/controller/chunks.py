@@ -23,6 +23,14 @@ def page_starts(header: Sequence[int], payload_length: int) -> list[int]:
     return [*_HEADER_STARTS, *table, *range(table_end, end, REGISTERS_PER_POINT), end]
 
 
+def header_spans(longest: int) -> list[tuple[int, int]]:
+    """Offset and count of the requests that read the header, `transfer` with it; every count is even.
+
+    `line_check.py` tells its own reads from these by their odd counts.
+    """
+    return spans([0, *_HEADER_STARTS, PAYLOAD_OFFSET], longest // 2 * 2)
+
+
 def spans(starts: Sequence[int], longest: int) -> list[tuple[int, int]]:
     """Offset and count of the fewest requests of at most `longest` registers that cover `starts[0]` to `starts[-1]`."""
     cut = []

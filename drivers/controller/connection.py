@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import copy
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -31,9 +32,9 @@ EXCEPTION_NAMES = {
     11: "gateway target device did not respond",
 }
 NEXT_STEPS = {
-    1: "The controller must know function codes 3, 6 and 16",
+    1: "The controller must know function codes 3, 6 and 16; for one without 6 set single_write: fc16",
     2: "Check link_address, service_address, contour_address and payload_capacity",
-    3: "Check payload_capacity, and the controller's limit of registers in one request",
+    3: "Check payload_capacity, and the controller's limit of registers in one request, which must be 16 or more",
     10: "Check the gateway and device_id",
     11: "Check the gateway, the line behind it, and device_id",
 }
@@ -260,7 +261,9 @@ class Connection:
             self._take(data)
         except ControllerNonsense as error:
             next_step = HEARS_ITSELF if self._hears_itself() else self._wire.mismatch
-            self.end(ControllerNonsense(f"{self.name}: {error}. {next_step}"))
+            if error.answered_as is not None:
+                next_step = f"If that is the controller, set device_id: {error.answered_as}"
+            self.end(ControllerNonsense(f"{self.name}: {error}. {next_step}", error.answered_as))
         self._wait_in_place()
 
     def _take(self, data: bytes) -> None:
@@ -320,4 +323,4 @@ class Connection:
 
 def _again(fault: ControllerUnavailable) -> ControllerUnavailable:
     """The fault anew: one exception object must not be raised in several tasks."""
-    return type(fault)(str(fault))
+    return copy.copy(fault)

@@ -36,7 +36,14 @@ class ControllerRefused(ControllerError):
 
 
 class ControllerNonsense(ControllerUnavailable):
-    """A reply that does not match its request (class, unit, address, count): nothing on this connection counts."""
+    """A reply that does not match its request (class, unit, address, count): nothing on this connection counts.
+
+    answered_as: the device id that it came from, where all that is wrong so far is that it is another one.
+    """
+
+    def __init__(self, message: str, answered_as: int | None = None) -> None:
+        super().__init__(message)
+        self.answered_as = answered_as
 
 
 class MailboxError(ControllerError):

@@ -34,10 +34,11 @@ class Frames(Protocol):
 class TcpFrames:
     """Modbus TCP: the MBAP header in front, a new transaction for each request."""
 
-    def __init__(self, device_id: int) -> None:
-        self._device_id = _checked(device_id)
+    def __init__(self, device_id: int, transaction: int = 0) -> None:
+        """transaction: the number before the first one's."""
+        self._device_id = _checked(device_id, 0)
         self._library = FramerSocket(DecodePDU(False))
-        self._transaction = 0
+        self._transaction = transaction
         self._request = NOTHING
         self._head = b""
         self._length = 0
@@ -66,7 +67,7 @@ class RtuFrames:
     """Modbus RTU: the device id in front, a CRC behind. Nothing says which request a reply belongs to."""
 
     def __init__(self, device_id: int) -> None:
-        self._device_id = _checked(device_id)
+        self._device_id = _checked(device_id, 1)
         self._library = FramerRTU(DecodePDU(False))
         self._request = NOTHING
 
@@ -87,7 +88,8 @@ class RtuFrames:
 NOTHING = Request(b"\0", b"\0", 1)
 
 
-def _checked(device_id: int) -> int:
-    if not 1 <= device_id <= 255:
-        raise MailboxError(f"device_id is {device_id}, expected 1 to 255 (0 is a broadcast, which is never answered)")
+def _checked(device_id: int, lowest: int) -> int:
+    if not lowest <= device_id <= 255:
+        why = " (0 is a broadcast, which is never answered)" if lowest else ""
+        raise MailboxError(f"device_id is {device_id}, expected {lowest} to 255{why}")
     return device_id

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from drivers.controller.connection import Connection
 from drivers.controller.errors import ControllerRefused
-from drivers.controller.requests import read_registers
+from drivers.controller.requests import SHORTEST_LIMIT, read_registers
 
 # USB adapters hand on bytes in packets up to 16 ms apart; a serial server may collect them for longer.
 SILENCE_S = 0.05
-# All other reads are of 16 registers, of 31 (a header), or of an even number (payload).
-BARRIER_COUNTS = tuple(range(1, 31, 2))
+# All other reads are of an even number of registers.
+BARRIER_COUNTS = tuple(range(1, SHORTEST_LIMIT, 2))
 
 
 async def check_line(connection: Connection, contour_address: int, turn: int, timeout_s: float) -> None:

@@ -7,7 +7,7 @@ import secrets
 import struct
 from collections.abc import Sequence
 
-from drivers.controller.chunks import PAYLOAD_OFFSET, page_starts, spans
+from drivers.controller.chunks import PAYLOAD_OFFSET, header_spans, page_starts, spans
 from drivers.controller.connection import Connection
 from drivers.controller.errors import ControllerNonsense, ControllerUnavailable, MailboxError
 from drivers.controller.library_log import cap_library_log
@@ -26,6 +26,7 @@ from drivers.controller.mailbox import (
 from drivers.controller.requests import (
     Request,
     RequestLimits,
+    SingleWrite,
     read_registers,
     registers_of,
     stream_of,
@@ -61,15 +62,21 @@ class ModbusController:
         layout: MailboxLayout | None = None,
         timeout_s: float = 1.0,
         limits: RequestLimits | None = None,
+        single_write: SingleWrite = "fc6",
     ) -> None:
+        """single_write: the function by which the commit register is written.
+
+        Both it and `device_id` may be changed; another device id counts from the next connection on.
+        """
         cap_library_log()
         wire.frames(device_id)  # MailboxError: a device id that none can have
         self._wire = wire
-        self._device_id = device_id
+        self.device_id = device_id
         self._layout = layout or MailboxLayout()
         self._read_link = (read_registers(self._layout.link_address, BLOCK_REGISTERS),)
         self._read_service = (read_registers(self._layout.service_address, BLOCK_REGISTERS),)
         self._timeout_s = timeout_s
+        self.single_write = single_write
         self._limits = limits or RequestLimits()
         if wire.pace.byte_s:
             self._limits = self._limits.within(LONGEST_EXCHANGE_S / wire.pace.byte_s)
@@ -80,7 +87,7 @@ class ModbusController:
         self._barriers = secrets.randbelow(1000)  # another place in their row than that of a process just killed
 
     def __str__(self) -> str:
-        return f"{self._wire.name} device {self._device_id}"
+        return f"{self._wire.name} device {self.device_id}"
 
     @property
     def connected(self) -> bool:
@@ -101,6 +108,11 @@ class ModbusController:
         """Close the connection; never raises."""
         self._closings += 1
         self._drop("closed by this side")
+
+    @property
+    def serial(self) -> bool:
+        """True on a line, where device id 0 is a broadcast."""
+        return self._wire.serial
 
     @property
     def layout(self) -> MailboxLayout:
@@ -137,10 +149,14 @@ class ModbusController:
         await self._held().run([write_registers(self._layout.service_address, stream_of(registers))])
 
     async def write_transfer(self, transfer: int) -> None:
-        """Write the commit register alone, FC6."""
+        """Write the commit register alone, by FC6, or FC16 where the controller knows no other."""
         if not 0 <= transfer <= 0xFFFF:
             raise MailboxError(f"transfer is {transfer}, expected 0 to 65535")
-        await self._held().run([write_register(self._layout.contour_address, transfer)])
+        address = self._layout.contour_address
+        by_fc6 = self.single_write == "fc6"
+        await self._held().run(
+            [write_register(address, transfer) if by_fc6 else write_registers(address, stream_of((transfer,)))]
+        )
 
     async def write_page(self, page: Page) -> None:
         """Write payload and header without the commit register, in as few FC16 as the limit allows."""
@@ -158,8 +174,10 @@ class ModbusController:
         self._check_payload_length(payload_length)
         connection = self._held()
         first = self._layout.contour_address
-        (reply,) = await connection.run([read_registers(first + 1, HEADER_REGISTERS)])
-        header = registers_of(reply)
+        replies = await connection.run(
+            [read_registers(first + offset, count) for offset, count in header_spans(self._limits.read)]
+        )
+        header = tuple(register for reply in replies for register in registers_of(reply))[1:]
         starts = [start for start in page_starts(header, payload_length) if start >= PAYLOAD_OFFSET]
         reads = [read_registers(first + offset, count) for offset, count in spans(starts, self._limits.read)]
         replies = await connection.run(reads)
@@ -170,9 +188,7 @@ class ModbusController:
     async def _checked(self, closings: int) -> Connection:
         """A new connection on which no late reply can come."""
         for left in reversed(range(LATE_REPLIES)):
-            connection = Connection(
-                self._wire, await self._wire.open(self._timeout_s), self._device_id, self._timeout_s
-            )
+            connection = Connection(self._wire, await self._wire.open(self._timeout_s), self.device_id, self._timeout_s)
             self._opening = connection
             try:
                 self._check_still_wanted(closings)
@@ -243,8 +259,9 @@ class ModbusTcpController(ModbusController):
         layout: MailboxLayout | None = None,
         timeout_s: float = 1.0,
         limits: RequestLimits | None = None,
+        single_write: SingleWrite = "fc6",
     ) -> None:
-        super().__init__(TcpWire(host, port), device_id, layout, timeout_s, limits)
+        super().__init__(TcpWire(host, port), device_id, layout, timeout_s, limits, single_write)
 
 
 class ModbusRtuController(ModbusController):
@@ -257,8 +274,9 @@ class ModbusRtuController(ModbusController):
         layout: MailboxLayout | None = None,
         timeout_s: float = 1.0,
         limits: RequestLimits | None = None,
+        single_write: SingleWrite = "fc6",
     ) -> None:
-        super().__init__(RtuWire(line), device_id, layout, timeout_s, limits)
+        super().__init__(RtuWire(line), device_id, layout, timeout_s, limits, single_write)
 
 
 class ModbusRtuOverTcpController(ModbusController):
@@ -272,6 +290,7 @@ class ModbusRtuOverTcpController(ModbusController):
         layout: MailboxLayout | None = None,
         timeout_s: float = 1.0,
         limits: RequestLimits | None = None,
+        single_write: SingleWrite = "fc6",
         baudrate: int = 9600,
     ) -> None:
-        super().__init__(RtuOverTcpWire(host, port, baudrate), device_id, layout, timeout_s, limits)
+        super().__init__(RtuOverTcpWire(host, port, baudrate), device_id, layout, timeout_s, limits, single_write)

@@ -22,6 +22,7 @@ from drivers.controller.requests import (
 MBAP_HEADER = struct.Struct(">HHHB")  # transaction, protocol, bytes that follow (unit included), unit
 _UP_TO_LENGTH = 6
 _CRC_LENGTH = 2
+_THE_DEVICE_ITSELF = frozenset({0, 255})  # behind no gateway: V1.0b, 4.4.2.2; some answer one as the other
 
 
 def check_tcp(request: Request, transaction: int, device_id: int, received: bytes) -> bytes | None:
@@ -34,7 +35,8 @@ def check_tcp(request: Request, transaction: int, device_id: int, received: byte
     seen_transaction, protocol, length, unit = MBAP_HEADER.unpack_from(received)
     _must_be("protocol identifier", protocol, 0)
     _must_be("transaction", seen_transaction, transaction)
-    _must_be("device id", unit, device_id)
+    if unit != device_id and not {unit, device_id} <= _THE_DEVICE_ITSELF:
+        raise ControllerNonsense(f"the reply's device id is {unit}, expected {device_id}", unit)
     _must_be("length", length, 1 + _pdu_length(request, received[MBAP_HEADER.size]))
     if len(received) < _UP_TO_LENGTH + length:
         return None

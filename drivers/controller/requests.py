@@ -8,6 +8,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from drivers.controller.errors import MailboxError
 
@@ -18,7 +19,9 @@ EXCEPTION = 0x80
 LONGEST_WRITE = 123  # registers in one FC16
 LONGEST_READ = 125  # registers in one FC3
 EXCEPTION_LENGTH = 2  # bytes of an exception's PDU
-SHORTEST_LIMIT = 32  # the page's header is read by one request, which `line_check.py` relies on
+SingleWrite = Literal["fc6", "fc16"]
+SHORTEST_LIMIT = 16  # a block of 16 goes in one request: the protocol has the service block written whole
+SHORTEST_FOR_PACE = 32  # on however slow a line; shorter ones are mostly overhead
 WRITE_OVERHEAD = 17  # bytes of an FC16 and its reply on RTU beside the registers: 9 and 8
 READ_OVERHEAD = 13  # of an FC3 and its reply: 8 and 5
 
@@ -33,17 +36,20 @@ class RequestLimits:
     def __post_init__(self) -> None:
         for name, seen, largest in (("write", self.write, LONGEST_WRITE), ("read", self.read, LONGEST_READ)):
             if not SHORTEST_LIMIT <= seen <= largest:
-                raise MailboxError(f"longest_{name} is {seen}, expected {SHORTEST_LIMIT} to {largest} registers")
+                raise MailboxError(
+                    f"longest_{name} is {seen}, expected {SHORTEST_LIMIT} to {largest} registers: "
+                    f"blocks of {SHORTEST_LIMIT} go whole"
+                )
 
     def within(self, line_bytes: float) -> RequestLimits:
         """These, or shorter ones, so that an RTU request and its reply together have at most `line_bytes`.
 
-        None is shorter than `SHORTEST_LIMIT`, on however slow a line.
+        Its pace alone makes none shorter than `SHORTEST_FOR_PACE`.
         """
         write, read = (int(line_bytes - overhead) // 2 for overhead in (WRITE_OVERHEAD, READ_OVERHEAD))
         return RequestLimits(
-            min(self.write, max(write, SHORTEST_LIMIT)),
-            min(self.read, max(read, SHORTEST_LIMIT)),
+            min(self.write, max(write, SHORTEST_FOR_PACE)),
+            min(self.read, max(read, SHORTEST_FOR_PACE)),
         )
 
 

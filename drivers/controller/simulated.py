@@ -4,7 +4,7 @@ Written from the protocol's text with its own page assembly; of the codec it kno
 
 What it does not model:
 - scans and requests are atomic to each other: what one request writes is never seen half written (a page of several
-  requests is, and `Pace` makes copies of it that are torn);
+  requests is; `Pace` makes copies of it that are torn, and tears the link block's 32-bit values);
 - nothing is cut: the machine is busy only when it is told so, and limits of travel are not known to it;
 - retained memory outlives a killed process, not a power cut in the midst of a disk write;
 - on a serial line no connection is seen, so heartbeats are not judged there; bytes are paced by the port alone, frames
@@ -16,6 +16,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -36,11 +37,19 @@ from drivers.controller.simulated_program import (
 from drivers.controller.simulated_server import RegisterServer
 from drivers.controller.simulated_verdict import Verdict
 from drivers.controller.simulated_watch import ClientWatch
-from drivers.controller.simulated_window import RegisterWindow
+from drivers.controller.simulated_window import RegisterWindow, ServerLimits
 
 NO_SUCH_DEVICE = 11  # exception: gateway target device did not respond
 
-__all__ = ["AcceptedContour", "FaultPlan", "Pace", "SimulatedController", "TriggerNotPossible", "Verdict"]
+__all__ = [
+    "AcceptedContour",
+    "FaultPlan",
+    "Pace",
+    "ServerLimits",
+    "SimulatedController",
+    "TriggerNotPossible",
+    "Verdict",
+]
 
 
 class SimulatedController:
@@ -56,6 +65,7 @@ class SimulatedController:
     judge: 1 accepted, 4 geometry refused or 7 operator refused, for a contour that is otherwise in order.
     faults: what befalls which requests.
     pace: how many scans it takes for a page.
+    limits: what its server takes.
     on_accepted: gets each accepted contour once, after it is in memory. Killed between the two, the next start hands
         the contour on; killed right after it, that start hands it on again: who must not act twice keeps the job_id.
     """
@@ -77,6 +87,7 @@ class SimulatedController:
         judge: Judge = judge_by_geometry,
         faults: FaultPlan | None = None,
         pace: Pace | None = None,
+        limits: ServerLimits | None = None,
         on_accepted: Callable[[AcceptedContour], None] = lambda contour: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -89,7 +100,8 @@ class SimulatedController:
         self._host = host
         self._port = self._used_port = port
         self._serial: tuple[str, int] | None = None
-        self._device_id = device_id
+        self._limits = limits or ServerLimits()
+        self._device_id = device_id if self._limits.answer_as is None else self._limits.answer_as
         self._layout = layout or MailboxLayout()
         self._memory = RetainedMemory(memory_path)
         self._session_source = session_source or self._memory.count_session
@@ -99,8 +111,8 @@ class SimulatedController:
         self._on_accepted = on_accepted
         self._now = now
         self._registers = [0] * REGISTERS
-        self._watch = ClientWatch(self._layout, self.verdict)
-        self._window = RegisterWindow(self._registers, self._layout, self._watch)
+        self._watch = ClientWatch(self._layout, self.verdict, write_single=self._limits.write_single)
+        self._window = RegisterWindow(self._registers, self._layout, self._watch, self._limits)
         self._program = self._new_program()
         self._run_since = self._began = 0.0
         self._halted = False
@@ -292,6 +304,10 @@ class SimulatedController:
             self._memory.delivered()
 
     # --- what the server asks -----------------------------------------------------------------------------------
+
+    def addressed(self, request: Request) -> Request:
+        """The request as to the device whose number its reply carries."""
+        return request if self._limits.answer_as is None else replace(request, unit=self._limits.answer_as)
 
     def answer(self, request: Request) -> bytes | None:
         """The PDU of the reply to a request; None where it is for another device on a line."""

@@ -16,6 +16,9 @@ class Device(Protocol):
     def answer(self, request: Request) -> bytes | None:
         """Do the request; the PDU of its reply, None where it is for another device on the line."""
 
+    def addressed(self, request: Request) -> Request:
+        """The request as to the device whose number its reply carries."""
+
     def answer_late(self, request: Request) -> None:
         """Do a write long after its client gave it up."""
 
@@ -108,7 +111,7 @@ class Exchange:
         """Take what came; raise BadFrame where it is no Modbus."""
         if self._dead:
             return
-        for request in self._framing.feed(data):
+        for request in map(self._device.addressed, self._framing.feed(data)):
             if self._waiting and self._reset is not None:
                 self._device.too_early(request)
             if not self._silenced():

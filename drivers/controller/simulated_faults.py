@@ -131,8 +131,8 @@ def targets_of(pdu: bytes, layout: MailboxLayout) -> frozenset[str]:
         return frozenset({"any", "read", _block_of(address, layout, {"link": 0, "owner": 1, "readback": 2})})
     if code not in (WRITE_ONE, WRITE_MANY):
         return frozenset({"any"})
-    if code == WRITE_ONE and address == layout.contour_address:
-        return frozenset({"any", "write", "commit" if any(pdu[3:5]) else "clear"})
+    if address == layout.contour_address:  # by FC16 the value stands behind the count and the length
+        return frozenset({"any", "write", "commit" if any(pdu[3:5] if code == WRITE_ONE else pdu[6:8]) else "clear"})
     return frozenset({"any", "write", _block_of(address, layout, {"service": 1, "page": 2})})
 
 

@@ -35,6 +35,7 @@ class Reply(IntEnum):
 FINAL = frozenset({Reply.ACCEPTED, Reply.GEOMETRY_REFUSED, Reply.EXPIRED, Reply.OPERATOR_REFUSED, Reply.WITHDRAWN})
 SERVICE_READY = 5
 READY, NOT_READY_STATE = 1, 0
+LAST_JOB = 10  # its offset in the link block
 
 Judge = Callable[[AcceptedContour], int]
 
@@ -49,11 +50,13 @@ class Pace:
 
     copy_scans: copying header and payload, a part a scan: what is written meanwhile makes a torn copy.
     check_scans: from the copy to the answer. stepwise: the fields of an answer are written one a scan.
+    torn: `last_job`, `test_echo` and `clock` stand half written for a scan wherever both of their registers change.
     """
 
     copy_scans: int = 1
     check_scans: int = 0
     stepwise: bool = False
+    torn: bool = False
 
 
 class ControllerProgram:
@@ -94,6 +97,7 @@ class ControllerProgram:
         self._to_copy = 0
         self._checks_left = 0
         self._to_write: deque[dict[int, int]] = deque()
+        self._second_halves: dict[int, int] = {}
         self._session = 0
         self._clock = 0
         self._assembly = Assembly()
@@ -115,6 +119,21 @@ class ControllerProgram:
         self._set(offset, first)
         self._set(offset + 1, second)
 
+    def _write32(self, offset: int, value: int) -> None:
+        """The same, in two scans where the program is one that tears it."""
+        first, second = self._words(value)
+        torn = self.pace.torn and first != self._link(offset) and second != self._link(offset + 1)
+        self._set(offset, first)
+        if torn:
+            self._second_halves[offset + 1] = second
+        else:
+            self._set(offset + 1, second)
+
+    @property
+    def _half_written(self) -> bool:
+        """True while `last_result` stands there without its `last_job`, during which the heartbeat may not change."""
+        return bool(self._to_write) and LAST_JOB in self._to_write[0]
+
     def _words(self, value: int) -> tuple[int, int]:
         high, low = value >> 16 & 0xFFFF, value & 0xFFFF
         return (high, low) if self._layout.word_order == "big" else (low, high)
@@ -133,14 +152,17 @@ class ControllerProgram:
     def scan(self, run_ms: int) -> AcceptedContour | None:
         """One scan, `run_ms` after the program's start; the contour that it accepted, if it did."""
         self._scans += 1
+        while self._second_halves:
+            self._set(*self._second_halves.popitem())
         if self._scans <= 3:
             self._start()
             return None
-        self._set(1, self._link(1) + 1)
+        if not self._half_written:
+            self._set(1, self._link(1) + 1)
         self._set(0, self.state)
         if self._has_clock:
             self._clock = (self._clock_start_ms + run_ms) % MODULUS
-            self._set32(14, self._clock)
+            self._write32(14, self._clock)
         self._look_at_service()
         return self._look_at_contour()
 
@@ -151,14 +173,14 @@ class ControllerProgram:
                 self._set(offset, 0)
         elif self._scans == 2:
             self._set(12, self._memory.last_result)
-            self._set32(10, self._memory.last_job)
+            self._write32(10, self._memory.last_job)
         else:
             self._session = self._new_session()
             self._set(13, self._session)
 
     def _look_at_service(self) -> None:
         block = self._service_registers()
-        self._set32(8, u32(block, 8, self._layout.word_order) + 1)
+        self._write32(8, u32(block, 8, self._layout.word_order) + 1)
         # Heartbeat (2) and test_value (8, 9) may differ between the two scans that must agree.
         seen = tuple(value for offset, value in enumerate(block) if offset not in (2, 8, 9))
         self._service = block if seen == self._service_before else None
@@ -221,8 +243,7 @@ class ControllerProgram:
         reply, contour = self._reply(copy)
         if reply in FINAL and copy.job_id > self._last_job and (contour or reply != Reply.ACCEPTED):
             self._memory.keep_answer(copy.job_id, reply, contour)
-            first, second = self._words(copy.job_id)
-            self._to_write += [{12: reply}, {10: first, 11: second}]
+            self._to_write += [{12: reply}, {LAST_JOB: copy.job_id}]
             self._assembly.drop()
             if copy.trigger and copy.trigger == self._link(2):
                 self._trigger_open = False
@@ -252,11 +273,11 @@ class ControllerProgram:
         return block
 
     def _write_answer(self) -> None:
-        """Write the next field of the answer, or all of them, in the protocol's order; a 32-bit one is never halved."""
+        """Write the next field of the answer, or all up to one that is torn, in the protocol's order."""
         while self._to_write:
             for offset, value in self._to_write.popleft().items():
-                self._set(offset, value)
-            if self.pace.stepwise:
+                (self._write32 if offset == LAST_JOB else self._set)(offset, value)
+            if self.pace.stepwise or self._second_halves:
                 return
 
     def _reply(self, copy: PageCopy) -> tuple[int, AcceptedContour | None]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import cycle
 from typing import Any, Literal, get_args
 
-from drivers.controller.simulated import FaultPlan, Pace, SimulatedController, TriggerNotPossible
+from drivers.controller.simulated import FaultPlan, Pace, ServerLimits, SimulatedController, TriggerNotPossible
 from drivers.controller.simulated_contour import AcceptedContour
 from drivers.controller.simulated_faults import Fault
 from drivers.controller.simulated_program import Judge, Reply
@@ -79,7 +79,10 @@ class Event:
 
 @dataclass(frozen=True)
 class MachineSettings:
-    """How the program runs. first_trigger: the session's first trigger_counter. sessions: of the starts, in turn."""
+    """How the program runs. first_trigger: the session's first trigger_counter. sessions: of the starts, in turn.
+
+    torn: see Pace. max_registers, write_single, answer_as: see ServerLimits.
+    """
 
     scan_ms: float = 10.0
     clock: bool = True
@@ -89,6 +92,10 @@ class MachineSettings:
     copy_scans: int = 1
     check_scans: int = 0
     stepwise: bool = False
+    torn: bool = False
+    max_registers: int = 125
+    write_single: bool = True
+    answer_as: int | None = None
 
 
 @dataclass(frozen=True)
@@ -109,7 +116,8 @@ def machine_options(scenario: Scenario) -> dict[str, Any]:
         "has_clock": machine.clock,
         "clock_start_ms": machine.clock_start_ms,
         "first_trigger": machine.first_trigger,
-        "pace": Pace(machine.copy_scans, machine.check_scans, machine.stepwise),
+        "pace": Pace(machine.copy_scans, machine.check_scans, machine.stepwise, machine.torn),
+        "limits": ServerLimits(machine.max_registers, machine.write_single, machine.answer_as),
         "faults": FaultPlan(scenario.faults, scenario.seed),
     }
     if machine.sessions:

@@ -19,7 +19,9 @@ HEADER_CUTS = frozenset({1, 2, 4, 5, 6, 7, 8, 10, 12, 16, 20, 22, 24, 26, 27, 28
 class ClientWatch:
     """Notes in `verdict` what the client does against the protocol; it changes nothing and answers nothing."""
 
-    def __init__(self, layout: MailboxLayout, verdict: Verdict) -> None:
+    def __init__(self, layout: MailboxLayout, verdict: Verdict, *, write_single: bool = True) -> None:
+        """write_single: `transfer` is to be written by FC6; else by an FC16 of this one register."""
+        self._write_single = write_single
         self._layout = layout
         self._verdict = verdict
         self._connections = 0
@@ -165,12 +167,13 @@ class ClientWatch:
     def _contour_write(self, function_code: int, offset: int, values: Sequence[int], held: Sequence[int]) -> None:
         contour = self._layout.contour_address
         transfer = held[contour] if self._transfer is None else self._transfer
-        if self._lost_write and (offset, function_code, values[0]) != (0, 6, 0):
+        alone = function_code == 6 or (len(values) == 1 and not self._write_single)
+        if self._lost_write and not (offset == 0 and alone and values[0] == 0):
             text = f"FC{function_code} at {contour + offset}, after the unanswered {self._lost_write}"
             self._verdict.note("went-on-after-lost-reply", text, contour + offset, values)
         self._lost_write = None
         if offset == 0:
-            if function_code == 6:
+            if alone:
                 self._commit(values[0], transfer, held)
                 self._transfer = values[0]
             else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 
 from drivers.controller.layout import MailboxLayout
 from drivers.controller.simulated_frames import READ, WRITE_MANY, WRITE_ONE
@@ -20,10 +21,25 @@ class Refusal(Exception):
         self.code = code
 
 
+@dataclass(frozen=True)
+class ServerLimits:
+    """What the server takes. registers: most in one request. write_single: it knows FC6.
+
+    answer_as: requests to every device id are answered, as from this one; None = only those to its own.
+    """
+
+    registers: int = LONGEST_READ
+    write_single: bool = True
+    answer_as: int | None = None
+
+
 class RegisterWindow:
     """Reads and writes `registers` within the mailbox's blocks, and lets `watch` see what is written."""
 
-    def __init__(self, registers: list[int], layout: MailboxLayout, watch: ClientWatch) -> None:
+    def __init__(
+        self, registers: list[int], layout: MailboxLayout, watch: ClientWatch, limits: ServerLimits | None = None
+    ) -> None:
+        self._limits = limits or ServerLimits()
         self._registers = registers
         self._layout = layout
         self._watch = watch
@@ -62,7 +78,7 @@ class RegisterWindow:
         if len(pdu) != 5:
             raise Refusal(ILLEGAL_VALUE)
         address, count = struct.unpack(">HH", pdu[1:])
-        if not 1 <= count <= LONGEST_READ:
+        if not 1 <= count <= self._limits.registers:
             raise Refusal(ILLEGAL_VALUE)
         if not any(start <= address and address + count <= end for start, end in self._readable):
             raise Refusal(ILLEGAL_ADDRESS)
@@ -70,6 +86,8 @@ class RegisterWindow:
 
     def _writing(self, pdu: bytes) -> tuple[int, list[int]]:
         """Address and values of a write."""
+        if pdu[0] == WRITE_ONE and not self._limits.write_single:
+            raise Refusal(ILLEGAL_FUNCTION)
         if pdu[0] == WRITE_ONE and len(pdu) == 5:
             address, value = struct.unpack(">HH", pdu[1:])
             return address, [value]
@@ -81,7 +99,11 @@ class RegisterWindow:
         address, count, length = struct.unpack(">HHB", pdu[1:6])
         if count > LONGEST_WRITE:
             self._watch.too_long(address, count)
-        if not 1 <= count <= LONGEST_WRITE or length != 2 * count or len(pdu) != 6 + length:
+        if (
+            not 1 <= count <= min(LONGEST_WRITE, self._limits.registers)
+            or length != 2 * count
+            or len(pdu) != 6 + length
+        ):
             raise Refusal(ILLEGAL_VALUE)
         return address, list(struct.unpack(f">{count}H", pdu[6:]))
 

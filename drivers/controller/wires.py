@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import secrets
 import socket
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.controller.errors import ControllerUnavailable
-from drivers.controller.frames import Frames, RtuFrames, TcpFrames
+from drivers.controller.frames import LAST_TRANSACTION, Frames, RtuFrames, TcpFrames
 from drivers.controller.name_lookup import addresses_of
 from drivers.controller.serial_line import SerialLine, open_serial
 
@@ -63,10 +64,14 @@ class Wire(Protocol):
 
 @dataclass(frozen=True)
 class TcpWire:
-    """Modbus TCP."""
+    """Modbus TCP. begin: the number before a connection's first transaction.
+
+    By default another one each time: the late reply to an earlier connection's request is then none to this one's.
+    """
 
     host: str
     port: int
+    begin: Callable[[], int] = lambda: secrets.randbelow(LAST_TRANSACTION)
 
     serial = False
     missing = "Check cable and power, device_id, whether the controller runs, and timeout_s"
@@ -84,7 +89,7 @@ class TcpWire:
 
     def frames(self, device_id: int) -> Frames:
         """MBAP frames."""
-        return TcpFrames(device_id)
+        return TcpFrames(device_id, self.begin())
 
     async def open(self, timeout_s: float) -> Descriptor:
         """A new TCP connection."""

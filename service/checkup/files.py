@@ -1,13 +1,18 @@
-"""The files of a configuration: calibration, templates of exports, table."""
+"""The files of a configuration: calibration, recipes, templates of exports, table."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from contour.calibration import Calibration
+from contour.errors import CalibrationError
 from service.calibration_guard import CalibrationGuard
 from service.checkup.finding import Finding, fault, ok, warning
 from service.checkup.page import check_page
 from service.config import Config, Gcode
+from service.measure import step_doubt
 from service.recipe_exports import trial
 from service.wiring import WiringError, find_guard, find_table
 
@@ -23,8 +28,9 @@ def summary(config: Config) -> str:
 
 
 def check_files(config: Config) -> Iterator[Finding]:
-    """Calibration, exports, table, and what the operator's page needs."""
+    """Calibration, sizes of methods, exports, table, and what the operator's page needs."""
     yield from check_calibration(config)
+    yield from _sizes(config)
     yield from _exports(config)
     if config.table is not None:
         yield _table(config)
@@ -54,6 +60,31 @@ def check_calibration(config: Config) -> Iterator[Finding]:
             f"its scale is not known at the thickness of {', '.join(blind)}",
             "Use the camera form (`combtrace calibrate` with pictures of a board), or the height it was made at",
         )
+    yield from _work_area(config, calibration)
+
+
+def _work_area(config: Config, calibration: Calibration) -> Iterator[Finding]:
+    """A warning where the work area reaches beyond what the calibration covers: blocks there would be refused."""
+    sure = calibration.uncertainty
+    if not config.work_area_mm or sure is None:
+        return
+    corners = np.array(config.work_area_mm, dtype=np.float64)
+    heights = sorted({0.0, *(recipe.thickness_mm for recipe in config.recipes)})
+    try:
+        outside = [
+            f"({corner[0]:g}, {corner[1]:g}) mm"
+            for corner in corners
+            if any(len(sure.uncovered(calibration.to_pixels(corner[None, :], height))) for height in heights)
+        ]
+    except CalibrationError as error:
+        yield warning("calibration", f"work_area_mm is not in view: {error}", "Check work_area_mm and the alignment")
+        return
+    if outside:
+        yield warning(
+            "calibration",
+            f"of work_area_mm {', '.join(outside)} {'lies' if len(outside) == 1 else 'lie'} where it is not covered",
+            "A block there is refused (115): calibrate with views that reach there, or make the work area smaller",
+        )
 
 
 def _told(config: Config, guard: CalibrationGuard) -> str:
@@ -69,6 +100,13 @@ def _told(config: Config, guard: CalibrationGuard) -> str:
     )
     marks = guard.record.sentinels
     return text if marks is None else f"{text}; {len(marks.marks)} fixed marks"
+
+
+def _sizes(config: Config) -> Iterator[Finding]:
+    for recipe in config.recipes:
+        doubt = step_doubt(recipe)
+        if doubt:
+            yield warning("recipes", f"recipe {recipe.number}: {doubt}")
 
 
 def _exports(config: Config) -> Iterator[Finding]:

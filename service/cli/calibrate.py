@@ -9,11 +9,21 @@ from typing import TYPE_CHECKING
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
 from service.cli.given_pictures import add_pictures_argument, pictures_of
+from service.cli.length_options import (
+    accept_share,
+    add_length_arguments,
+    compare_span,
+    known_length,
+    made_of_lengths,
+    pixel_pair,
+    tell_lengths,
+)
 
 if TYPE_CHECKING:
     from contour.board import Board
     from contour.calibrate import CameraResult
     from contour.calibration import Calibration
+    from contour.position_uncertainty import PositionUncertainty
     from contour.sentinels import Sentinels
     from service.board_pictures import Gathered
 
@@ -31,6 +41,10 @@ square's outer corner becomes the origin, x runs along its lower edge, y up. Tak
 pictures, the board tilted by about 20 degrees to all sides, in all parts of the view.
 A report with pictures is written beside the file. docs/calibrating.md goes step by step.
 
+Pictures of a board do not tell its size. --camera-height-mm and --known-length-mm, measured
+by hand, are told beside what the calibration says: from 3 % apart with a warning, from
+8 % apart (--accept-apart-percent) nothing is written.
+
 Exit status: 0 written, 3 the verdict is not good: nothing written but the report,
 2 unusable input or usage."""
 
@@ -43,19 +57,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_board_arguments(board, required=False)
     board.add_argument("--plane", type=Path, metavar="IMAGE", help="the picture in which the board lies on the table")
     board.add_argument("--board-thickness-mm", type=float, default=0.0, metavar="T", help="pattern above the table")
+    board.add_argument("--camera-height-mm", type=float, metavar="H", help="table to lens by tape, to compare")
     board.add_argument(
-        "--camera-height-mm", type=float, metavar="H", help="measured by tape, to compare (within 30 %%)"
+        "--area-px",
+        type=_box,
+        metavar="L,T,R,B",
+        help="where blocks will lie (left, top, right, bottom): to be covered",
+    )
+    board.add_argument(
+        "--accept-uncovered", action="store_true", help="let contours lie where no corner of the board was seen, too"
     )
     board.add_argument("--report", type=Path, metavar="FILE", help="default: the output's name with .html")
     other = parser.add_argument_group("without a board")
     other.add_argument("--points", type=Path, metavar="FILE", help="CSV: x_px,y_px,x_mm,y_mm")
     other.add_argument("--scale", type=float, metavar="MM", help="millimetres a pixel")
     other.add_argument("--size", type=picture_size, metavar="WxH", help="size of the camera's pictures, px")
-    other.add_argument("--origin-px", type=_pair, metavar="X,Y", help="with --scale; default: the lower-left pixel")
+    other.add_argument(
+        "--origin-px", type=pixel_pair, metavar="X,Y", help="with --scale; default: the lower-left pixel"
+    )
     other.add_argument("--plane-height-mm", type=float, default=0.0, metavar="H", help="height of points or scale")
     both = parser.add_argument_group("for all")
     both.add_argument("--block-mm", type=float, default=60.0, metavar="H", help="height judged besides the table")
     both.add_argument("--accept-mm", type=float, metavar="MM", help="largest 95 %% figure that is good; default 0.1")
+    add_length_arguments(both)
     both.add_argument("--camera-name", default="", metavar="NAME", help="as `combtrace check` prints it")
     both.add_argument("--sentinels", metavar="DICTIONARY", help="dictionary of fixed marks beside the table")
     both.add_argument("--sentinel-image", type=Path, metavar="IMAGE", help="picture of the marks; default --plane")
@@ -101,10 +125,18 @@ def run(args: argparse.Namespace) -> int:
         return _from_board(args)
     if args.images or args.plane is not None:
         raise UserError(f"--{ways[0]} takes no pictures of a board; leave them and --plane out")
+    if args.camera_height_mm is not None:
+        raise UserError(f"--{ways[0]} knows no camera to compare --camera-height-mm with; give --known-length-mm")
+    if args.area_px is not None or args.accept_uncovered:
+        raise UserError(f"--{ways[0]} has no views that cover an area; leave --area-px and --accept-uncovered out")
     if args.size is None:
         raise UserError(f"--{ways[0]} needs --size WxH, the size of the camera's pictures in pixels")
-    calibration = _from_points(args) if ways[0] == "points" else _from_scale(args)
-    _write(args, calibration, _sentinels(args, None), {"made_from": ways[0]})
+    if ways[0] == "points":
+        calibration, cause = _from_points(args), "Check the points' millimetres: all times {factor} would agree"
+    else:
+        calibration, cause = _from_scale(args), "Check --scale: {factor} times as much would agree"
+    made = made_of_lengths(compare_span(args, calibration, cause))
+    _write(args, calibration, _sentinels(args, None), {"made_from": ways[0], **made})
     return EXIT_OK
 
 
@@ -146,6 +178,10 @@ def _from_board(args: argparse.Namespace) -> int:
         block_mm=args.block_mm,
         accept_mm=0.1 if args.accept_mm is None else args.accept_mm,
         camera_height_mm=args.camera_height_mm,
+        known_length=known_length(args),
+        accept_apart=accept_share(args),
+        area_px=args.area_px,
+        accept_uncovered=args.accept_uncovered,
         camera_name=args.camera_name,
     )
     try:
@@ -154,11 +190,12 @@ def _from_board(args: argparse.Namespace) -> int:
         result = calibrate_camera(gathered.views, board, gathered.size, setup, _progress)
     except (PlaneViewError, CalibrationFailed) as error:
         raise UserError(str(error)) from error
-    _tell(result, gathered)
+    _tell(result, gathered, setup.accept_apart)
     made = made_of(result, board, setup.block_mm)
     _report(args, result, gathered, board, setup, sentinels)
     if not result.verdict.good:
-        print(f"{args.output}: not written. To take it nevertheless, raise --accept-mm", file=sys.stderr)
+        options = " ".join(result.verdict.overrides)
+        print(f"{args.output}: not written. To take it nevertheless: {options}", file=sys.stderr)
         return EXIT_REFUSED
     _write(args, result.calibration, sentinels, made)
     return EXIT_OK
@@ -180,11 +217,12 @@ def made_of(result: CameraResult, board: Board, block_mm: float) -> dict[str, st
         "block_95_mm": round(sure.figure_mm(block_mm), 4),
         "halves_apart_mm": round(float(verdict.halves_mm[0].mean()), 4),
         "inflation": round(verdict.inflation, 2),
+        **made_of_lengths(result.lengths),
         "verdict": verdict.sentence,
     }
 
 
-def _tell(result: CameraResult, gathered: Gathered) -> None:
+def _tell(result: CameraResult, gathered: Gathered, share: float) -> None:
     for one in (*gathered.dropped, *result.dropped):
         print(f"not used  {one.name}: {one.reason}")
     verdict = result.verdict
@@ -194,9 +232,16 @@ def _tell(result: CameraResult, gathered: Gathered) -> None:
     )
     print(f"lens      {result.model.name}, corners within {result.noise_px:.3f} px (one standard deviation)")
     print(f"camera    {position[2]:.0f} mm above the table, {verdict.mm_per_px:.4f} mm a pixel in the middle")
-    print(f"coverage  corners enclose {100 * verdict.zones.covered_share:.0f} % of the picture")
+    tell_lengths(result.lengths, share)
+    print(f"coverage  corners enclose {verdict.zones.told}{_told_use(verdict.uncertainty)}")
     print(f"halves    two independent halves differ by {verdict.halves_mm[0].mean():.3f} mm on the table (mean)")
     print(f"verdict   {verdict.sentence}")
+
+
+def _told_use(sure: PositionUncertainty) -> str:
+    if sure.covered_px is None:
+        return "; contours outside of it are taken, too"
+    return "; a block that leaves that part is refused (115 outside_work_area)"
 
 
 def _report(
@@ -222,6 +267,7 @@ def _report(
 
 def _from_points(args: argparse.Namespace) -> Calibration:
     from contour.errors import CalibrationFailed
+    from contour.length_check import rounded_up
     from contour.point_calibration import calibrate_points
     from service.points_file import PointsFileError, read_points
 
@@ -239,8 +285,8 @@ def _from_points(args: argparse.Namespace) -> Calibration:
         number = int(result.residuals_mm.argmax()) + 1
         raise UserError(
             f"{args.points}: point {number} lies {worst:.3f} mm from the map through all points, {accept_mm:g} mm are "
-            "allowed. Measure it again; if all are off, the lens bends lines: calibrate with a board, or raise "
-            "--accept-mm",
+            "allowed. Measure it again; if all are off, the lens bends lines: calibrate with a board. To take it "
+            f"nevertheless: --accept-mm {rounded_up(worst, 0.001):.9g}",
             EXIT_REFUSED,
         )
     sure = result.calibration.uncertainty
@@ -296,7 +342,9 @@ def _sentinels(args: argparse.Namespace, gathered: Gathered | None) -> Sentinels
     except (CameraError, ContourError) as error:
         raise UserError(f"--sentinels: {error}") from error
     if found is None:
-        raise UserError(f"--sentinels {args.sentinels}: no such mark is seen. Check the name, and the light")
+        raise UserError(
+            f"--sentinels {args.sentinels}: no such mark is seen. Check name and light, or leave --sentinels out"
+        )
     print(f"sentinels {', '.join(str(mark.id) for mark in found.marks)}")
     return found
 
@@ -347,9 +395,11 @@ def _two_numbers(text: str, expected: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[1])
 
 
-def _pair(text: str) -> tuple[float, float]:
+def _box(text: str) -> tuple[float, float, float, float]:
     try:
-        x, y = (float(part) for part in text.split(","))
+        left, top, right, bottom = (float(part) for part in text.split(","))
     except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected two numbers such as 100,1100") from None
-    return x, y
+        raise argparse.ArgumentTypeError(f"{text!r}: expected four numbers such as 200,150,1400,1050") from None
+    if not (0 <= left < right and 0 <= top < bottom):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected left < right and top < bottom, from 0 on")
+    return left, top, right, bottom

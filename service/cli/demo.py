@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import logging
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,9 @@ DESCRIPTION = """\
 Run the daemon's own path once: a shipped picture, the tracing, the journal, and a
 simulated controller over Modbus TCP on this machine. Nothing has to be set up.
 Writes the picture with the contour over it."""
+
+_WIDTH = 79
+"""Columns of a newcomer's terminal, which has 24 rows: everything said is seen at once."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,7 +61,7 @@ async def _demo(output: Path) -> int:
     for line in report(job, seen, taken):
         print(line)
     if seen:
-        print(f"overlay: {_draw(output, seen[-1])}")
+        print(f"picture: {_draw(output, seen[-1])}")
     return EXIT_OK if job.outcome == "accepted" and _equal(seen, taken) else EXIT_FAILED
 
 
@@ -82,7 +86,7 @@ def report(job: Job, seen: list[Observation], taken: list[AcceptedContour]) -> l
     lines = [f"job {job.job_id}: {job.outcome}" + (f" ({job.reason.label}: {job.detail})" if job.reason else "")]
     if seen:
         measurement = seen[-1].measurement
-        lines.append(f"  frame         {seen[-1].frame.source}")
+        lines.append(f"  frame         {Path(seen[-1].frame.source).name}")
         lines.append(f"  method        {measurement.method}, walls {measurement.polarity}")
         if measurement.pitch_px is not None:
             lines.append(f"  cell pitch    {measurement.pitch_px:.1f} px")
@@ -91,8 +95,9 @@ def report(job: Job, seen: list[Observation], taken: list[AcceptedContour]) -> l
             lines.append(f"  vertices      {measurement.millimetres.point_count}")
             lines.append(f"  area          {measurement.area_mm2:.1f} mm²")
             lines.append(f"  size          {width:.1f} x {height:.1f} mm")
-        stages = ", ".join(f"{name} {value:.1f}" for name, value in measurement.timings_ms.items())
-        lines.append(f"  stages, ms    {stages}")
+        stages = ", ".join(f"{name}={value:.1f}" for name, value in measurement.timings_ms.items())
+        wrapped = textwrap.wrap(stages, _WIDTH, initial_indent="  stages, ms    ", subsequent_indent=" " * 16)
+        lines += [line.replace("=", " ") for line in wrapped]
     if "transfer_ms" in job.report:
         lines.append(f"  transfer      {job.report['transfer_ms']:.1f} ms, to the controller's final answer")
     for contour in taken:
@@ -123,11 +128,12 @@ def _draw(output: Path, observation: Observation) -> Path:
 
 
 def _log_to_the_terminal() -> None:
-    """Show the daemon's own records, as the demo's running text."""
+    """Show the daemon's states and warnings as the demo's running text; what else it says, `report` says shorter."""
     import sys
 
     handler = logging.StreamHandler(sys.stdout)
     handler.setFormatter(logging.Formatter("  %(message)s"))
+    handler.addFilter(lambda record: record.levelno > logging.INFO or record.name == "combtrace.state")
     logger = logging.getLogger("combtrace")
     logger.addHandler(handler)
     logger.setLevel(logging.INFO)

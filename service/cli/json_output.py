@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from service.cli.errors import UserError
-from service.whole_file import file_mode
+from service.whole_file import file_mode, sync_folder
 
 
 @contextmanager
@@ -60,6 +60,8 @@ def _replaced(path: Path, option: str) -> Iterator[Callable[[str], None]]:
             except OSError as error:
                 raise _cannot(option, path, error) from error
         os.replace(beside, target)
+        with suppress(OSError):  # it is there; that it outlives a power cut is more than some file systems can say
+            sync_folder(target.parent)
     finally:
         with suppress(FileNotFoundError):
             os.unlink(beside)

@@ -15,7 +15,7 @@ COMMANDS = (
     *("cameras", "grab", "focus"),
     *("board", "calibrate", "align", "verify", "repeat", "teach-table"),
     *("probe", "jobs", "replay"),
-    *("status", "halt", "resume", "reset", "install-service"),
+    *("status", "halt", "resume", "confirm", "reset", "install-service"),
     *("schema", "reasons", "register-map"),
 )
 

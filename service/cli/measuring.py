@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from service.config import Config, Recipe
     from service.measure import Measurer
     from service.trend_file import TrendLine
+
+
+PLOT_SUFFIX = ".svg"
 
 
 def load_config_or_default(path: Path | None) -> Config:
@@ -71,7 +75,9 @@ def add_measuring_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--calibration", type=Path, metavar="FILE", help="pixels to millimetres")
     parser.add_argument("--thickness-mm", type=float, metavar="H", help="height of the traced plane above the table")
     parser.add_argument("--tolerance-mm", type=float, default=0.3, metavar="MM", help="limit of a pass; default 0.3")
-    parser.add_argument("--trend", type=Path, metavar="FILE", help="CSV file that gets one line a check")
+    parser.add_argument(
+        "--trend", type=Path, metavar="FILE", help="CSV that gets a line a check; its plot beside it, .svg"
+    )
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,8 @@ class Measuring:
 
         if not 0 < args.tolerance_mm < 1e4:
             raise UserError(f"--tolerance-mm {args.tolerance_mm:g}: expected a number above 0")
+        if args.trend is not None and args.trend.suffix == PLOT_SUFFIX:
+            raise UserError(f"--trend {args.trend}: its plot would overwrite it. End it in .csv")
         config = load_config_or_default(args.config)
         recipe = find_recipe(config, args.recipe)
         guard = guard_of(config, args)
@@ -105,17 +113,32 @@ class Measuring:
 
 
 def note_trend(path: Path | None, line: TrendLine) -> None:
-    """Add a line to the trend file and tell how it compares with the last; raise UserError."""
-    from service.trend_file import TrendFileError, append_trend
+    """Add a line to the trend file, tell how it compares with the last, and draw them all; raise UserError."""
+    from service.trend_file import TrendFileError, append_trend, read_trend
+    from service.trend_plot import trend_svg
+    from service.whole_file import write_whole
 
     if path is None:
         return
     try:
-        before = append_trend(path, line)
+        trend = read_trend(path)
+        append_trend(path, line)
     except TrendFileError as error:
         raise UserError(str(error)) from error
-    last = "first line" if before is None else f"worst {line.worst_mm:.3f} mm, last time {before:.3f} mm"
+    for text in trend.skipped:
+        print(f"trend     {text}", file=sys.stderr)
+    before = trend.last(line.check)
+    last = "first line" if before is None else f"worst {line.worst_mm:.3f} mm, last time {before.worst_mm:.3f} mm"
     print(f"trend     {path}: {last}")
+    if not path.is_file():  # a device or pipe has no picture beside it
+        return
+    plot = path.with_suffix(PLOT_SUFFIX)
+    try:
+        write_whole(plot, trend_svg([*trend.lines, line]).encode())
+    except OSError as error:
+        print(f"trend     {plot}: cannot be written: {error.strerror}; the line is in {path}", file=sys.stderr)
+    else:
+        print(f"plot      {plot}")
 
 
 def now() -> datetime:

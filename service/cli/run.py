@@ -72,14 +72,20 @@ def summary(config: Config) -> str:
 
 
 async def _run(config: Config, config_path: Path, *, once: bool) -> int:
-    from service.wiring import WiringError, build
+    from service.wiring import WiringError, build, opening_of
 
-    try:
-        parts = build(config, path=config_path)
-    except WiringError as error:
-        raise UserError(str(error)) from error
-    log.info("%s, process %d, %s: %s", version(), os.getpid(), config_path, summary(config))
-    return await serve(parts, config.controller.ready_timeout_s, once=once)
+    opening = None if once else opening_of(config)
+    while True:
+        try:
+            parts = build(config, path=config_path, opening=opening)
+        except WiringError as error:
+            raise UserError(str(error)) from error
+        log.info("%s, process %d, %s: %s", version(), os.getpid(), config_path, summary(config))
+        status = await serve(parts, config.controller.ready_timeout_s, once=once)
+        if not parts.begin_anew:
+            return status
+        assert parts.reloader is not None
+        config = parts.reloader.config  # what was read again meanwhile is in force
 
 
 async def serve(parts: Parts, ready_timeout_s: float, *, once: bool) -> int:

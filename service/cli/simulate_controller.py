@@ -28,7 +28,7 @@ The addresses are those of the default layout; --layout gives others."""
 
 VERDICT_PERIOD_S = 2.0
 RANGES = {
-    "device_id": (1, 255),
+    "device_id": (0, 255),
     "scan_ms": (0.1, 10_000),
     "trigger_every": (0.01, 86_400),
     "recipe": (0, 65_535),

@@ -145,6 +145,7 @@ class TriggerOrigin(Answer):
     thickness_um: int
     session: int | None
     counter: int | None
+    line: str | None
 
 
 class Job(Answer):

@@ -10,6 +10,7 @@ from contour.board_detection import BoardView
 from contour.calibrate import CameraResult, Setup, calibrate_camera
 from contour.calibration_verdict import Judgement
 from contour.errors import CalibrationFailed
+from contour.length_check import KnownLength
 from contour.synthetic import camera_above
 from contour.synthetic.board_poses import BoardPose
 from tests.contour.board_scenes import CAMERA, CHARUCO, LENS, moved, noisy_view, noisy_views
@@ -165,11 +166,58 @@ def test_a_block_as_high_as_the_camera_is_refused() -> None:
     assert "--block-mm 700 reaches up to the camera" in failure(views, setup=replace(PLANE, block_mm=700.0))
 
 
-def test_a_measured_height_finds_a_square_size_that_is_half_off() -> None:
+# --- what was measured by hand ----------------------------------------------------------------------------------------
+
+
+def squares_told_as(square_mm: float) -> Board:
+    """The board of squares of 30 mm, with another size said of them."""
+    return Board("charuco", 11, 8, square_mm, 0.7 * square_mm, "DICT_5X5_250")
+
+
+@pytest.mark.parametrize(("square_mm", "board_mm"), [(25.0, 0.0), (60.0, 0.0), (25.0, 50.0), (3.0, 0.0)])
+def test_a_height_by_tape_refuses_a_wrong_square_size_and_names_the_right_one(
+    square_mm: float, board_mm: float
+) -> None:
     views, _ = noisy_views()
-    wrong = Board("charuco", 11, 8, 60.0, 42.0, "DICT_5X5_250")
-    text = failure(views, wrong, replace(PLANE, camera_height_mm=1200.0))
-    assert "--camera-height-mm says 1200" in text
+    true_mm = float(CAMERA.position_mm[2]) + board_mm
+    setup = replace(PLANE, camera_height_mm=round(true_mm), board_thickness_mm=board_mm, block_mm=20.0)
+    verdict = calibrate_camera(views, squares_told_as(square_mm), SIZE, setup).verdict
+    assert verdict.judgement is Judgement.CONTRADICTED
+    assert f"mm by the calibration, {true_mm:.0f} mm measured" in verdict.sentence
+    assert f"squares of 30.0 mm would give {true_mm:.0f} mm, --square-mm says {square_mm:g}" in verdict.sentence
+
+
+def test_a_known_length_in_the_picture_refuses_it_too() -> None:
+    views, _ = noisy_views()
+    ends = np.array([[400.0, 300.0], [1200.0, 900.0]])
+    length_mm = float(np.linalg.norm(np.diff(CAMERA.back_project(ends, 0.0), axis=0)))
+    setup = replace(PLANE, known_length=KnownLength(round(length_mm, 1), ends))
+    good = calibrate_camera(views, CHARUCO, SIZE, setup)
+    assert good.verdict.good
+    assert good.lengths[0].apart < 0.001
+    wrong = calibrate_camera(views, squares_told_as(25.0), SIZE, setup).verdict
+    assert wrong.judgement is Judgement.CONTRADICTED
+    assert "squares of 30.0 mm would give 37" in wrong.sentence
+
+
+@pytest.mark.parametrize(("factor", "warns", "good"), [(1.029, False, True), (1.031, True, True), (1.09, False, False)])
+def test_a_tape_is_warned_of_from_3_percent_and_refused_from_8(factor: float, warns: bool, good: bool) -> None:
+    views, _ = noisy_views()
+    tape_mm = float(CAMERA.position_mm[2]) / factor
+    result = calibrate_camera(views, CHARUCO, SIZE, replace(PLANE, camera_height_mm=tape_mm))
+    (check,) = result.lengths
+    assert (check.warning(0.08) is not None) is warns
+    assert result.verdict.good is good
+
+
+def test_a_known_length_that_cannot_tell_is_refused_before_the_work() -> None:
+    views, _ = noisy_views()
+    for ends, words in (
+        ([[10, 10], [50, 10]], "the ends lie 40 px apart, 50 or more"),
+        ([[10, 10], [1600, 10]], "pixel (1600, 10) lies outside"),
+    ):
+        known = KnownLength(100.0, np.array(ends, dtype=np.float64))
+        assert words in failure(views, setup=replace(PLANE, known_length=known))
 
 
 def test_views_of_which_a_third_is_wrong_are_refused_as_a_whole() -> None:
@@ -189,16 +237,68 @@ def test_little_tilt_is_told_to_need_more() -> None:
     assert "repeat with more tilt" in result.verdict.sentence
 
 
-def test_views_in_one_corner_are_told_to_need_more_of_the_picture() -> None:
+def views_in_one_corner() -> tuple[list[BoardView], Board, np.ndarray]:
+    """Views of a small board in the lower left of the picture, the board, and where the flat one's origin lies."""
     rng = np.random.default_rng(6)
-    views, poses = noisy_views()
+    _, poses = noisy_views()
     near = [
         BoardPose(pose.rotation, pose.rotation @ np.array([-75.0, -60.0, 0.0]) + [140.0, 110.0, 20.0]) for pose in poses
     ]
     small = Board("charuco", 11, 8, 14.0, 10.0, "DICT_5X5_250")
-    views = [noisy_view(f"{n:02d}", small, CAMERA, pose, rng) for n, pose in enumerate(near)]
-    result = calibrate_camera(views, small, SIZE, PLANE)
-    assert result.verdict.judgement is Judgement.MORE_COVERAGE
+    return [noisy_view(f"{n:02d}", small, CAMERA, pose, rng) for n, pose in enumerate(near)], small, near[0][1]
+
+
+def test_an_area_that_views_in_one_corner_do_not_reach_needs_more_of_them() -> None:
+    views, small, _ = views_in_one_corner()
+    verdict = calibrate_camera(views, small, SIZE, replace(PLANE, area_px=(300.0, 800.0, 900.0, 950.0))).verdict
+    assert verdict.judgement is Judgement.MORE_COVERAGE
+    assert "of --area-px (900, 800), (900, 950) px lie outside" in verdict.sentence
+    assert verdict.overrides == ("--accept-uncovered",)
+
+
+def test_views_in_one_corner_serve_for_blocks_in_that_corner_and_as_surely_as_they_say() -> None:
+    views, small, origin = views_in_one_corner()
+    for area_px, words in (((300.0, 800.0, 450.0, 950.0), "good: 95 %"), (None, "good in 7 % of the picture: 95 %")):
+        result = calibrate_camera(views, small, SIZE, replace(PLANE, area_px=area_px))
+        assert result.verdict.sentence.startswith(words)
+    sure = result.verdict.uncertainty
+    assert len(sure.uncovered(GRID)) == (~result.verdict.zones.inside(GRID)).sum() > 300
+    inside = GRID[result.verdict.zones.inside(GRID)]
+    for height_mm in (0.0, 60.0):
+        true = CAMERA.back_project(inside, height_mm + origin[2]) - origin[:2]
+        errors = np.linalg.norm(result.calibration.to_work(inside, height_mm) - true, axis=1)
+        assert (errors <= sure.figure_mm(height_mm)).mean() >= 0.95
+
+
+def test_the_whole_picture_may_be_used_where_half_of_it_is_covered(good: tuple[CameraResult, list[BoardPose]]) -> None:
+    verdict = good[0].verdict
+    assert 0.5 < verdict.zones.covered_share < 0.95
+    assert verdict.uncertainty.covered_px is None
+
+
+def test_the_whole_picture_may_be_used_where_a_person_says_so() -> None:
+    views, small, _ = views_in_one_corner()
+    setup = replace(PLANE, area_px=(0.0, 0.0, 1599.0, 1199.0), accept_uncovered=True)
+    verdict = calibrate_camera(views, small, SIZE, setup).verdict
+    assert verdict.good
+    assert not len(verdict.uncertainty.uncovered(GRID))
+
+
+def test_what_takes_a_calibration_nevertheless_does_take_it() -> None:
+    """All that speaks against it at once: figures too large, the wrong squares, and a part never seen."""
+    views, _ = noisy_views()
+    setup = replace(PLANE, accept_mm=0.001, camera_height_mm=1200.0, area_px=(0.0, 0.0, 1599.0, 1199.0))
+    verdict = calibrate_camera(views, squares_told_as(25.0), SIZE, setup).verdict
+    assert verdict.judgement is Judgement.CONTRADICTED
+    options = dict(option.split(" ") for option in verdict.overrides if " " in option)
+    assert set(verdict.overrides) - {" ".join(pair) for pair in options.items()} == {"--accept-uncovered"}
+    taken = replace(
+        setup,
+        accept_uncovered=True,
+        accept_mm=float(options["--accept-mm"]),
+        accept_apart=float(options["--accept-apart-percent"]) / 100,
+    )
+    assert calibrate_camera(views, squares_told_as(25.0), SIZE, taken).verdict.good
 
 
 def test_a_lens_that_no_model_holds_is_told() -> None:

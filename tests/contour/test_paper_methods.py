@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from contour.binarize import binarize
-from contour.direct_scan import direct_scan_ring, scan_rows
+from contour.direct_scan import direct_scan_ring, scan_pairs, scan_rows
 from contour.errors import NoBlockFound, ParameterError
 from contour.find_contours import largest_contour
 from contour.geometry import contour_defect, signed_area
@@ -204,3 +204,17 @@ def test_nothing_that_encloses_area_is_no_block(mask: np.ndarray) -> None:
         largest_contour(mask)
     with pytest.raises(NoBlockFound):
         sliding_matrix_contour(mask, 1.0)
+
+
+@given(pictures, st.integers(0, 6), st.integers(0, 8))
+def test_what_the_scan_drops_as_noise_is_narrow_and_lies_before_its_rows_pair(
+    mask: np.ndarray, max_gap_px: int, min_width_px: int
+) -> None:
+    kept, noise = scan_pairs(mask, max_gap_px, min_width_px)
+    assert (kept[:, 2] - kept[:, 1] >= min_width_px).all()
+    left_at = dict(zip(kept[:, 0].tolist(), kept[:, 1].tolist(), strict=True))
+    for y, left, right in noise.tolist():
+        assert right - left < min_width_px
+        assert right + max_gap_px < left_at.get(y, mask.shape[1] + max_gap_px)
+    empty = set(np.flatnonzero((mask != 0).any(axis=1)).tolist()) - set(left_at)
+    assert empty <= set(noise[:, 0].tolist())  # a row with white has a pair, or only noise

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 import shapely
 
+from contour.binarize import binarize
 from contour.errors import NoBlockFound, ParameterError, PictureError
 from contour.geometry import contour_defect, signed_area
+from contour.sliding_matrix import coarse_step, default_core_px
+from contour.synthetic import CellGeometry, Scene, camera_above, render
 from contour.tracing import TraceSettings, trace
-from tests.contour.scenes import OUTLINES, block
+from tests.contour.scenes import HEIGHT, MM_PER_PX, OUTLINES, WIDTH, block
 
 PAPER_METHODS = ("sliding-matrix", "direct-scan", "find-contours")
 
@@ -105,7 +108,7 @@ def test_sizes_given_are_used() -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        TraceSettings(method="sliding-matrix", binarize=100, core_px=6),
+        TraceSettings(method="sliding-matrix", binarize=100, core_px=6, threshold=64.0),
         TraceSettings(method="direct-scan", binarize=100, max_gap_px=5, min_width_px=5),
         TraceSettings(method="find-contours", binarize=100),
     ],
@@ -120,6 +123,8 @@ def test_without_cells_sizes_must_be_given_and_then_suffice(settings: TraceSetti
         open_sizes = replace(settings, core_px=None, max_gap_px=None)
         with pytest.raises(NoBlockFound, match=r"fewer than 6 regular cells.*(core_px|max_gap_px)"):
             trace(plate, open_sizes)
+        with pytest.raises(NoBlockFound, match=r"fewer than 6 regular cells.*(threshold|min_width_px)"):
+            trace(plate, replace(settings, threshold=None, min_width_px=None))
 
 
 @pytest.mark.parametrize("method", PAPER_METHODS)
@@ -188,10 +193,20 @@ def test_a_view_into_a_larger_picture_is_traced_as_its_copy() -> None:
     )
 
 
-def test_with_a_core_set_by_hand_the_papers_threshold_applies() -> None:
-    picture = block("rectangle").picture
-    by_hand = trace(picture, TraceSettings(method="sliding-matrix", core_px=12, step_px=6)).contour
-    paper = trace(picture, TraceSettings(method="sliding-matrix", core_px=12, step_px=6, threshold=64.0)).contour
-    np.testing.assert_array_equal(by_hand.exterior, paper.exterior)
-    followed = trace(picture, TraceSettings(method="sliding-matrix")).contour
-    assert len(followed.exterior) != len(by_hand.exterior)
+@pytest.mark.parametrize("wall_mm", [0.6, 1.0, 5.0])
+def test_the_threshold_follows_from_the_cells_whoever_gives_the_core(wall_mm: float) -> None:
+    cells = CellGeometry(pitch_mm=10, wall_mm=wall_mm, ribbon_deg=17)
+    picture = render(Scene(OUTLINES["rectangle"], camera_above(WIDTH, HEIGHT, MM_PER_PX), cells, seed=11)).picture
+    seen = binarize(picture).cells
+    assert seen is not None
+    own = TraceSettings(method="sliding-matrix")
+    followed = trace(picture, own).contour
+    by_hand = trace(picture, replace(own, core_px=default_core_px(seen.pitch_px))).contour
+    np.testing.assert_array_equal(by_hand.exterior, followed.exterior)
+    half = trace(picture, replace(own, threshold=255 * seen.wall_share / 2)).contour
+    np.testing.assert_array_equal(half.exterior, followed.exterior)
+
+
+def test_a_step_above_twice_the_core_is_doubted() -> None:
+    assert coarse_step(10, 20) is None
+    assert "step_px is 21, expected up to 20, twice core_px" in str(coarse_step(10, 21))

@@ -214,7 +214,11 @@ REQUESTS = {
     COMMIT: lambda controller: controller.write_transfer(5),
 }
 NONSENSE = {
-    "another transaction": (READ, changed(1, 99), "transaction is 99, expected 1"),
+    "another transaction": (
+        READ,
+        lambda request: bytes([request[0], request[1] ^ 0x55]) + right_reply(request)[2:],
+        "transaction is [0-9]+, expected [0-9]+",
+    ),
     "another protocol": (READ, changed(3, 1), "protocol identifier is 1, expected 0"),
     "another unit": (READ, changed(6, 2), "device id is 2, expected 1"),
     "another function": (READ, changed(7, 4), "function code is 4, expected 3"),
@@ -224,7 +228,7 @@ NONSENSE = {
     "a byte count that contradicts the length": (READ, changed(8, 30), "byte count is 30, expected 32"),
     "a frame length that is none": (READ, changed(4, 0xFF), "length is 65315"),
     "the request's echo": (READ, lambda request: request, "length is 6, expected 35"),
-    "long garbage": (COMMIT, lambda request: bytes(1000), "transaction is 0, expected 1"),
+    "long garbage": (COMMIT, lambda request: bytes(1000), "transaction is 0, expected [0-9]+"),
     "text": (READ, lambda request: b"HTTP/1.1 400 Bad Request\r\n\r\n", "protocol identifier"),
     "a second reply in one go": (READ, lambda request: right_reply(request) * 2, "number of bytes is 82, expected 41"),
     "another address written": (WRITE, changed(9, 17), "address is 17, expected 16"),
@@ -463,11 +467,43 @@ async def test_no_request_is_longer_than_the_controller_takes(server: Misbehavin
     await controller.close()
     counts = [(request[7], int.from_bytes(request[10:12], "big")) for request in server.requests]
     assert sum(count for function_code, count in counts if function_code == 16) == 31 + 402
-    assert sum(count for function_code, count in counts if function_code == 3) == 31 + 402
+    assert sum(count for function_code, count in counts if function_code == 3) == 32 + 402, "transfer is read too"
     assert all(count <= {16: 50, 3: 33}[function_code] for function_code, count in counts)
 
 
-@pytest.mark.parametrize("limits", [{"write": 31}, {"read": 31}, {"write": 124}, {"read": 126}])
+@pytest.mark.parametrize("limits", [{"write": 15}, {"read": 15}, {"write": 124}, {"read": 126}])
 def test_limits_that_no_controller_can_have_are_refused(limits: dict[str, int]) -> None:
-    with pytest.raises(MailboxError, match="expected 32 to 12"):
+    with pytest.raises(MailboxError, match="expected 16 to 12"):
         RequestLimits(**limits)
+
+
+async def test_each_connection_begins_with_another_transaction(server: MisbehavingServer) -> None:
+    controller = ModbusTcpController("127.0.0.1", server.port, timeout_s=PATIENT_S)
+    for _ in range(8):
+        await controller.connect()
+        await controller.read_link()
+    await controller.close()
+    assert len({request[:2] for request in server.requests}) >= 7, "of 65,535 numbers eight drawn at random"
+
+
+@pytest.mark.parametrize(("asked", "answers"), [(0, 255), (255, 0), (0, 0), (255, 255)])
+async def test_the_device_itself_may_answer_as_0_or_255(server: MisbehavingServer, asked: int, answers: int) -> None:
+    server.reply_with(lambda request: right_reply(request[:6] + bytes([answers]) + request[7:]))
+    controller = ModbusTcpController("127.0.0.1", server.port, device_id=asked, timeout_s=PATIENT_S)
+    await controller.connect()
+    assert (await controller.read_link()).session == 0
+    await controller.close()
+    assert {request[6] for request in server.requests} == {asked}
+
+
+@pytest.mark.parametrize(("asked", "answers"), [(1, 255), (1, 0), (0, 1), (255, 7)])
+async def test_a_unit_that_answers_as_another_is_told_with_what_to_set(
+    server: MisbehavingServer, asked: int, answers: int
+) -> None:
+    server.reply_with(lambda request: right_reply(request[:6] + bytes([answers]) + request[7:]))
+    controller = ModbusTcpController("127.0.0.1", server.port, device_id=asked, timeout_s=PATIENT_S)
+    await controller.connect()
+    with pytest.raises(ControllerNonsense, match=f"set device_id: {answers}") as fault:
+        await controller.read_link()
+    await controller.close()
+    assert fault.value.answered_as == answers

@@ -4,6 +4,8 @@
  *   libmodbus_server rtu DEVICE REGISTERS BAUDRATE PARITY STOP_BITS
  *
  * It holds registers 0 to REGISTERS - 1, answers all else with exception 2, and says "ready PORT" when it listens.
+ * In its environment: MOST_REGISTERS of one request (more: exception 3), WITHOUT_FC6 (exception 1), ANSWER_AS, the unit
+ * of all its replies.
  */
 #include <errno.h>
 #include <modbus.h>
@@ -36,6 +38,20 @@ static void ready(int port) {
     fflush(stdout);
 }
 
+static void answer(modbus_t *modbus, uint8_t *request, int length, modbus_mapping_t *registers) {
+    const char *most = getenv("MOST_REGISTERS"), *unit = getenv("ANSWER_AS");
+    uint8_t *pdu = request + modbus_get_header_length(modbus);
+    int count = pdu[3] << 8 | pdu[4], many = pdu[0] == 3 || pdu[0] == 16;
+    if (unit)
+        pdu[-1] = atoi(unit);
+    if (pdu[0] == 6 && getenv("WITHOUT_FC6"))
+        modbus_reply_exception(modbus, request, MODBUS_EXCEPTION_ILLEGAL_FUNCTION);
+    else if (many && most && count > atoi(most))
+        modbus_reply_exception(modbus, request, MODBUS_EXCEPTION_ILLEGAL_DATA_VALUE);
+    else
+        modbus_reply(modbus, request, length, registers);
+}
+
 static int serve_line(modbus_t *modbus, modbus_mapping_t *registers) {
     uint8_t request[MODBUS_RTU_MAX_ADU_LENGTH];
     if (modbus_set_slave(modbus, DEVICE_ID) == -1 || modbus_connect(modbus) == -1)
@@ -44,7 +60,7 @@ static int serve_line(modbus_t *modbus, modbus_mapping_t *registers) {
     for (;;) {
         int length = modbus_receive(modbus, request);
         if (length > 0)
-            modbus_reply(modbus, request, length, registers);
+            answer(modbus, request, length, registers);
         else if (length == -1 && (errno == EIO || errno == EBADF))
             return fail("line"); /* the pseudo-terminal has gone */
     }
@@ -78,7 +94,7 @@ static int serve_network(modbus_t *modbus, modbus_mapping_t *registers) {
             modbus_set_socket(modbus, socket);
             int length = modbus_receive(modbus, request);
             if (length > 0)
-                modbus_reply(modbus, request, length, registers);
+                answer(modbus, request, length, registers);
             else if (length == -1) {
                 close(socket);
                 FD_CLR(socket, &open_ones);

@@ -16,12 +16,19 @@ FIRST_CLOCK = 70_000  # the higher half is not 0, as after a minute
 
 
 @contextlib.asynccontextmanager
-async def program(port: int, shift: int = 0, word_order: str = "big", *, alive: bool = True) -> AsyncIterator[None]:
+async def program(
+    port: int,
+    shift: int = 0,
+    word_order: str = "big",
+    *,
+    alive: bool = True,
+    through: ModbusTcpController | None = None,
+) -> AsyncIterator[None]:
     """It runs on the server on loopback's `port`, its blocks `shift` registers higher than the protocol's default.
 
-    alive: False for one that has forgotten heartbeat and clock.
+    alive: False for one that has forgotten heartbeat and clock. through: a client that suits the server.
     """
-    client = ModbusTcpController("127.0.0.1", port, timeout_s=30)
+    client = through or ModbusTcpController("127.0.0.1", port, timeout_s=30)
     await client.connect()
     scanning = asyncio.create_task(_scan_for_ever(client, shift, word_order, alive))
     try:

@@ -8,7 +8,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 TRANSFER, LINK, EXECUTOR, CYCLE = "service/transfer.py", "service/link.py", "service/executor.py", "service/cycle.py"
-JOURNAL, OWNERSHIP = "service/journal.py", "service/ownership.py"
+JOURNAL, OWNERSHIP, CLOCK = "service/journal.py", "service/ownership.py", "service/controller_clock.py"
+IN_CLOCK, IN_DOUBT = "tests/service/test_controller_clock.py", "tests/service/test_transfer_in_doubt.py"
+TRIGGERS, IN_ANSWERS = "service/triggers.py", "tests/service/test_serial_answers.py"
 IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_RESUMING, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (
     f"tests/service/test_{name}.py"
     for name in (
@@ -31,6 +33,12 @@ class Rule:
     test: str
     there: str
     without: str
+
+    def taken_out(self) -> str:
+        """The text of the code's file without the rule."""
+        text = (ROOT / self.code.partition("::")[0]).read_text(encoding="utf-8")
+        whole = source_of(self.code)
+        return text.replace(whole, whole.replace(self.there, self.without, 1))
 
 
 RULES = (
@@ -63,13 +71,48 @@ RULES = (
         "if self._link.connections != clean:",
         "if False:",
     ),
+    Rule(
+        "Conventions: what rests on last_job alone needs reads alike over two changes of the heartbeat",
+        f"{TRANSFER}::Transfer._see",
+        f"{IN_DOUBT}::test_without_our_acknowledgement_last_job_settles_only_once_it_holds",
+        "(self._link.holds or self._acknowledged(view))",
+        "True",
+    ),
+    Rule(
+        "Conventions: so does a last_job above job_id, and another session",
+        f"{TRANSFER}::Transfer._see",
+        f"{IN_DOUBT}::test_a_last_job_that_stands_half_written_for_a_scan_fails_no_job",
+        "if self._link.holds:",
+        "if True:",
+    ),
+    Rule(
+        "Conventions: two changes of the heartbeat, all reads between them alike",
+        f"{LINK}::Link._shows_the_same",
+        f"{IN_LINK}::test_last_job_is_known_once_it_held_over_two_changes_of_the_heartbeat",
+        "if self.holds and",
+        "if",
+    ),
+    Rule(
+        "Conventions: beside our acknowledgement two reads are enough, where ack_result = last_result",
+        f"{TRANSFER}::Transfer._acknowledged",
+        f"{IN_DOUBT}::test_an_acknowledgement_that_says_something_else_than_last_result_settles_nothing_at_once",
+        "return before or view.ack_result == view.last_result",
+        "return True",
+    ),
+    Rule(
+        "Conventions: or where they are 6 and 1",
+        f"{TRANSFER}::Transfer._acknowledged",
+        f"{IN_DOUBT}::test_accepted_before_is_an_acknowledgement_of_accepted",
+        "return before or",
+        "return",
+    ),
     # --- link block ---
     Rule(
         "Link block: session 0 is disregarded",
-        f"{TRANSFER}::Transfer._look",
+        f"{TRANSFER}::Transfer._see",
         f"{IN_TRANSFER}::test_a_session_of_0_is_disregarded",
-        "if view.session == 0:",
-        "if view.session == -1:",
+        "if view.session == 0 or self._link.echo_fault",
+        "if self._link.echo_fault",
     ),
     Rule(
         "Link block: the controller's heartbeat changes while its program runs",
@@ -119,8 +162,8 @@ RULES = (
         "Transfer 1: at most until the job has expired, then it withdraws",
         f"{TRANSFER}::Transfer._ready",
         f"{IN_TRANSFER}::test_a_job_that_expires_while_it_waits_is_withdrawn_with_156",
-        "if now >= self._expires_at_s:",
-        "if now >= self._expires_at_s + 1e9:",
+        "if self._lifetime.over:",
+        "if False:",
     ),
     Rule(
         "Transfer 2: transfer = 0 before payload and header",
@@ -154,8 +197,8 @@ RULES = (
         "Transfer 5: a contour that became too old on its way is not committed",
         f"{TRANSFER}::Transfer._too_old",
         f"{IN_TRANSFER}::test_a_contour_that_became_too_old_while_it_was_made_durable_is_not_committed",
-        "if self._withdrawn_for is not None or self._now() < self._expires_at_s:",
-        "if self._expires_at_s:",
+        "or not self._lifetime.over",
+        "or self._lifetime",
     ),
     Rule(
         "Transfer 7: last_job alone settles, an acknowledgement does not",
@@ -168,14 +211,14 @@ RULES = (
     ),
     Rule(
         "Transfer 7: the controller's final answer settles the job",
-        f"{TRANSFER}::Transfer._look",
+        f"{TRANSFER}::Transfer._see",
         f"{IN_TRANSFER}::test_a_job_that_was_accepted_before_its_withdrawal_arrived_is_accepted",
-        "if view.last_job == self._job_id and view.last_result != 0:",
-        "if view.last_job == self._job_id and view.last_result > 1:",
+        "view.last_result != 0 and (",
+        "view.last_result > 1 and (",
     ),
     Rule(
         "Transfer 7: last_job > job_id: another service was here (155)",
-        f"{TRANSFER}::Transfer._look",
+        f"{TRANSFER}::Transfer._end_without",
         f"{IN_TRANSFER}::test_a_higher_last_job_means_that_another_service_was_here",
         "if view.last_job > self._job_id:",
         "if view.last_job > self._job_id + 10**9:",
@@ -239,17 +282,52 @@ RULES = (
     ),
     Rule(
         "Transfer 9: another session: failed (153), not sent again",
-        f"{TRANSFER}::Transfer._look",
+        f"{TRANSFER}::Transfer._end_without",
         f"{IN_TRANSFER}::test_a_restart_of_the_controller_without_memory_fails_the_job_with_153_and_sends_it_never_again",
         "if view.session != self._session:",
         "if view.session == -1:",
     ),
     Rule(
         "Transfer 9: but last_job = job_id settles it also then",
-        f"{TRANSFER}::Transfer._look",
+        f"{TRANSFER}::Transfer._see",
         f"{IN_TRANSFER}::test_a_restart_of_the_controller_after_it_accepted_settles_the_job_by_its_memory",
-        "if view.last_job == self._job_id and view.last_result != 0:",
-        "if view.session == self._session and view.last_job == self._job_id and view.last_result != 0:",
+        "if view.last_job == self._job_id and",
+        "if view.session == self._session and view.last_job == self._job_id and",
+    ),
+    Rule(
+        "Transfer 2: what was taken longer ago than valid_for by the machine's clock is withdrawn, not sent again",
+        f"{TRANSFER}::Lifetime.left_s",
+        f"{IN_DOUBT}::test_what_was_taken_longer_ago_than_it_may_live_is_withdrawn_never_sent_again",
+        "if self.taken_at_s is not None:",
+        "if False:",
+    ),
+    Rule(
+        "Transfer 2: so is what was taken before that clock went back",
+        f"{TRANSFER}::Lifetime.left_s",
+        f"{IN_DOUBT}::test_what_was_taken_longer_ago_than_it_may_live_is_withdrawn_never_sent_again",
+        "if age_s >= 0 else 0.0",
+        "",
+    ),
+    Rule(
+        "Transfer 2: also after a restart",
+        f"{CYCLE}::Cycle.resume",
+        f"{IN_RESUMING}::test_a_job_taken_longer_ago_than_it_is_valid_is_taken_back_after_a_restart_not_sent_again",
+        "job.taken_at_s, lasts_s",
+        "None, lasts_s",
+    ),
+    Rule(
+        "Transfer 7: nothing is concluded while test_echo is wrong",
+        f"{TRANSFER}::Transfer._see",
+        f"{IN_DOUBT}::test_nothing_is_concluded_from_a_block_that_is_misread",
+        "or self._link.echo_fault(view) is not None",
+        "",
+    ),
+    Rule(
+        "Transfer 9: nothing is sent while the session seems to be another, or last_job to be this job or later",
+        f"{TRANSFER}::Transfer._may_have_ended",
+        f"{IN_DOUBT}::test_nothing_is_sent_while_the_job_may_have_ended",
+        "if view.session not in (0, self._session):",
+        "return None\n        if view.session not in (0, self._session):",
     ),
     # --- after its own start ---
     Rule(
@@ -277,21 +355,77 @@ RULES = (
         "Own start: without a limit of its own a sent job is withdrawn (154)",
         f"{CYCLE}::Cycle.resume",
         f"{IN_RESUMING}::test_a_sent_job_without_a_limit_of_its_own_is_taken_back_after_a_restart",
-        "elif job.pages[0].header[VALID_FOR] == NO_LIMIT:",
-        "elif job.pages[0].header[VALID_FOR] == 0:",
+        "elif not validity.valid_for:",
+        "elif validity.valid_for < 0:",
+    ),
+    Rule(
+        "Own start: what the service block says counts also where owner is its own",
+        f"{JOURNAL}::_is_later",
+        f"{IN_EXECUTOR}::test_a_restored_journal_repeats_no_trigger_and_no_number",
+        "return than[0] != session or 0 < (pair[1] - than[1]) % 65536 < LATER",
+        "return False",
+    ),
+    Rule(
+        "Own start: but an earlier trigger_ack does not",
+        f"{JOURNAL}::_is_later",
+        f"{IN_EXECUTOR}::test_an_earlier_trigger_in_the_service_block_takes_nothing_back",
+        "return than[0] != session or 0 < (pair[1] - than[1]) % 65536 < LATER",
+        "return True",
+    ),
+    Rule(
+        "Own start: a job_id there that the journal does not know is withdrawn (154)",
+        f"{JOURNAL}::Journal.go_on_above",
+        f"{IN_EXECUTOR}::test_a_job_that_only_the_service_block_knows_is_taken_back",
+        "found.job_id > found.settled_job\n",
+        "found.job_id < 0\n",
+    ),
+    Rule(
+        "Own start: a job in flight is settled at the controller and layout that it was sent with, by nothing else",
+        f"{CYCLE}::Cycle.hindrance",
+        f"{IN_RESUMING}::test_a_job_sent_to_another_controller_is_settled_by_nothing_else",
+        "if job.target and job.target != dict(target):",
+        "if False:",
+    ),
+    Rule(
+        "Own start: and no trigger is taken until then",
+        f"{EXECUTOR}::Executor._settle_in_flight",
+        f"{IN_EXECUTOR}::test_a_job_in_flight_elsewhere_keeps_every_trigger_out",
+        "if hindrance is not None:",
+        "if False:",
+    ),
+    Rule(
+        "Own start: numbers from at least 1,000 above all it finds",
+        f"{JOURNAL}::Journal.go_on_above",
+        f"{IN_EXECUTOR}::test_each_start_numbers_from_a_thousand_above_all_in_the_journal",
+        "min(known + room, LARGEST_JOB - 1)",
+        "known",
+    ),
+    Rule(
+        "Own start: and above last_job",
+        f"{EXECUTOR}::Executor._above",
+        f"{IN_EXECUTOR}::test_the_first_number_after_a_start_is_a_thousand_above_last_job",
+        "else last_job + self._room",
+        "else last_job",
+    ),
+    Rule(
+        "Own start: a last_job more than 1,000,000 above all known is a fault until a person confirms it",
+        f"{LINK}::Link._number_fault",
+        f"{IN_LINK}::test_a_last_job_that_leaps_is_a_fault_until_it_is_corrected",
+        "if self.last_job > known + LARGEST_STEP and",
+        "if False and",
     ),
     Rule(
         "A new job_id is above all in the journal",
         f"{JOURNAL}::Journal.take",
         f"{IN_JOURNAL}::test_job_ids_rise_above_the_journal_and_above_what_the_controller_knows",
-        'job_id = max(highest, above, self._number("above")',
-        'job_id = max(above, above, self._number("above")',
+        "job_id = max(highest, above, found) + 1",
+        "job_id = max(above, found) + 1",
     ),
     Rule(
         "A new job_id is above last_job",
         f"{EXECUTOR}::Executor._take",
         f"{IN_EXECUTOR}::test_a_job_id_is_above_the_controllers_last_job",
-        "above=view.last_job if view else 0",
+        "above=self._above()",
         "above=0",
     ),
     Rule(
@@ -303,17 +437,24 @@ RULES = (
     ),
     Rule(
         "Contours are sent only while test_echo = test_value + 1",
-        f"{LINK}::Link._echo_fault",
+        f"{LINK}::Link.echo_fault",
         f"{IN_TRANSFER}::test_contours_are_sent_only_while_the_test_echo_is_right",
         "if view.test_echo == expected:",
         "if expected:",
     ),
     Rule(
-        "A clock reading counts only if it fits the one before within 1 s",
-        f"{LINK}::Link._heard_clock",
-        f"{IN_LINK}::test_a_clock_reading_counts_when_it_fits_the_one_before_within_a_second",
-        "self._clock_fits = abs(off_ms) <= CLOCK_TOLERANCE_MS",
-        "self._clock_fits = True",
+        "A clock reading counts only if it fits the last one that counted within 1 s",
+        f"{CLOCK}::ControllerClock.stamp",
+        f"{IN_CLOCK}::test_a_reading_counts_when_it_fits_the_last_one_that_counted_within_a_second",
+        "if latest is self._counted else None",
+        "",
+    ),
+    Rule(
+        "A clock that jumped counts only once it holds",
+        f"{CLOCK}::ControllerClock._holds",
+        f"{IN_CLOCK}::test_a_value_that_stands_half_written_for_a_whole_scan_never_counts",
+        "and self._doubted_beats >= BEATS_TO_HOLD",
+        "",
     ),
     Rule(
         "Without a clock captured_at and valid_for are 0",
@@ -355,11 +496,32 @@ RULES = (
         "if self.ownership.saw(found) is None:",
     ),
     Rule(
-        "One service: owner is read before a job is called accepted",
-        f"{TRANSFER}::Transfer._look",
-        f"{IN_OWNERSHIP}::test_a_job_is_called_accepted_only_after_the_owner_was_read_once_more",
-        "if view.last_result == Answer.ACCEPTED and not await self._surely_ours():",
-        "if False:",
+        "One service: its own number is watched for 1.5 s at the start",
+        f"{OWNERSHIP}::Ownership._watch",
+        f"{IN_OWNERSHIP}::test_our_own_number_is_watched_for_1_5_s_before_anything_is_written",
+        "WATCH_S if foreign else WATCH_OWN_S",
+        "WATCH_S if foreign else 0.0",
+    ),
+    Rule(
+        "One service: a heartbeat beside its own number that moves: Error (155)",
+        f"{OWNERSHIP}::Ownership._watch",
+        f"{IN_OWNERSHIP}::test_a_copy_of_our_journal_that_lives_is_left_alone",
+        "if foreign or self._moved:",
+        "if foreign:",
+    ),
+    Rule(
+        "One service: a heartbeat that it did not write, twice in a row, is another service",
+        f"{OWNERSHIP}::Ownership._saw_later",
+        f"{IN_OWNERSHIP}::test_a_heartbeat_that_we_did_not_write_twice_in_a_row_is_another_with_our_number",
+        "block.service_heartbeat not in self._beats",
+        "False",
+    ),
+    Rule(
+        "One service: a write without a reply may be found later",
+        f"{OWNERSHIP}::Ownership.writing",
+        f"{IN_OWNERSHIP}::test_a_heartbeat_of_ours_that_lands_late_is_ours",
+        "self._beats.append(beat)",
+        "self._beats = deque([beat])",
     ),
     Rule(
         "One service: a foreign one whose heartbeat moves: Error (155), nothing is written",
@@ -372,22 +534,50 @@ RULES = (
         "One service: watched for 3 s before its own is written",
         f"{OWNERSHIP}::Ownership._watch",
         f"{IN_OWNERSHIP}::test_nothing_is_written_over_another_that_moved_or_was_watched_for_less_than_3_s",
-        "elif now - self._since >= WATCH_S:",
-        "elif now - self._since >= WATCH_S / 2:",
+        "(WATCH_S if foreign",
+        "(WATCH_S / 2 if foreign",
     ),
     Rule(
         "One service: then 3 s more, and only if its own still stands",
-        f"{OWNERSHIP}::Ownership._saw_ours",
+        f"{OWNERSHIP}::Ownership._saw_later",
         f"{IN_OWNERSHIP}::test_a_foreign_owner_whose_heartbeat_stands_for_3_s_is_taken_over_and_ours_must_stand_for_3_s_more",
-        "if self._now() - self._since < WATCH_S:",
+        "if self._now() - self._since_s >= WATCH_S:",
+        "if True:",
+    ),
+    Rule(
+        "One service: later a foreign one stops all writing, until a person says so",
+        f"{OWNERSHIP}::Ownership.saw",
+        f"{IN_OWNERSHIP}::test_a_foreign_owner_later_stops_all_writing_until_a_person_says_so",
+        "if self.conflict:\n            return False",
+        "",
+    ),
+    Rule(
+        "One service: then a job of which nothing was sent fails (155) at once",
+        f"{TRANSFER}::Transfer._stand_by",
+        f"{IN_OWNERSHIP}::test_a_job_of_which_nothing_was_sent_fails_with_155_at_once",
+        "if ownership.conflict and not self._sent:",
         "if False:",
     ),
     Rule(
-        "One service: later a foreign one stops all writing, the job in flight fails (155)",
-        f"{TRANSFER}::Transfer._check_owner",
-        f"{IN_OWNERSHIP}::test_a_job_in_flight_fails_with_155_when_another_service_comes_and_nothing_more_is_written",
-        "if ownership.lost:",
-        "if False:",
+        "One service: any other stays in flight, and last_job = job_id settles it",
+        f"{TRANSFER}::Transfer._stand_by",
+        f"{IN_OWNERSHIP}::test_a_job_that_was_sent_stays_in_flight_beside_another_service_and_its_acceptance_settles_it",
+        "if ownership.conflict and not self._sent:",
+        "if ownership.conflict:",
+    ),
+    Rule(
+        "One service: valid_for and then ack_timeout gone by on the controller's clock end it (155)",
+        f"{TRANSFER}::Transfer._is_over",
+        f"{IN_OWNERSHIP}::test_beside_another_service_a_job_ends_with_155_once_the_controller_would_not_accept_it_any_more",
+        "self._validity.valid_for + self._settings.ack_timeout_s * 1000",
+        "self._validity.valid_for + 10**9",
+    ),
+    Rule(
+        "One service: without valid_for job_timeout ends it",
+        f"{TRANSFER}::Transfer._is_over",
+        f"{IN_OWNERSHIP}::test_beside_another_service_and_without_a_limit_it_ends_after_job_timeout_and_says_so",
+        "return self._lifetime.over",
+        "return False",
     ),
     # --- handshake: none ---
     Rule(
@@ -505,10 +695,31 @@ RULES = (
     ),
     Rule(
         "Always: a lost journal repeats no trigger: the service block says which was taken",
-        f"{EXECUTOR}::Executor._go_on_after",
+        f"{JOURNAL}::Journal.go_on_above",
         f"{IN_EXECUTOR}::test_a_trigger_that_a_lost_journal_held_is_not_taken_again",
-        "pair = (block.session_ack, block.trigger_ack)",
-        "pair = (0, 0)",
+        "if later:",
+        "if False:",
+    ),
+    Rule(
+        "Always: who got an ACK on a serial line gets its DONE or FAIL, also after a restart",
+        f"{TRIGGERS}::SerialTrigger._tell_owed",
+        f"{IN_ANSWERS}::test_a_job_that_was_in_flight_at_a_kill_is_told_its_end_after_the_restart",
+        "if job.job_id <= self._of_before or job.job_id in self._acknowledged",
+        "if job.job_id in self._acknowledged",
+    ),
+    Rule(
+        "Always: who got an ACK hears the end also when the line was away",
+        f"{TRIGGERS}::SerialTrigger._serve",
+        f"{IN_ANSWERS}::test_what_ended_while_the_line_was_away_is_told_when_it_is_back",
+        "self._look.set()",
+        "pass",
+    ),
+    Rule(
+        "Always: measurement and evidence of a job are durable before its contour is sent",
+        f"{CYCLE}::Cycle._send",
+        f"{IN_CYCLE}::test_nothing_is_sent_before_measurement_and_evidence_are_durable",
+        "await self._drafted(job, drafted)",
+        "pass",
     ),
     Rule(
         "Always: losing the controller never ends the service",

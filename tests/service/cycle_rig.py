@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.mailbox import Page
 from service.config import Recipe
 from service.cycle import Cycle, CycleSettings, Observation
+from service.evidence import Evidence
 from service.health import Health
 from service.journal import Job, Journal, TriggerStamp
 from service.link import Link, LinkSettings
@@ -57,6 +58,22 @@ class Plan:
         return self.result
 
 
+class HeldKeeper:
+    """Keeps evidence in memory; what is drafted is durable once `durable` is told so."""
+
+    def __init__(self) -> None:
+        self.drafted: list[Evidence] = []
+        self.kept: list[Evidence] = []
+        self.durable: Future[None] = Future()
+
+    def draft(self, evidence: Evidence) -> Future[None]:
+        self.drafted.append(evidence)
+        return self.durable
+
+    def keep(self, evidence: Evidence) -> None:
+        self.kept.append(evidence)
+
+
 class Rig:
     """A cycle with a real journal, a camera of the simulated kind and a scripted controller."""
 
@@ -73,6 +90,8 @@ class Rig:
             self.link = Link(controller, LinkSettings(handshake, poll_period_s=0.01, heartbeat_timeout_s=0.5))
         self.pool = ThreadPoolExecutor(1)
         self.seen: list[Observation] = []
+        self.keeper = HeldKeeper()
+        self.keeper.durable.set_result(None)
         recipes = {1: Recipe(number=1, name="one"), 2: Recipe(number=2, name="two", thickness_mm=35)}
         self.cycle = Cycle(
             self.camera,
@@ -85,6 +104,7 @@ class Rig:
             settings,
             self.pool,
             observe=self.seen.append,
+            keeper=self.keeper,
         )
 
     async def job(self, trigger: TriggerStamp | None = None) -> Job:

@@ -61,6 +61,20 @@ def written(folder: Path, data: object) -> Path:
     return path
 
 
+@pytest.mark.parametrize("stated", [{"plane_mm": 0.12}, {"planes": [PLANE]}], ids=["one figure", "maps"])
+def test_the_covered_part_comes_back_and_a_file_without_one_covers_all(tmp_path: Path, stated: dict[str, Any]) -> None:
+    corners = np.array([[0.0, 0.0], [1599.0, 0.0]])
+    ring = [[100.0, 100.0], [1700.0, -100.0], [900.0, 900.0]]
+    for covered, outside in (({}, 0), ({"covered_px": ring}, 1)):
+        read = load_calibration(written(tmp_path, {**CAMERA, "uncertainty": {**stated, **covered}}))
+        save_calibration(tmp_path / "again.yaml", read)
+        for calibration in (read, load_calibration(tmp_path / "again.yaml")):
+            assert calibration.uncertainty is not None
+            assert len(calibration.uncertainty.uncovered(corners)) == outside
+    with pytest.raises(CalibrationFileError, match="covered_px"):
+        load_calibration(written(tmp_path, {**CAMERA, "uncertainty": {**stated, "covered_px": ring[:2]}}))
+
+
 @pytest.mark.parametrize("form", [CAMERA, SIMPLE], ids=["camera", "simple"])
 def test_what_a_calibration_states_of_itself_is_read_and_written(tmp_path: Path, form: dict[str, Any]) -> None:
     assert load_calibration(written(tmp_path, form)).uncertainty is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 import yaml
 
 from contour.calibration import CameraCalibration
+from contour.position_uncertainty import PositionUncertainty
 from contour.sentinels import Sentinels, see_sentinels
 from service.calibration_file import CalibrationRecord, save_record
 from service.calibration_guard import CalibrationGuard, GuardLimits
@@ -119,6 +121,23 @@ def test_check_shows_age_figure_and_offsets(tmp_path: Path, capsys: pytest.Captu
     assert "95 % of positions within, mm: not stated" in told
     assert "2 fixed marks" in told
     assert "fixed marks: mark 3 by 0.0" in told
+
+
+def test_check_warns_of_a_work_area_that_the_calibration_does_not_cover(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    width, height = calibration().image_width, calibration().image_height
+    ring = np.array([[0.0, 0.0], [width / 2, 0.0], [width / 2, height], [0.0, height]])
+    sure = replace(PositionUncertainty.everywhere(width, height, 0.1), covered_px=ring)
+    covering = replace(calibration(), uncertainty=sure)
+    inner = np.array([[0.1, 0.1], [0.4, 0.1], [0.4, 0.9], [0.1, 0.9]]) * [width, height]
+    config = cell(tmp_path, EMPTY, CalibrationRecord(covering))
+    for pixels, told in ((inner, False), (inner * [2.0, 1.0], True)):
+        area = covering.to_machine(covering.to_work(pixels, 20.0)).round(1).tolist()
+        data = yaml.safe_load(config.read_text()) | {"work_area_mm": area}
+        config.write_text(yaml.safe_dump(data))
+        assert main(["check", "--config", str(config)]) == 0
+        assert ("mm lie where it is not covered" in capsys.readouterr().out) is told
 
 
 def test_check_tells_a_bump_and_an_old_calibration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import grp
 import importlib.util
 import json
 import os
+import pwd
 import shutil
 import socket
-import subprocess
-import sys
+from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from service.config import Config
 from service.config_file import SAMPLES, load_config
 from service.journal import Journal, TriggerStamp
 from service.lock import Lock, NameLock, name_is_held
+from tests.nobody import NOBODY, needs_root, open_folder, python_as_nobody
 
 
 def written(folder: Path, camera: str = "{kind: files, path: in}", more: str = "") -> Path:
@@ -44,6 +46,12 @@ def config(folder: Path, camera: str = "{kind: files, path: in}", more: str = ""
 
 def part(found: list[Finding], name: str) -> Finding:
     return next(one for one in found if one.part == name)
+
+
+@pytest.fixture
+def reachable() -> Iterator[Path]:
+    with open_folder() as folder:
+        yield folder
 
 
 WATCHED = "{kind: files, path: in, loop: false, watch: true, move_to: done}"
@@ -120,32 +128,24 @@ def test_a_clock_behind_the_last_job_is_a_warning(tmp_path: Path) -> None:
     assert (found.level, "before the last job" in found.text) == (Level.WARNING, True)
 
 
-@pytest.mark.skipif(os.getuid() != 0, reason="needs root to become somebody else")
-def test_who_may_not_enter_the_services_folders_gets_a_line_and_no_traceback(tmp_path: Path) -> None:
-    for folder in (tmp_path, *tmp_path.parents):
-        if folder.stat().st_uid == 0 and folder != Path("/"):
-            folder.chmod(folder.stat().st_mode | 0o055)
-    path = written(tmp_path, more="table: {file: closed/table}")
+@needs_root
+def test_who_may_not_enter_the_services_folders_gets_a_line_and_no_traceback(reachable: Path) -> None:
+    path = written(reachable, more="table: {file: closed/table}")
     path.write_text(path.read_text().replace("journal: {path: journal", "journal: {path: state/journal"))
-    journal = Journal(tmp_path / "state" / "journal.sqlite")
+    journal = Journal(reachable / "state" / "journal.sqlite")
     journal.take(TriggerStamp("manual"))
     journal.close()
     for name in ("state", "archive", "closed"):
-        (tmp_path / name).mkdir(exist_ok=True, mode=0o750)
-        (tmp_path / name).chmod(0o750)
-    code = (
-        "import os, sys; from service.cli.main import main\n"
-        "os.setgroups([]); os.setgid(65534); os.setuid(65534)\n"
-        "sys.exit(main([*sys.argv[2:], '--config', sys.argv[1]]))"
-    )
+        (reachable / name).mkdir(exist_ok=True, mode=0o750)
+        (reachable / name).chmod(0o750)
+    command_line = "sys.exit(main([*sys.argv[2:], '--config', sys.argv[1]]))"
 
     def told(*command: str) -> tuple[int, str]:
-        arguments = [sys.executable, "-c", code, str(path), *command]
-        done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+        done = python_as_nobody("from service.cli.main import main", command_line, path, *command)
         assert "Traceback" not in done.stderr
         return done.returncode, done.stdout + done.stderr
 
-    state = tmp_path / "state"
+    state = reachable / "state"
     assert "User root and group root may" in told("status")[1]
     for command in (["jobs"], ["jobs", "show", "1"], ["replay", "--limit", "1"]):
         status, text = told(*command)
@@ -161,25 +161,28 @@ def test_who_may_not_enter_the_services_folders_gets_a_line_and_no_traceback(tmp
     assert "Run this as a user who may read it" in told("jobs")[1]
 
 
-@pytest.mark.skipif(os.getuid() != 0, reason="needs root to become somebody else")
-def test_what_the_user_may_not_use_names_the_group_that_may(tmp_path: Path) -> None:
-    device = tmp_path / "ttyUSB0"
-    device.touch(mode=0o660)
-    os.chown(device, 0, 20)  # dialout
-    for folder in (tmp_path, *tmp_path.parents):
-        if folder.stat().st_uid == 0 and folder != Path("/"):
-            folder.chmod(folder.stat().st_mode | 0o055)
-    path = written(tmp_path, more=f"triggers: [{{kind: serial, port: {device}}}]")
-    code = (
-        "import os, sys; from pathlib import Path; from service.config_file import load_config\n"
+@needs_root
+def test_what_the_user_may_not_use_names_the_group_that_may(reachable: Path) -> None:
+    device = reachable / "ttyUSB0"
+    device.touch()
+    device.chmod(0o660)
+    group = next(one for one in grp.getgrall() if one.gr_gid != 0)
+    os.chown(device, 0, group.gr_gid)
+    path = written(reachable, more=f"triggers: [{{kind: serial, port: {device}}}]")
+    done = python_as_nobody(
+        "from pathlib import Path; from service.config_file import load_config\n"
         "import service.checkup.devices as devices; import service.checkup.storage as storage\n"
-        "config = load_config(Path(sys.argv[1])); os.setgroups([]); os.setgid(65534); os.setuid(65534)\n"
+        "config = load_config(Path(sys.argv[1]))",
         "for one in (*devices.check_permissions(config), *storage.check_storage(config, running=False)):\n"
-        "    print(one.level.label, one.part, one.text, one.next_step)"
+        "    print(one.level.label, one.part, one.text, one.next_step)",
+        path,
     )
-    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True)
-    assert f"FAULT permissions {device}: user nobody may not read and write it, group dialout may" in done.stdout
-    assert "usermod -aG dialout nobody" in done.stdout
+    assert done.returncode == 0, done.stderr
+    user = pwd.getpwuid(NOBODY).pw_name
+    assert (
+        f"FAULT permissions {device}: user {user} may not read and write it, group {group.gr_name} may" in done.stdout
+    )
+    assert f"usermod -aG {group.gr_name} {user}" in done.stdout
     for name in ("state", "archive", "journal"):
         assert f"FAULT {name} " in done.stdout
 
@@ -193,6 +196,18 @@ def test_one_recipe_is_one_recipe(tmp_path: Path, capsys: pytest.CaptureFixture[
     told = capsys.readouterr().out
     assert "1 recipe, no triggers: jobs begin by hand only" in told
     assert "calibration  none" in told
+
+
+def test_a_step_above_twice_the_core_is_a_warning_where_both_are_given(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(SAMPLES / "1-rectangle.jpg", written(tmp_path).parent / "in")
+    recipe = "{number: 4, name: a, method: sliding-matrix, parameters: {step_px: 21, core_px: CORE}}"
+    for core, warned in ((10, True), (11, False)):
+        path = written(tmp_path, more=f"recipes: [{recipe.replace('CORE', str(core))}]\ndefault_recipe: 4")
+        assert main(["check", "--config", str(path)]) == 0
+        told = capsys.readouterr().out
+        assert ("warn  recipes      recipe 4: step_px is 21, expected up to 20, twice core_px" in told) == warned
 
 
 def test_each_mistake_is_a_finding_and_keys_of_other_kinds_are_one(

@@ -38,6 +38,7 @@ def test_the_shipped_config_is_the_contracts_example_and_loads() -> None:
     assert isinstance(config.controller, ModbusTcp)
     controller = config.controller
     assert (controller.link_address, controller.service_address, controller.contour_address) == (0, 16, 32)
+    assert (controller.device_id, controller.single_write) == (1, "fc6")
     assert (controller.payload_capacity, controller.word_order, controller.handshake) == (1984, "big", "full")
     assert (controller.valid_for_s, controller.job_timeout_s, controller.max_repeats) == (30, 120, 3)
     assert config.recipes[0].name == "default"
@@ -141,6 +142,13 @@ def test_the_embedded_defaults_need_no_file() -> None:
         ),
         (SMALL.replace("modbus-tcp", "modbus-tcp, word_order: huge"), "controller.word_order: seen 'huge'"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, payload_capacity: 99"), "payload_capacity: is 99, expected an even"),
+        (SMALL.replace("modbus-tcp", "modbus-tcp, longest_write: 15"), "seen 15, expected 16 or more (Most registers"),
+        (SMALL.replace("modbus-tcp", "modbus-tcp, longest_read: 10"), "in one read; blocks of 16 go whole"),
+        (
+            SMALL.replace("modbus-tcp", "modbus-rtu, port: /dev/x, device_id: 0"),
+            "device_id: seen 0, expected 1 or more",
+        ),
+        (SMALL.replace("modbus-tcp", "modbus-rtu-over-tcp, device_id: 0"), "device_id: seen 0, expected 1 or more"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, link_address: 20"), "link_address (20 to 35) and service_address"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, contour_address: 65000"), "contour_address 65000 and 2016 registers"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, ack_timeout_s: 0.01"), "ack_timeout_s is 0.01, expected more than"),

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
+from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
@@ -15,7 +18,7 @@ from contour.error_budget import ErrorBudget
 from contour.errors import ParameterError, PictureError
 from contour.geometry import Contour, area
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable, SceneMoved
-from drivers.controller.mailbox import Answer
+from drivers.controller.mailbox import Answer, Page
 from service.cycle import MailboxFormat
 from service.journal import TriggerStamp
 from service.reasons import Outcome, Reason
@@ -23,6 +26,7 @@ from service.state import State
 from tests.protocol_decoder import decode_contour
 from tests.service.cycle_rig import QUICK, RECTANGLE, SETTINGS, decoded, measured, rig
 from tests.service.scripted_controller import ScriptedController
+from tests.service.waiting import until
 
 
 async def test_a_good_job_is_accepted_and_its_page_says_what_the_protocol_says(tmp_path: Path) -> None:
@@ -327,6 +331,61 @@ async def test_a_journal_that_fails_during_a_job_holds_it_up_is_told_once_and_lo
         built.journal._db.execute("PRAGMA query_only = OFF")
         assert (await asyncio.wait_for(task, 10)).outcome is Outcome.ACCEPTED
     assert sum("journal" in record.message for record in caplog.records if record.name == "combtrace.cycle") == 1
+
+
+async def test_nothing_is_sent_before_measurement_and_evidence_are_durable(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        built.keeper.durable = Future()
+        task = asyncio.ensure_future(built.job())
+        await until(lambda: built.keeper.drafted)
+        await asyncio.sleep(0.2)
+        assert built.controller.count("write_page") == 0
+        (draft,) = built.keeper.drafted
+        assert (draft.job.outcome, draft.measurement, draft.frame) == (None, built.plan.result, built.seen[0].frame)
+        assert not built.journal.unsettled()[0].sent, "a restart would send it, with its evidence lost"
+        seen, write_page = [], built.controller.write_page
+
+        async def noting(page: Page) -> None:
+            seen.extend(built.journal.unsettled())
+            await write_page(page)
+
+        built.controller.write_page = noting  # type: ignore[method-assign]
+        built.keeper.durable.set_result(None)
+        job = await task
+        (taken,) = seen
+        assert (taken.terms, taken.transfer) == (job.terms, job.transfer)
+        assert taken.terms is not None
+        assert taken.transfer["crc32"]
+        assert taken.report["vertices"] == 4
+        assert job.outcome is Outcome.ACCEPTED
+        assert (draft.pages, [kept.job for kept in built.keeper.kept]) == (tuple(built.controller.accepted), [job])
+
+
+async def test_a_disk_that_hangs_holds_no_contour_up_for_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("service.cycle.EVIDENCE_WAIT_S", 0.05)
+    async with rig(tmp_path) as built:
+        built.keeper.durable = Future()
+        assert (await built.job()).outcome is Outcome.ACCEPTED
+    assert "job 1 goes on without its evidence: the archive's disk is slow" in caplog.text
+
+
+async def test_a_job_that_is_stopped_before_it_was_sent_leaves_what_it_came_to(tmp_path: Path) -> None:
+    async with rig(tmp_path) as built:
+        measuring = threading.Event()
+        built.plan.measure = lambda *_: measuring.set() or time.sleep(0.3)  # type: ignore[assignment,method-assign]
+        task = asyncio.ensure_future(built.job())
+        await until(measuring.is_set)
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+        job = built.journal.last_settled()
+        assert job is not None
+        assert (job.reason, job.report.keys()) == (Reason.ABORTED, {"frame", "frame_ms"})
+        (kept,) = built.keeper.kept
+        assert kept.job == job
+        assert kept.frame is not None
 
 
 async def test_a_withdrawal_that_drags_on_is_an_error_with_its_reason(tmp_path: Path) -> None:

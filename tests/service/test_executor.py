@@ -6,6 +6,7 @@ import asyncio
 import sqlite3
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller.mailbox import LinkBlock, ServiceBlock
-from service.executor import Executor, missed_between
+from service.executor import ROOM, Executor, missed_between
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
 from service.link import Link, LinkSettings
@@ -26,10 +27,13 @@ from tests.service.waiting import until
 class HeldRunner:
     """Carries a job out when it is let go."""
 
+    hindered: str | None = None
+
     def __init__(self, journal: Journal) -> None:
         self.journal = journal
         self.begun: list[int] = []
         self.resumed: list[int] = []
+        self.sent: list[int] = []
         self.go = asyncio.Event()
         self.go.set()
 
@@ -38,8 +42,12 @@ class HeldRunner:
         await self.go.wait()
         return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"vertices": 4})
 
+    def hindrance(self, job: Job) -> str | None:
+        return self.hindered
+
     async def resume(self, job: Job) -> Job:
         self.resumed.append(job.job_id)
+        self.sent += [job.job_id] if job.sent else []
         await self.go.wait()
         return self.journal.settle(job.job_id, Outcome.FAILED, Reason.SERVICE_RESTARTED, "sent before")
 
@@ -72,13 +80,17 @@ class Bench:
         self.link._beat_at = 0.0
         self.link._up.set()
         self.link._trouble = None
+        self.link.last_job = self.link.view.last_job
         self.link.ownership.saw(ServiceBlock())
+        self.link.ownership.wrote()
         self.executor.wake()
 
 
 @asynccontextmanager
-async def running(folder: Path, *, observe: bool = False, counter: int = 0) -> AsyncIterator[Bench]:
+async def running(folder: Path, *, observe: bool = False, counter: int = 0, begun: bool = True) -> AsyncIterator[Bench]:
+    """begun: what stands at the controller was seen: nobody has written there."""
     bench = Bench(folder, observe=observe)
+    bench.executor._begun = bench.executor._begun or begun
     task = asyncio.ensure_future(bench.executor.run())
     bench.health.start()
     bench.controller_says(trigger_counter=counter)
@@ -220,6 +232,7 @@ async def test_a_job_in_flight_at_the_start_is_settled_before_any_trigger_is_tak
     old = before.take(TriggerStamp("controller", session=9, counter=6))
     before.close()
     bench = Bench(tmp_path)
+    bench.executor._begun = True
     bench.runner.go.clear()
     bench.health.start()
     bench.controller_says(trigger_counter=7)
@@ -245,7 +258,7 @@ async def test_a_job_id_is_above_the_controllers_last_job(tmp_path: Path) -> Non
     async with running(tmp_path) as bench:
         bench.controller_says(last_job=70_000, last_result=1)
         ticket = await bench.executor.submit(TriggerStamp("serial"))
-        assert ticket.job.job_id == 70_001
+        assert ticket.job.job_id >= 70_000 + ROOM
         await ticket.settled
 
 
@@ -353,7 +366,7 @@ async def test_a_trigger_that_a_lost_journal_held_is_not_taken_again(tmp_path: P
         assert (published.trigger_ack, published.session_ack) == (6, 9)
         assert (published.job_id, published.settled_job) == (70, 70)
         job = await by_hand(bench)  # it would be refused, were the controller's trigger still open
-        assert job.job_id == 71, "numbers go on above what was found"
+        assert job.job_id >= 70 + ROOM, "numbers go on well above what was found"
         bench.controller_says(trigger_counter=7)
         await until(lambda: len(bench.settled) == 2)
 
@@ -371,7 +384,8 @@ async def test_a_job_that_a_lost_journal_held_in_flight_is_settled_before_any_tr
         assert (job.sent, job.session, job.withdraw_reason) == (True, 9, Reason.SERVICE_RESTARTED)
         bench.runner.go.set()
         await until(lambda: len(bench.settled) == 2)
-        assert [job.job_id for job in bench.settled] == [70, 71]
+        assert bench.settled[0].job_id == 70
+        assert bench.settled[1].job_id >= 70 + ROOM
 
 
 async def test_what_was_found_is_known_after_the_next_restart_too(tmp_path: Path) -> None:
@@ -383,7 +397,7 @@ async def test_what_was_found_is_known_after_the_next_restart_too(tmp_path: Path
         await asyncio.sleep(0.05)
         assert bench.settled == []
         ticket = await bench.executor.submit(TriggerStamp("serial"))
-        assert ticket.job.job_id == 71
+        assert ticket.job.job_id >= 70 + ROOM
         await ticket.settled
 
 
@@ -391,17 +405,152 @@ async def test_registers_that_hold_no_service_block_are_not_believed(tmp_path: P
     async with running(tmp_path) as bench:
         await bench.link.on_found(left_behind(test_value=99, job_id=4_000_000_000))
         ticket = await bench.executor.submit(TriggerStamp("serial"))
-        assert ticket.job.job_id == 1
+        assert ROOM <= ticket.job.job_id < 3 * ROOM
         await ticket.settled
 
 
-async def test_a_service_whose_numbers_were_lower_leaves_ours_as_they_are(tmp_path: Path) -> None:
+async def test_a_job_of_a_service_whose_numbers_were_lower_is_taken_back_and_ours_stay(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
         bench.controller_says(last_job=200)
-        await (await bench.executor.submit(TriggerStamp("serial"))).settled
+        ours = (await (await bench.executor.submit(TriggerStamp("serial"))).settled).job_id
         await bench.link.on_found(left_behind(settled_job=69))
-        assert bench.link.published.job_id == 201
-        assert bench.journal.unsettled() == ()
+        await until(lambda: bench.runner.resumed == [70])
+        await until(lambda: bench.journal.unsettled() == ())
+        assert (bench.link.published.job_id, bench.link.published.settled_job) == (ours, ours)
+
+
+# --- our own number, and a journal that is older than what it told ---------------------------------------------
+
+
+async def after_a_restore(tmp_path: Path, bench_jobs: int = 3) -> int:
+    """A journal in which triggers 1 to 3 of session 9 were taken; the last job's number."""
+    async with running(tmp_path) as bench:
+        for counter in range(1, bench_jobs + 1):
+            bench.controller_says(trigger_counter=counter)
+            await until(lambda counter=counter: len(bench.settled) == counter)
+        return bench.settled[-1].job_id
+
+
+async def test_a_restored_journal_repeats_no_trigger_and_no_number(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    before = await after_a_restore(tmp_path)
+    async with running(tmp_path) as bench:
+        owner = bench.journal.owner
+        gone_on = before + 3  # three more jobs, which the restored journal does not hold
+        await bench.link.on_found(left_behind(owner=owner, job_id=gone_on, settled_job=gone_on))
+        bench.controller_says(trigger_counter=6)
+        await asyncio.sleep(0.05)
+        assert bench.settled == [], "trigger 6 was done"
+        bench.controller_says(trigger_counter=7)
+        await until(lambda: bench.settled)
+        assert bench.settled[0].job_id >= gone_on + ROOM
+    assert "the journal is older" in caplog.text
+    assert [record.levelname for record in caplog.records if "counts as taken" in record.message] == ["CRITICAL"]
+
+
+async def test_a_job_that_only_the_service_block_knows_is_taken_back(tmp_path: Path) -> None:
+    before = await after_a_restore(tmp_path)
+    async with running(tmp_path) as bench:
+        found = left_behind(owner=bench.journal.owner, job_id=before + 1, settled_job=before, trigger_ack=4)
+        await bench.link.on_found(found)
+        await until(lambda: bench.runner.resumed == [before + 1])
+        assert bench.link.published.settled_job == before + 1, "so that its trigger ends"
+
+
+async def test_a_job_that_the_journal_calls_unsent_is_settled_by_the_controller_where_the_block_knows_it(
+    tmp_path: Path,
+) -> None:
+    """A copy of the journal was taken after the trigger and before the contour was sent, and put back afterwards."""
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        job = (await bench.executor.submit(TriggerStamp("serial"))).job
+    async with running(tmp_path, begun=False) as bench:
+        await asyncio.sleep(0.05)
+        assert bench.runner.resumed == [], "what the controller knows is asked first"
+        assert bench.health.state is State.ERROR
+        owner = bench.journal.owner
+        await bench.link.on_found(left_behind(owner=owner, job_id=job.job_id, settled_job=0, trigger_ack=0))
+        await until(lambda: bench.runner.resumed == [job.job_id])
+        assert bench.runner.sent == [job.job_id], "as one that may have been sent"
+
+
+async def test_a_job_that_the_journal_calls_unsent_and_the_block_does_not_know_was_never_sent(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        job = (await bench.executor.submit(TriggerStamp("serial"))).job
+    async with running(tmp_path) as bench:
+        await until(lambda: bench.runner.resumed == [job.job_id])
+        assert bench.runner.sent == []
+
+
+async def test_an_earlier_trigger_in_the_service_block_takes_nothing_back(tmp_path: Path) -> None:
+    before = await after_a_restore(tmp_path)
+    async with running(tmp_path, counter=3) as bench:
+        owner = bench.journal.owner
+        await bench.link.on_found(left_behind(owner=owner, job_id=before, settled_job=before, trigger_ack=2))
+        await asyncio.sleep(0.05)
+        assert bench.settled == [], "trigger 3 stays taken"
+        assert (bench.link.published.session_ack, bench.link.published.trigger_ack) == (9, 3)
+
+
+async def test_each_start_numbers_from_a_thousand_above_all_in_the_journal(tmp_path: Path) -> None:
+    numbers = []
+    for _ in range(4):
+        async with running(tmp_path) as bench:
+            await bench.link.on_found(ServiceBlock())
+            numbers.append((await by_hand(bench)).job_id)
+            numbers.append((await by_hand(bench)).job_id)
+    starts, seconds = numbers[::2], numbers[1::2]
+    assert [second - start for start, second in zip(starts, seconds, strict=True)] == [1] * 4
+    assert all(later - earlier >= ROOM for earlier, later in zip([0, *seconds], starts, strict=False))
+
+
+async def test_a_start_without_a_job_uses_up_no_numbers(tmp_path: Path) -> None:
+    for _ in range(5):
+        async with running(tmp_path) as bench:
+            await bench.link.on_found(ServiceBlock())
+    async with running(tmp_path) as bench:
+        await bench.link.on_found(ServiceBlock())
+        assert (await by_hand(bench)).job_id < 3 * ROOM
+
+
+async def test_the_first_number_after_a_start_is_a_thousand_above_last_job(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        await bench.link.on_found(ServiceBlock())
+        bench.controller_says(last_job=500_000)
+        assert (await by_hand(bench)).job_id >= 500_000 + ROOM
+
+
+async def test_a_last_job_that_has_not_held_numbers_nothing(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=1)
+        await until(lambda: bench.settled)
+        assert bench.link.view is not None
+        bench.link.view = replace(bench.link.view, last_job=0x0001_FFFF, trigger_counter=2)  # half written
+        bench.executor.wake()
+        await asyncio.sleep(0.05)
+        assert len(bench.settled) == 1, "the trigger stays pending"
+        bench.controller_says(last_job=0x0001_0000, trigger_counter=2)
+        await until(lambda: len(bench.settled) == 2)
+        assert 0x0001_0000 < bench.settled[1].job_id < 0x0001_0000 + 3 * ROOM
+
+
+async def test_a_job_in_flight_elsewhere_keeps_every_trigger_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        ticket = await bench.executor.submit(TriggerStamp("serial"))
+        bench.journal.store_pages(ticket.job.job_id, 9, ())
+    monkeypatch.setattr(HeldRunner, "hindered", "Put back controller.word_order: big")
+    async with running(tmp_path) as bench:
+        bench.controller_says(trigger_counter=4)
+        await until(lambda: "word_order" in (bench.health.reason or ""))
+        await asyncio.sleep(0.05)
+        assert bench.health.state is State.ERROR
+        assert bench.settled == []
+        assert bench.runner.resumed == []
 
 
 # --- observing --------------------------------------------------------------------------------------------------

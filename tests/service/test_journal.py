@@ -132,7 +132,7 @@ def test_a_journal_of_another_version_is_refused_by_its_number(tmp_path: Path) -
     database = sqlite3.connect(path)
     database.execute("PRAGMA user_version = 99")
     database.close()
-    with pytest.raises(JournalError, match="schema version 99, expected 1 to 3"):
+    with pytest.raises(JournalError, match="schema version 99, expected 1 to 4"):
         Journal(path)
 
 

@@ -188,7 +188,7 @@ def test_what_had_not_ended_is_brought_over_where_it_can_be_read(tmp_path: Path)
 
 def test_the_last_trigger_is_not_taken_again_after_a_journal_was_brought_over(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "journal.sqlite")
-    journal.restore([(61, "2026-11-21T08:00:00", "controller", 9, 5, 0, 0, None, None, None)], (9, 5))
+    journal.restore([(61, "2026-11-21T08:00:00", "controller", None, 9, 5, 0, 0, None, None, None, None)], (9, 5))
     assert journal.last_controller_trigger() == (9, 5)
     assert [job.job_id for job in journal.unsettled()] == [61]
     journal.close()

@@ -89,47 +89,6 @@ async def test_what_an_earlier_connection_said_does_not_count_as_one_of_the_two(
         assert link._previous is None
 
 
-async def test_a_clock_reading_counts_when_it_fits_the_one_before_within_a_second() -> None:
-    blocks = [LinkBlock(session=9, clock=clock) for clock in (1000, 1500, 9000, 9500)]
-    link = link_over(*blocks, times=[0.0, 0.5, 1.0, 1.5])
-    await link.look()
-    assert link.stamp().clock_ms == 1500
-    link._previous = None
-    link.controller.blocks = [blocks[2]]
-    with pytest.raises(IndexError):
-        await link.look()
-    assert link.stamp() is None
-
-
-async def test_a_clock_may_wrap() -> None:
-    link = link_over(
-        LinkBlock(session=9, clock=0xFFFFFFFF - 99), LinkBlock(session=9, clock=400), times=[0.0, 0.5, 0.5]
-    )
-    await link.look()
-    assert link.stamp().clock_ms == 400
-
-
-async def test_a_controller_without_a_clock_gives_a_stamp_of_0() -> None:
-    link = link_over(LinkBlock(session=9), LinkBlock(session=9), times=[0.0, 60.0])
-    await link.look()
-    assert (link.stamp().session, link.stamp().clock_ms) == (9, 0)
-
-
-async def test_a_clock_of_another_session_does_not_count() -> None:
-    link = link_over(
-        LinkBlock(session=9, clock=500), LinkBlock(session=10, clock=510), LinkBlock(session=10, clock=520)
-    )
-    await link.look()
-    assert link.stamp().clock_ms == 520
-    assert link.stamp().session == 10
-
-
-async def test_no_stamp_while_the_session_is_0() -> None:
-    link = link_over(LinkBlock(clock=500), LinkBlock(clock=510))
-    await link.look()
-    assert link.stamp() is None
-
-
 async def test_our_heartbeat_changes_at_least_once_a_second_and_the_block_is_written_whole() -> None:
     controller = ScriptedController()
     async with linked(controller) as link:
@@ -306,33 +265,6 @@ async def test_a_heartbeat_is_called_silent_only_after_the_time_it_has(caplog: p
         assert link.fault() == "the controller's heartbeat has not changed yet"
 
 
-async def test_a_clock_that_shows_0_is_no_missing_clock_before_it_had_time_to_run() -> None:
-    blocks = [LinkBlock(session=9, clock=clock) for clock in (0, 0, 0, 40)]
-    link = link_over(*blocks, times=[0.0, 0.3, 0.6, 0.64])
-    await link.look()
-    assert link.stamp() is None, "without a limit a late contour would be taken"
-    assert link._clock_fault() == "the controller's clock shows 0: whether it runs is not known yet"
-    await link.look()
-    assert link.stamp() is None
-    await link.look()
-    assert link.stamp().clock_ms == 40
-
-
-async def test_a_running_clock_that_wraps_to_0_is_not_taken_for_a_missing_one() -> None:
-    link = link_over(*(LinkBlock(session=9, clock=clock) for clock in (0xFFFFFFFF, 0)), times=[0.0, 0.001])
-    await link.look()
-    assert link.stamp().clock_ms == 0xFFFFFFFF
-
-
-async def test_a_controller_known_to_have_no_clock_is_known_after_a_reconnection_too() -> None:
-    link = link_over(*(LinkBlock(session=9) for _ in range(3)), times=[0.0, 60.0, 61.0])
-    await link.look()
-    link._forget()
-    link._previous = steady(LinkBlock(session=9))
-    await link.look()
-    assert link.stamp().clock_ms == 0
-
-
 class Glanced(ScriptedController):
     """A prompt controller: its block can be had in place. torn: what is seen there, where it is not what it holds."""
 
@@ -399,3 +331,74 @@ async def test_an_observer_has_nothing_to_wait_for_that_would_be_written() -> No
     async with linked(ScriptedController(), replace(QUICK, observe=True)) as link:
         link.publish(job_id=9)
         assert await link.flush(3600)
+
+
+# --- last_job ---------------------------------------------------------------------------------------------------
+
+
+async def test_last_job_is_known_once_it_held_over_two_changes_of_the_heartbeat() -> None:
+    controller = ScriptedController()
+    controller.link = replace(controller.link, last_job=70)
+    controller.beating = False
+    async with linked(controller, replace(QUICK, heartbeat_timeout_s=5.0)) as link:
+        await until(lambda: link.view is not None)
+        await asyncio.sleep(0.1)
+        assert link.last_job is None
+        assert link.fault() is not None
+        controller.beating = True
+        await until(lambda: link.fault() is None)
+        assert link.last_job == 70
+
+
+async def test_a_misread_last_job_is_not_kept() -> None:
+    controller = ScriptedController()
+    controller.link = replace(controller.link, last_job=70 << 16, test_echo=0x01030304)
+    async with linked(controller) as link:
+        await until(lambda: link.holds)
+        assert link.last_job is None
+
+
+async def test_a_last_job_that_leaps_is_a_fault_until_it_is_corrected() -> None:
+    controller = ScriptedController()
+    async with linked(controller) as link:
+        link.publish(job_id=7)
+        await until(lambda: link.fault() is None)
+        controller.link = replace(controller.link, last_job=0xFFFF_FFFD)
+        await until(lambda: "looks like a fault of the controller" in (link.fault() or ""))
+        assert "expected 7 or little more" in (link.fault() or "")
+        controller.link = replace(controller.link, last_job=7)
+        await until(lambda: link.fault() is None)
+
+
+async def test_a_last_job_that_leaps_is_taken_as_right_on_a_persons_word() -> None:
+    controller = ScriptedController()
+    async with linked(controller) as link:
+        link.publish(job_id=7)
+        controller.link = replace(controller.link, last_job=5_000_000)
+        await until(lambda: "confirm" in (link.fault() or ""))
+        assert link.confirm() == ["last_job 5000000 is taken as right: jobs are numbered above it"]
+        assert link.fault() is None
+        assert link.confirm() == []
+        controller.link = replace(controller.link, last_job=9_000_000)
+        await until(lambda: link.fault() is not None), "another leap needs another word"
+
+
+async def test_no_person_can_give_numbers_that_a_register_does_not_hold() -> None:
+    controller = ScriptedController()
+    controller.link = replace(controller.link, last_job=0xFFFF_FFFF)
+    async with linked(controller) as link:
+        await until(lambda: "no higher job number is left" in (link.fault() or ""))
+        assert link.confirm() == []
+
+
+async def test_our_heartbeat_begins_anywhere_and_never_falls_into_anothers_step() -> None:
+    beats: list[set[int]] = []
+    for _ in range(2):
+        controller = ScriptedController()
+        async with linked(controller) as link:
+            for number in range(20):
+                link.publish(job_id=number + 1)
+                assert await link.flush(2.0)
+        beats.append({block.service_heartbeat for name, block in controller.requests if name == "write_service"})
+    assert len(beats[0]) >= 20
+    assert len(beats[0] & beats[1]) <= 2

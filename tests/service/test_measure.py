@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from benchmarks.sample_scenes import THICKNESS_MM, sample_scenes
 from contour.errors import ParameterError, PictureError
 from contour.geometry import area, hausdorff
+from contour.position_uncertainty import PositionUncertainty
 from contour.synthetic import render
 from service.calibration_file import load_calibration
 from service.config import Recipe
@@ -50,6 +52,19 @@ def test_each_stage_is_timed_and_total_is_their_sum(rendered, measurer: Measurer
     times = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM).timings_ms
     assert set(times) == {"mask", "trace", "quality", "convert", "simplify", "judge", "total"}
     assert times["total"] == pytest.approx(sum(value for name, value in times.items() if name != "total"))
+
+
+def test_a_step_above_twice_the_core_is_logged_once_a_recipe(
+    rendered, measurer: Measurer, caplog: pytest.LogCaptureFixture
+) -> None:
+    followed = Recipe(number=1, name="a", method="sliding-matrix", parameters={"step_px": 25})  # the core is 10
+    given = Recipe(number=2, name="b", method="sliding-matrix", parameters={"step_px": 25, "core_px": 12})
+    sound = Recipe(number=3, name="c", method="sliding-matrix", parameters={"step_px": 24, "core_px": 12})
+    measurer = Measurer(None)
+    for recipe in (followed, given, sound, followed, given):
+        measurer.measure(rendered.picture, recipe, THICKNESS_MM)
+    assert [record.getMessage().split(":")[0] for record in caplog.records] == ["recipe 1", "recipe 2"]
+    assert "step_px is 25, expected up to 24, twice core_px" in caplog.text
 
 
 def test_the_clock_is_the_callers(rendered) -> None:
@@ -127,6 +142,18 @@ def test_the_work_area_refuses(rendered) -> None:
     area_mm = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
     seen = Measurer(calibration, work_area_mm=area_mm).measure(rendered.picture, RECIPE, THICKNESS_MM)
     assert seen.reasons == (Reason.OUTSIDE_WORK_AREA,)
+
+
+def test_a_contour_beyond_what_the_calibration_covers_is_refused_by_that_name(rendered) -> None:
+    plain = load_calibration(SAMPLES / "calibration.yaml")
+    exterior = rendered.truth_px.exterior
+    low, high = exterior.min(axis=0) - 20, exterior.max(axis=0) + 20
+    for right, reasons in ((high[0], ()), (high[0] - 40, (Reason.OUTSIDE_WORK_AREA,))):
+        ring = np.array([low, [right, low[1]], [right, high[1]], [low[0], high[1]]])
+        sure = replace(PositionUncertainty.everywhere(1600, 1200, 0.05), covered_px=ring)
+        seen = Measurer(replace(plain, uncertainty=sure)).measure(rendered.picture, RECIPE, THICKNESS_MM)
+        assert seen.reasons == reasons
+    assert "leaves the part of the picture that the calibration covers: vertex (" in seen.texts[0]
 
 
 def test_limits_in_millimetres_do_not_apply_without_a_calibration(rendered) -> None:

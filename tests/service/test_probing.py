@@ -13,9 +13,10 @@ from drivers.controller import ControllerUnavailable, ServiceBlock
 from drivers.controller.mailbox import MailboxLayout
 from drivers.controller.modbus import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
 from drivers.controller.requests import read_registers, registers_of, stream_of, write_register, write_registers
-from drivers.controller.simulated import FaultPlan, SimulatedController
+from drivers.controller.simulated import FaultPlan, Pace, ServerLimits, SimulatedController
 from drivers.controller.simulated_faults import Fault, Target
 from service.probing import LOOK_PERIOD_S, Finding, Probe
+from service.restart_watch import RestartWatch
 from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 from tests.interop.programs import libmodbus_tcp
 from tests.interop.shifted_program import program
@@ -196,7 +197,7 @@ async def test_a_dead_services_block_does_not_hinder(client: ModbusTcpController
     assert findings["writable"].well
 
 
-@pytest.mark.parametrize("longest", [100, 40, 20])
+@pytest.mark.parametrize("longest", [100, 40, 20, 16])
 async def test_shorter_requests_than_the_standards_are_found(longest: int) -> None:
     async with MisbehavingServer() as server:
         right = server.behave
@@ -210,24 +211,16 @@ async def test_shorter_requests_than_the_standards_are_found(longest: int) -> No
 
         server.behave = short
         findings, probe = await probed(server.port, write=False)
-    assert probe.changes == ({"longest_read": longest} if longest > 20 else {})
-    said = (
-        "the standard's limit is 125" if longest > 20 else "expected 32 or more. Check contour_address, and what limits"
-    )
-    assert f"{longest} registers in one request, {said}" in findings["longest read"].text
-
-
-def _with_another_unit(request: bytes) -> bytes:
-    reply = right_reply(request)
-    return reply[:6] + b"\x07" + reply[7:]
+    assert probe.changes == {"longest_read": longest}
+    assert f"{longest} registers in one request, the standard's limit is 125" in findings["longest read"].text
 
 
 @pytest.mark.parametrize(
     ("reply", "said"),
     [
-        (_with_another_unit, "the reply's device id is 7, expected 1"),
         (lambda _request: b"SSH-2.0-OpenSSH_9.2\r\n", "the reply's protocol identifier is"),
         (lambda request: exception_reply(request, 1), "must know function codes 3, 6 and 16"),
+        (lambda request: exception_reply(request, 3), "limit of registers in one request, which must be 16 or more"),
         (lambda request: exception_reply(request, 6), "server device busy"),
     ],
 )
@@ -287,3 +280,95 @@ async def test_a_heartbeat_of_one_bit_in_step_with_the_looks_is_seen_to_move() -
         server.reply_with(lambda request: in_step(request) or right_reply(request))
         findings, _ = await probed(server.port, write=False)
     assert findings["heartbeat"].well, findings["heartbeat"].text
+
+
+@pytest.mark.parametrize(("shift", "order"), [(100, "big"), (-90, "little"), (4096, "little")])
+async def test_a_mailbox_far_from_where_it_should_be_is_found(
+    client: ModbusTcpController, shift: int, order: str
+) -> None:
+    layout = MailboxLayout(100, 116, 132)
+    async with program(port_of(client), 100 + shift, order):
+        findings, probe = await probed(port_of(client), layout)
+    moved = {"link_address": 100 + shift, "service_address": 116 + shift, "contour_address": 132 + shift}
+    assert probe.changes == moved | ({"word_order": "little"} if order == "little" else {})
+    assert f"{abs(shift)} registers {'higher' if shift > 0 else 'lower'} than" in findings["heartbeat"].text
+    assert "probe again" in findings["all else"].text
+
+
+async def test_a_mailbox_elsewhere_is_found_where_most_registers_are_not_there() -> None:
+    """And where a request beyond the blocks is refused, as a PLC's is that maps no more than they need."""
+    layout = MailboxLayout(3_001, 3_017, 3_033, 100)
+    async with SimulatedController(scan_s=0.001, layout=layout) as simulated:
+        _, probe = await probed(simulated.port)
+    assert probe.changes == {"link_address": 3_001, "service_address": 3_017, "contour_address": 3_033}
+
+
+@pytest.mark.parametrize("device_id", [255, 0, 1])
+async def test_a_unit_that_answers_as_another_is_asked_by_that_and_probed_on(device_id: int) -> None:
+    limits = ServerLimits(answer_as=device_id)
+    async with SimulatedController(scan_s=0.001, limits=limits) as simulated:
+        findings, probe = await probed_by(
+            ModbusTcpController("127.0.0.1", simulated.port, device_id=9, timeout_s=5), write=True
+        )
+    assert probe.changes == {"device_id": device_id}
+    assert not findings["device id"].well
+    assert findings["test_echo"].well
+
+
+async def test_a_unit_that_only_another_number_reaches_is_found() -> None:
+    async with SimulatedController(scan_s=0.001, device_id=255) as simulated:
+        findings, probe = await probed(simulated.port)
+    assert probe.changes == {"device_id": 255}
+    assert findings["writable"].well
+
+
+async def test_a_controller_of_short_requests_and_without_fc6_is_told_by_keys_that_suit_it() -> None:
+    limits = ServerLimits(16, write_single=False)
+    async with SimulatedController(scan_s=0.001, limits=limits) as simulated:
+        findings, probe = await probed(simulated.port)
+    assert probe.changes == {"longest_read": 16, "single_write": "fc16", "longest_write": 16}
+    assert findings["writable"].well
+    assert "put back" not in findings
+
+
+async def test_the_same_is_told_of_a_server_that_others_wrote(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("MOST_REGISTERS", "20"), ("WITHOUT_FC6", "1"), ("ANSWER_AS", "255")):
+        monkeypatch.setenv(name, value)
+    with libmodbus_tcp() as (_, port):
+        serving = ModbusTcpController("127.0.0.1", port, 255, timeout_s=30)
+        async with program(port, through=serving):
+            _, probe = await probed(port)
+    assert probe.changes == {"device_id": 255, "longest_read": 20, "single_write": "fc16", "longest_write": 20}
+
+
+@pytest.mark.parametrize("torn", [True, False])
+async def test_values_that_stand_half_written_are_seen(torn: bool) -> None:
+    async with SimulatedController(scan_s=0.02, pace=Pace(torn=torn)) as simulated:
+        findings, probe = await probed(simulated.port)
+    said = "they stand half written for up to" if torn else "none was seen half written"
+    assert said in findings["32-bit values"].text
+    assert findings["32-bit values"].well, "its heartbeat waits for them"
+    assert probe.changes == {}
+
+
+@pytest.mark.parametrize("changes", [True, False])
+async def test_a_session_that_a_restart_does_not_change_is_told(changes: bool) -> None:
+    sessions = iter([7, 8] if changes else [7, 7])
+    async with SimulatedController(scan_s=0.005, session_source=lambda: next(sessions)) as simulated:
+        controller = ModbusTcpController("127.0.0.1", simulated.port, timeout_s=5)
+        watch = RestartWatch(controller)
+        async with asyncio.timeout(20):
+            while not simulated.registers(13, 1)[0]:
+                await asyncio.sleep(0.01)
+            await asyncio.sleep(0.3)
+            assert await watch.begin() == 7
+            ending = asyncio.create_task(watch.end())
+            await asyncio.sleep(0.2)
+            assert not ending.done()
+            await simulated.switch_off()
+            await asyncio.sleep(0.2)
+            await simulated.switch_on()
+            well, text = await ending
+        await controller.close()
+    assert well == changes
+    assert ("8 after the restart, 7 before" if changes else "still 7 after the restart") in text

@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
 from drivers.trigger import TriggerUnavailable
 from service.health import Health
+from service.journal import Journal
 from service.state import StateMachine
 from service.triggers import SerialTrigger
 
@@ -34,12 +36,13 @@ class HalfDeadPort:
 
 
 async def test_a_port_that_opens_and_cannot_be_read_is_not_back_and_is_told_once(
-    caplog: pytest.LogCaptureFixture,
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level("INFO")
     port, health = HalfDeadPort(), Health(StateMachine())
+    journal = Journal(tmp_path / "journal.sqlite")
     with ThreadPoolExecutor(1) as pool:
-        trigger = SerialTrigger(port, "ttyX", None, health, str, pool)  # type: ignore[arg-type]
+        trigger = SerialTrigger(port, "ttyX", None, health, journal, str, pool)  # type: ignore[arg-type]
         task = asyncio.ensure_future(trigger.run())
         while port.opened < 3:
             await asyncio.sleep(0.01)
@@ -47,4 +50,5 @@ async def test_a_port_that_opens_and_cannot_be_read_is_not_back_and_is_told_once
         task.cancel()
         with suppress(asyncio.CancelledError):
             await task
+    journal.close()
     assert [record.levelname for record in caplog.records if "ttyX" in record.message] == ["WARNING"]

@@ -5,14 +5,16 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-from contour.calibration import Alignment
-from service.calibration_file import load_calibration, load_record
+from contour.calibration import Alignment, SimpleCalibration
+from contour.position_uncertainty import PositionUncertainty
+from service.calibration_file import CalibrationRecord, load_calibration, load_record, save_record
 from service.cli.main import main
 
 SAMPLES = Path(__file__).parents[2] / "service" / "samples"
@@ -186,6 +188,22 @@ def test_pixels_at_a_height_align_it_too(tmp_path: Path) -> None:
     assert load_calibration(tmp_path / "c.yaml").alignment == Alignment(0.0, (0.0, 0.0))
 
 
+def test_marks_off_the_calibrations_plane_or_beyond_what_it_covers_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pixels = np.array([[100.0, 100.0], [1500.0, 150.0], [1400.0, 1100.0]])
+    ring = np.array([[0.0, 0.0], [1599.0, 0.0], [1599.0, 800.0], [0.0, 800.0]])
+    sure = replace(PositionUncertainty.everywhere(1600, 1200, 0.1), covered_px=ring)
+    plain = SimpleCalibration(1600, 1200, 0.375, (0.0, 1199.0), 20.0, uncertainty=sure)
+    machine = MACHINE.apply(plain.to_work(pixels, 20.0))
+    save_record(tmp_path / "c.yaml", CalibrationRecord(plain))
+    assert align(tmp_path, pixels, machine, "x_px,y_px") == 2
+    advice = capsys.readouterr().err.strip().split(", and ")[1].split()
+    assert advice == ["--height-mm", "20"]
+    assert align(tmp_path, pixels, machine, "x_px,y_px", *advice) == 0
+    assert "WARNING   pixel (1400, 1100) lies where the calibration is not covered" in capsys.readouterr().out
+
+
 MIRROR = np.array([1.0, -1.0])
 
 
@@ -193,7 +211,12 @@ MIRROR = np.array([1.0, -1.0])
     ("work", "machine", "status", "expected"),
     [
         (WORK, MACHINE.apply(WORK) + np.array([[0, 0], [0, 2], [0, 0], [0, 0]]), 3, "point 2 lies 1."),
-        (WORK, MACHINE.apply(WORK) * 1.01, 3, "The scale between both is 1.01000: check --square-mm"),
+        (
+            WORK,
+            MACHINE.apply(WORK) * 1.01,
+            3,
+            "the scale between both is 1.01000 ± 0.00000 (95 %), within 0.1 % of 1 is allowed. Check --",
+        ),
         (WORK, MACHINE.apply(WORK * MIRROR), 3, "A mirrored fit is better"),
         (WORK[:2], WORK[:2], 2, "2 points, expected 3 or more"),
         (WORK[[0, 0, 1]], WORK[[0, 0, 1]], 2, "lie on one line"),
@@ -213,3 +236,50 @@ def test_points_that_do_not_fit_are_refused(
     assert align(tmp_path, work, machine) == status
     assert expected in capsys.readouterr().err
     assert (tmp_path / "c.yaml").read_bytes() == before
+
+
+def test_a_scale_of_1_003_is_refused_by_name_although_every_point_lies_near(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Over 260 x 195 mm the scale moves no point by more than the 0.49 mm that once passed."""
+    work = 0.65 * WORK
+    machine = MACHINE.apply(1.003 * work)
+    shutil.copy(SAMPLES / "calibration.yaml", tmp_path / "c.yaml")
+    record = load_record(tmp_path / "c.yaml")
+    save_record(tmp_path / "c.yaml", replace(record, made={"square_mm": 25.0}))
+    before = (tmp_path / "c.yaml").read_bytes()
+    assert align(tmp_path, work, machine) == 3
+    told = capsys.readouterr()
+    assert "point 1: off by 0.487 mm" in told.out
+    assert "the scale between both is 1.00300" in told.err
+    assert "(squares of 25.075 mm would give 1)" in told.err
+    assert (tmp_path / "c.yaml").read_bytes() == before
+    options = told.err.strip().split("To take it nevertheless: ")[1].split()
+    assert "--accept-scale-percent" in options
+    assert align(tmp_path, work, machine, "x_mm,y_mm", *options) == 0
+
+
+def test_advice_for_a_point_that_is_off_takes_it_and_a_mirrored_frame_gets_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    off = MACHINE.apply(WORK) + np.array([[0, 0], [0, 2], [0, 0], [0, 0]])
+    assert align(tmp_path, WORK, off) == 3
+    options = capsys.readouterr().err.strip().split("To take it nevertheless: ")[1].split()
+    assert align(tmp_path, WORK, off, "x_mm,y_mm", *options) == 0
+    capsys.readouterr()
+    assert align(tmp_path, WORK, MACHINE.apply(WORK * MIRROR)) == 3
+    assert "nevertheless" not in capsys.readouterr().err
+
+
+def test_repeats_say_how_well_was_jogged_and_three_places_not_which_is_off(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    twice = np.vstack([WORK, WORK])
+    jogged = MACHINE.apply(twice) + np.repeat([[0.03, -0.03], [-0.03, 0.03]], 4, axis=0)
+    assert align(tmp_path, twice, jogged) == 0
+    told = capsys.readouterr().out
+    assert "jogging   0.042 mm by 4 repeats; explains misses up to 0.1" in told
+    assert align(tmp_path, WORK[:3], MACHINE.apply(WORK[:3])) == 0
+    told = capsys.readouterr().out
+    assert "jogging   0.150 mm as told (--jog-mm); jog to points twice to measure it; explains misses up to 0.4" in told
+    assert "3 places show that one is off, not which" in told

@@ -12,10 +12,11 @@ import numpy as np
 from drivers.controller.mailbox import ContourMessage, Page, encode_pages, withdrawal
 from service.link import Link, LinkSettings
 from service.reasons import Reason
-from service.transfer import Settlement, Transfer, TransferCounter, TransferSettings
+from service.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
 from tests.service.scripted_controller import ScriptedController
 
 JOB, SESSION = 7, 9
+VALIDITY = Validity(captured_at=60_000, valid_for=30_000)  # of `page`
 QUICK = TransferSettings(ready_timeout_s=0.3, ack_timeout_s=0.1, max_repeats=3, poll_period_s=0.01)
 
 
@@ -36,6 +37,7 @@ class Run:
         settings: TransferSettings,
         lifetime_s: float,
         pages: tuple[Page, ...],
+        validity: Validity,
     ) -> None:
         self.controller, self.link = controller, link
         self.durable: list[str] = []
@@ -47,7 +49,8 @@ class Run:
             session=SESSION,
             pages=pages,
             withdrawal=withdrawal(JOB, SESSION, "big"),
-            expires_at_s=time.monotonic() + lifetime_s,
+            lifetime=Lifetime(time.monotonic() + lifetime_s),
+            validity=validity,
             before_sending=self._sending,
             before_withdrawal=self._withdrawing,
         )
@@ -69,11 +72,12 @@ async def transferring(
     settings: TransferSettings = QUICK,
     lifetime_s: float = 5.0,
     pages: tuple[Page, ...] | None = None,
+    validity: Validity = VALIDITY,
 ) -> AsyncIterator[Run]:
     link = Link(controller, LinkSettings(handshake=settings.handshake, poll_period_s=0.01, heartbeat_timeout_s=0.3))
     task = asyncio.ensure_future(link.run())
     try:
-        yield Run(controller, link, settings, lifetime_s, pages or (page(),))
+        yield Run(controller, link, settings, lifetime_s, pages or (page(),), validity)
     finally:
         task.cancel()
         with suppress(asyncio.CancelledError):

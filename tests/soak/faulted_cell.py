@@ -25,10 +25,11 @@ from drivers.controller.simulated import (
     TriggerNotPossible,
 )
 from drivers.controller.simulated_faults import Fault
+from drivers.controller.simulated_frames import FramingName
 from service import wiring
 from service.config import Config
 from service.cycle import Observation
-from service.daemon import Daemon
+from service.daemon import Daemon, Parts
 from service.journal import TriggerStamp
 from service.state import State
 from service.trigger_queue import TriggerRefused
@@ -38,9 +39,11 @@ from tests.soak.random_contours import RandomContours
 from tests.system.processes import jobs
 
 Transport = Literal["tcp", "rtu-over-tcp", "rtu"]
+Incident = Callable[[], Awaitable[None]]
 
 VALID_FOR_S = 0.8
 TIMEOUT_S = 0.08
+RECOVERY_S = 30.0  # from a start to Ready, as long as nothing that lasts speaks against it
 LINE_FAULTS = ("lost-request", "lost-reply", "garbled-request", "garbled-reply", "foreign-reply")
 CONNECTION_FAULTS = ("reset-before", "reset-after", "half-open")
 LATE = (0.02, 0.1, 0.3, 0.9)  # below and above the time-out, and past a reconnection
@@ -58,7 +61,10 @@ rotation_deg: 0
 
 @dataclass(frozen=True)
 class Terms:
-    """One campaign: how many jobs, over what, and under which faults. risk: chance of a fault, of one write."""
+    """One campaign: how many jobs, over what, and under which faults.
+
+    risk: chance of a fault, of one write. incidents: how many at least.
+    """
 
     seed: int
     jobs: int
@@ -69,6 +75,7 @@ class Terms:
     word_order: Literal["big", "little"] = "big"
     payload_capacity: int = 1984
     slow_program: bool = False
+    incidents: int = 0
 
     def __str__(self) -> str:
         words = [f"seed {self.seed}", self.transport, f"risk {self.risk:g}", f"word order {self.word_order}"]
@@ -110,7 +117,19 @@ def fault_rules(risk: float) -> list[Fault]:
 
 
 class FaultedCell:
-    """Both sides, what befalls them, and what the controller took."""
+    """Both sides, what befalls them, and what the controller took. Other campaigns change what stands first here."""
+
+    valid_for_s = VALID_FOR_S
+    serial_share = 0.1  # of triggers that are not the controller's
+    rude_share = 0.01  # of the controller's triggers that do not wait for the end of the one before
+    other_service = False  # true where another one, or an older journal, is at the controller
+    pause_s = (0.3, 3.0)  # between two incidents
+    seconds_a_job = 3.0  # far more than one takes on a busy machine: what comes to this hangs
+    controller_kind: type[SimulatedController] = SimulatedController
+    clock_start_ms = 2**32 - 3000  # it wraps while the campaign runs, and so does the trigger counter
+    host: Any = "127.0.0.1"
+    port, near_port, far_port = 0, "", ""
+    judges = True  # false where the controller's verdict would hear two clients as one
 
     def __init__(self, folder: Path, terms: Terms) -> None:
         self.chance = random.Random(terms.seed)
@@ -134,6 +153,9 @@ class FaultedCell:
         session, trigger = self.controller.registers(13, 1)[0], self.controller.registers(2, 1)[0]
         self.taken.append(Taken(contour.job_id, micrometres(contour.rings), time.monotonic(), session, trigger))
 
+    def note_event(self, event: dict[str, Any]) -> None:
+        self.events.append({**event, "at_s": time.monotonic()})
+
     def note_seen(self, seen: Observation) -> None:
         assert seen.measurement.millimetres is not None
         self.exposed[seen.job.job_id] = seen.frame.exposed_at_s
@@ -152,17 +174,23 @@ class FaultedCell:
             "scan_s": 0.002,
             "memory_path": self.folder / "memory.json",
             "has_clock": terms.has_clock,
-            "clock_start_ms": 2**32 - 3000,  # it wraps while the campaign runs, and so does the trigger counter
+            "clock_start_ms": self.clock_start_ms,
             "first_trigger": 65535 - 9,
             "judge": self.judge,
             "faults": self.faults,
             "on_accepted": self.note_accepted,
+            **self.more_options(),
         }
         if terms.slow_program:
             options["pace"] = Pace(copy_scans=4, check_scans=3, stepwise=True)
         if terms.transport == "rtu":
-            return SimulatedController.on_serial(self.far_port, **options)
-        return SimulatedController(port=self.port, framing="tcp" if terms.transport == "tcp" else "rtu", **options)
+            return self.controller_kind.on_serial(self.far_port, **options)
+        framing: FramingName = "tcp" if terms.transport == "tcp" else "rtu"
+        return self.controller_kind(self.host, self.port, framing=framing, **options)
+
+    def more_options(self) -> dict[str, Any]:
+        """What else the simulated controller is told."""
+        return {}
 
     async def start_controller(self) -> None:
         before = getattr(self, "controller", None)
@@ -170,13 +198,14 @@ class FaultedCell:
         if before is not None:  # one verdict, and one client to judge, over all starts
             self.controller.verdict = before.verdict
             self.controller._watch._verdict = before.verdict
-        self.controller.verdict.on_event = self.events.append
+        self.controller.verdict.on_event = self.note_event
         await self.controller.start()
         if self.terms.transport != "rtu":
             self.port = self.controller.port
 
-    def config(self) -> Config:
-        terms = self.terms
+    def config(self, folder: Path | None = None, **changed: Any) -> Config:
+        """The service's configuration. folder: of its own files; changed: settings of the controller."""
+        terms, folder = self.terms, folder or self.folder
         wires: dict[str, Any] = {
             "tcp": {"kind": "modbus-tcp", "port": self.port},
             "rtu-over-tcp": {"kind": "modbus-rtu-over-tcp", "port": self.port},
@@ -193,28 +222,33 @@ class FaultedCell:
                     "heartbeat_timeout_s": 1.0,
                     "ready_timeout_s": 0.4,
                     "ack_timeout_s": 0.15,
-                    "valid_for_s": VALID_FOR_S,
-                    "job_timeout_s": VALID_FOR_S,
+                    "valid_for_s": self.valid_for_s,
+                    "job_timeout_s": self.valid_for_s,
                     "word_order": terms.word_order,
                     "payload_capacity": terms.payload_capacity,
+                    **changed,
                 },
                 "triggers": [{"kind": "controller"}],
-                "service": {"state_dir": str(self.folder)},
-                "journal": {"path": str(self.folder / "journal.sqlite")},
-                "archive": {"path": str(self.folder / "archive")},
+                "service": {"state_dir": str(folder)},
+                "journal": {"path": str(folder / "journal.sqlite")},
+                "archive": {"path": str(folder / "archive")},
             }
         )
 
     def start_service(self) -> None:
+        """Start what `wired` gives."""
+        self.parts = self.wired(self.config(), self.note_seen)
+        self.running = asyncio.ensure_future(Daemon(self.parts).run())
+
+    def wired(self, config: Config, observe: Callable[[Observation], None]) -> Parts:
         """A daemon as wired for the shop floor, but for its camera and its measurer."""
-        parts = wiring.build(self.config(), observe=self.note_seen)
+        parts = wiring.build(config, observe=observe)
         cycle: Any = parts.executor._runner
         measurer = RandomContours(self.chance, 12 if self.terms.payload_capacity < 64 else 40)
         cycle._plan = replace(cycle._plan, measurer=measurer)
         cycle._camera = parts.camera = SimulatedCamera(self.picture)
         cycle._abort = lambda _job: None  # it is killed, not stopped: nobody tidies up
-        self.parts = parts
-        self.running = asyncio.ensure_future(Daemon(parts).run())
+        return parts
 
     # --- what befalls them --------------------------------------------------------------------------------------
 
@@ -222,11 +256,16 @@ class FaultedCell:
         """The machine's person: triggers from the controller, and now and then one of another kind."""
         while True:
             await asyncio.sleep(self.chance.uniform(0, 0.02))
-            if self.chance.random() < 0.1:
+            if self.chance.random() < self.serial_share:
                 with suppress(TriggerRefused):
                     await self.parts.executor.submit(TriggerStamp("serial"))
-            with suppress(TriggerNotPossible):
-                self.controller.request_measurement(force=self.chance.random() < 0.01)
+            elif self.serial_share < 1:
+                with suppress(TriggerNotPossible):
+                    self.request()
+
+    def request(self) -> None:
+        """The controller's own trigger."""
+        self.controller.request_measurement(force=self.chance.random() < self.rude_share)
 
     async def machine(self) -> None:
         """The machine is busy at times, and its program slow."""
@@ -247,6 +286,16 @@ class FaultedCell:
             await asyncio.sleep(0.001)
         await asyncio.sleep(self.chance.uniform(0, 0.015))
 
+    async def commit(self, bound_s: float = 0.3) -> bool:
+        """Wait for the next commit; False where none came."""
+        seen = self.controller.registers(32, 1)
+        give_up_at = time.monotonic() + bound_s
+        while self.controller.registers(32, 1) in (seen, (0,)):
+            if time.monotonic() > give_up_at:
+                return False
+            await asyncio.sleep(0.001)
+        return True
+
     async def restart_service(self) -> None:
         await self.in_the_midst_of_a_transfer()
         self.restarts["service"] += 1
@@ -257,6 +306,16 @@ class FaultedCell:
         self.running.cancel()
         with suppress(asyncio.CancelledError):
             await self.running
+
+    async def serves(self) -> None:
+        """Wait until the service is ready, or at work; a finding where that takes long."""
+        give_up_at = time.monotonic() + RECOVERY_S
+        while self.parts.health.state not in (State.READY, State.SINGLE_EXECUTION):
+            if time.monotonic() > give_up_at:
+                fault = self.parts.health.first()
+                self.findings_of_life.add("ended", f"not Ready {RECOVERY_S:g} s after its start: {fault}")
+                return
+            await asyncio.sleep(0.05)
 
     async def restart_program(self) -> None:
         await self.in_the_midst_of_a_transfer()
@@ -273,11 +332,7 @@ class FaultedCell:
 
     async def unplug(self) -> None:
         """The cable is pulled just after a commit, or at any time; the program goes on, and may accept meanwhile."""
-        seen = self.controller.registers(32, 1)
-        for _ in range(300):
-            if self.controller.registers(32, 1) not in (seen, (0,)):
-                break
-            await asyncio.sleep(0.001)
+        await self.commit()
         self.restarts["line cut and restored"] += 1
         await self.controller.unplug()
         await asyncio.sleep(self.chance.uniform(0.1, 1.5))
@@ -293,7 +348,6 @@ class FaultedCell:
     async def run(self, bound_s: float) -> Outcome:
         """Jobs until there are enough, rest, judgement; what does not come in time is a finding."""
         started = time.monotonic()
-        self.port, self.near_port, self.far_port = 0, "", ""
         (self.folder / "calibration.yaml").write_text(CALIBRATION)
         async with crossed_line() as (self.near_port, self.far_port):
             await self.start_controller()
@@ -308,22 +362,18 @@ class FaultedCell:
             await self._rest()
             await self.end_service()
             await self.controller.stop()
-        rows = jobs(self.folder / "journal.sqlite")
-        evidence = Evidence(
-            jobs=rows,
-            taken=self.taken,
-            events=self.events,
-            measured=self.measured,
-            exposed=self.exposed,
-            valid_for_s=VALID_FOR_S if self.terms.has_clock else None,
-            verdict_kinds=self.controller.verdict.counts,
-            memory_lost=self.terms.forgetful,
-        )
+        return self.outcome(started)
+
+    def outcome(self, started: float) -> Outcome:
+        """What it came to, judged."""
+        rows = self.rows()
+        evidence = self.evidence(rows)
         findings = judge(evidence)
         for text in self.findings_of_life.texts:
-            findings.add("ended", text)
+            findings.add(*text.split(": ", 1))
         for kind, texts in self.controller.verdict.texts.items():
-            findings.texts += [f"  {kind}: {text}" for text in texts[:3] if kind != "heartbeat-stalled"]
+            told = kind != "heartbeat-stalled" and evidence.verdict_kinds[kind] > 0
+            findings.texts += [f"  {kind}: {text}" for text in texts[:3] if told]
         return Outcome(
             findings,
             Counter(str(row["outcome"]) for row in rows),
@@ -335,13 +385,37 @@ class FaultedCell:
             time.monotonic() - started,
         )
 
+    def rows(self) -> list[dict[str, Any]]:
+        """What the journal says of all jobs."""
+        return jobs(self.folder / "journal.sqlite")
+
+    def evidence(self, rows: list[dict[str, Any]]) -> Evidence:
+        """What is judged."""
+        return Evidence(
+            jobs=rows,
+            taken=self.taken,
+            events=self.events,
+            measured=self.measured,
+            exposed=self.exposed,
+            valid_for_s=self.valid_for_s if self.terms.has_clock else None,
+            verdict_kinds=self.controller.verdict.counts.copy() if self.judges else Counter(),
+            memory_lost=self.terms.forgetful,
+            other_service=self.other_service,
+        )
+
+    def incidents(self) -> list[Incident]:
+        """What happens besides the line's faults: each in its turn, then one as likely as another."""
+        found: list[Incident] = [self.restart_service, self.restart_program, self.power_off]
+        return found + [self.unplug] * 2 + [self.forget] * self.terms.forgetful
+
     async def _until_enough(self, give_up_at: float) -> None:
-        events: list[Callable[[], Awaitable[None]]] = [self.restart_service, self.restart_program, self.power_off]
-        events += [self.unplug] * 2
-        events += [self.forget] * self.terms.forgetful
-        while self._ended() < self.terms.jobs:
-            await asyncio.sleep(self.chance.uniform(0.3, 3.0) + (0 if self.terms.has_clock else 1.2))
-            await self.chance.choice(events)()
+        incidents = self.incidents()
+        turns = iter(dict.fromkeys(incidents))
+        done = 0
+        while self._ended() < self.terms.jobs or done < self.terms.incidents:
+            await asyncio.sleep(self.chance.uniform(*self.pause_s) + (0 if self.terms.has_clock else 1.2))
+            await (next(turns, None) or self.chance.choice(incidents))()
+            done += 1
             if self.running.done():
                 self._end_of_service()
                 return
@@ -350,7 +424,7 @@ class FaultedCell:
                 return
 
     def _ended(self) -> int:
-        return sum(row["outcome"] is not None for row in jobs(self.folder / "journal.sqlite"))
+        return sum(row["outcome"] is not None for row in self.rows())
 
     def _end_of_service(self) -> None:
         self.findings_of_life.add("ended", f"the service ended: {self.running!r}")

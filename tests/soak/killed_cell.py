@@ -26,12 +26,13 @@ from drivers.controller.simulated_faults import Fault, targets_of
 from drivers.controller.simulated_frames import Request
 from tests.soak.crossed_line import crossed_line
 from tests.soak.faulted_cell import Transport
-from tests.soak.promises import Evidence, Findings, Rings, Taken, judge, logged_contours, micrometres
+from tests.soak.promises import Evidence, Findings, Rings, Taken, acks, judge, logged_contours, micrometres
 from tests.system.processes import Process, combtrace, free_port, jobs, lines
 
 STEPS = ("service", "owner", "clear", "page", "readback", "commit", "link")
 MOMENTS = ("before", "after", "replied")
 WAIT_S = 60.0
+KNOWN: set[Rings] = set()
 PATIENT_S = 300.0  # of what is waited out on a machine that has other work
 
 
@@ -109,6 +110,11 @@ def honeycomb(columns: int, rows: int) -> np.ndarray:
 class KilledCell:
     """A folder with all that both sides leave behind."""
 
+    valid_for_s = 30.0
+    triggers = "[{kind: controller}]"
+    storage = "journal: {path: journal.sqlite}\n"
+    state: str | Path = "state"
+
     def __init__(self, folder: Path, killing: Killing) -> None:
         self.folder = folder
         self.killing = killing
@@ -118,6 +124,7 @@ class KilledCell:
         self.kills: Counter[str] = Counter()
         self.taken: list[Taken] = []
         self.events: list[dict[str, Any]] = []
+        self.said: list[str] = []  # on a serial line
         (folder / "pictures").mkdir()
         for number, (columns, rows) in enumerate([(10, 8), (12, 9), (8, 10)]):
             cv2.imwrite(str(folder / "pictures" / f"{number}.png"), honeycomb(columns, rows))
@@ -133,14 +140,19 @@ class KilledCell:
             "calibration: {file: calibration.yaml}\n"
             f"controller: {{kind: modbus-{killing.transport}, port: {port}, timeout_s: 0.3,"
             f" poll_period_s: 0.01, ack_timeout_s: 1, word_order: {killing.word_order},"
-            f" payload_capacity: {killing.payload_capacity}}}\n"
-            "triggers: [{kind: controller}]\n"
+            f" payload_capacity: {killing.payload_capacity}, valid_for_s: {self.valid_for_s}}}\n"
+            f"triggers: {self.triggers}\n"
             "recipes: [{number: 1, name: comb, method: direct-scan, tolerance_mm: 0.5}]\n"
-            "service: {state_dir: state}\njournal: {path: journal.sqlite}\n"
+            f"service: {{state_dir: {self.state}}}\n{self.storage}"
         )
 
     def known(self) -> frozenset[Rings]:
-        """The contours that the pictures give."""
+        """The contours that the pictures give, which are the same for all cells."""
+        if not KNOWN:
+            KNOWN.update(self._traced())
+        return frozenset(KNOWN)
+
+    def _traced(self) -> frozenset[Rings]:
         pictures = sorted((self.folder / "pictures").iterdir())
         table = self.folder / "known.json"
         done = combtrace(
@@ -152,6 +164,21 @@ class KilledCell:
 
     def start_service(self) -> Process:
         return Process(self.folder / "service.log", "run", "--config", self.folder / "config.yaml")
+
+    # --- what befalls the victim --------------------------------------------------------------------------------
+
+    def strike_down(self, process: Process) -> None:
+        """kill -9."""
+        process.kill()
+
+    async def bring_back(self, process: Process, forgets: bool = False) -> Process:
+        """Start it anew. forgets: without its memory."""
+        if process is self.service:
+            return self.start_service()
+        if forgets:
+            (self.folder / "memory.json").unlink(missing_ok=True)
+        await asyncio.sleep(self.chance.choice((0.0, 0.0, self.chance.uniform(0, 1.0))))
+        return self._start_controller()
 
     # --- the service is killed ----------------------------------------------------------------------------------
 
@@ -188,7 +215,7 @@ class KilledCell:
             try:
                 for _ in range(killing.kills):
                     await self._kill_once(controller)
-                    self.service = self.start_service()
+                    self.service = await self.bring_back(self.service)
                     if self.life.counts:
                         break
                 await self._served(controller, len(self.taken) + 2)
@@ -196,7 +223,7 @@ class KilledCell:
                 asking.cancel()
                 await asyncio.wait([asking])
                 plan.enabled = False
-                await self._rest(lambda: not controller.trigger_open)
+                await self._rest(lambda: not controller.trigger_open and self.all_told())
                 await asyncio.to_thread(self._stop, self.service)
         verdict = controller.verdict
         return self._toll(started, verdict.counts, plan.struck)
@@ -204,6 +231,10 @@ class KilledCell:
     def _note(self, contour: AcceptedContour) -> None:
         session, trigger = self.controller.registers(13, 1)[0], self.controller.registers(2, 1)[0]
         self.taken.append(Taken(contour.job_id, micrometres(contour.rings), None, session, trigger))
+
+    def all_told(self) -> bool:
+        """True where nobody waits for a word of the service."""
+        return True
 
     async def _ask(self) -> None:
         while True:
@@ -217,14 +248,14 @@ class KilledCell:
     async def _kill_once(self, controller: Sniper) -> None:
         if self.chance.random() < 0.2:
             await asyncio.sleep(self.chance.uniform(0, 1.5))
-            self.service.kill()
+            self.strike_down(self.service)
             self.kills["at a random time"] += 1
             return
         await self._served(controller, len(self.taken) + self.chance.randint(0, 2))
         gone = asyncio.Event()
 
         def kill() -> None:
-            self.service.kill()
+            self.strike_down(self.service)
             gone.set()
 
         controller.on_kill = kill
@@ -235,7 +266,7 @@ class KilledCell:
                 await gone.wait()
         except TimeoutError:
             self.life.add("ended", f"the service did not come to {step} within {WAIT_S:g} s; state Ready was expected")
-            self.service.kill()
+            self.strike_down(self.service)
         self.kills[f"{moment} {step}"] += 1
 
     async def _served(self, controller: Sniper, accepted: int) -> None:
@@ -263,13 +294,10 @@ class KilledCell:
             for _ in range(self.killing.kills):
                 self._goes_on(1)
                 await self._near_a_job()
-                self.controller_process.kill()
+                self.strike_down(self.controller_process)
                 forgets = self.killing.forgetful and self.chance.random() < 0.3
                 self.kills["memory lost" if forgets else "memory kept"] += 1
-                if forgets:
-                    (self.folder / "memory.json").unlink(missing_ok=True)
-                await asyncio.sleep(self.chance.choice((0.0, 0.0, self.chance.uniform(0, 1.0))))
-                self.controller_process = self._start_controller()
+                self.controller_process = await self.bring_back(self.controller_process, forgets)
                 if self.life.counts:
                     break
             self._goes_on(2)
@@ -344,10 +372,11 @@ class KilledCell:
             known=self.known(),
             verdict_kinds=kinds,
             memory_lost=self.killing.forgetful,
+            said=self.said,
         )
         findings = judge(evidence)
         for text in self.life.texts:
-            findings.add("ended", text)
+            findings.add(*text.split(": ", 1))
         told = [event for event in self.events if event["event"] == "violation"]
         kept = [event for event in told if event["kind"] != "heartbeat-stalled"]
         findings.texts += [json.dumps(event) for event in kept[:10]]
@@ -357,6 +386,6 @@ class KilledCell:
             Counter(str(row["outcome"]) for row in rows),
             faults,
             len(self.taken),
-            sum(event["event"] == "acknowledged" for event in self.events),
+            sum(event["event"] == "acknowledged" for event in self.events) + len(acks(self.said)),
             time.monotonic() - started,
         )

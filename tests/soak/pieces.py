@@ -8,31 +8,75 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
+from tests.soak.disk_cell import DiskCell
 from tests.soak.faulted_cell import FaultedCell, Outcome, Terms, Transport
 from tests.soak.killed_cell import KilledCell, Killing, Toll
+from tests.soak.other_services import ForeignCell, TwinCell
+from tests.soak.restored_cell import RestoredCell
+from tests.soak.stopped_cell import StoppedCell
+from tests.soak.swapped_cell import SettingsCell, SpareCell
+from tests.soak.told_cell import ToldCell
+from tests.soak.torn_cell import TornCell
 
-JOBS_A_PIECE = 125
-KILLS_A_PIECE = 25
-FUZZ_A_PIECE = 25_000
-SECONDS_A_JOB = 3.0  # far more than a job takes on a busy machine: what comes to this hangs
+LINE: tuple[Transport, ...] = ("tcp", "rtu", "rtu-over-tcp")
+# What is done to both sides in one process.
+INCIDENTS: dict[str, type[FaultedCell]] = {
+    "restored-journals": RestoredCell,
+    "copied-journals": TwinCell,
+    "foreign-owners": ForeignCell,
+    "spare-controllers": SpareCell,
+    "changed-settings": SettingsCell,
+    "torn-values": TornCell,
+}
+# What is done to one of two processes, or to its disk.
+BLOWS: dict[str, type[KilledCell]] = {
+    "service-kills": KilledCell,
+    "controller-kills": KilledCell,
+    "service-stops": StoppedCell,
+    "controller-stops": StoppedCell,
+    "small-disks": DiskCell,
+    "serial-answers": ToldCell,
+}
+SIZES = {  # of a piece
+    **dict.fromkeys(LINE, 125),
+    **dict.fromkeys(BLOWS, 25),
+    "small-disks": 10,
+    "restored-journals": 150,
+    "copied-journals": 5,
+    "foreign-owners": 40,
+    "spare-controllers": 60,
+    "changed-settings": 40,
+    "torn-values": 70,
+    "fuzz": 25_000,
+}
+OVER_ALL_LINES = ("service-kills", "service-stops", "serial-answers")
 CAPACITIES = (1984, 64, 602, 24)
 RISKS = (0.03, 0.06, 0.12)
 
 
 @dataclass(frozen=True)
 class Amounts:
-    """How much of each campaign; as the issue of the link asks for."""
+    """How much of each campaign, in jobs, kills and the like; in the order of the report."""
 
-    tcp_jobs: int = 5000
-    rtu_jobs: int = 500
-    rtu_over_tcp_jobs: int = 500
+    tcp: int = 5000
+    rtu: int = 500
+    rtu_over_tcp: int = 500
     service_kills: int = 500
     controller_kills: int = 100
-    fuzz_cases: int = 100_000
+    service_stops: int = 100
+    controller_stops: int = 50
+    restored_journals: int = 1200
+    copied_journals: int = 40
+    foreign_owners: int = 240
+    spare_controllers: int = 360
+    changed_settings: int = 200
+    torn_values: int = 350
+    small_disks: int = 40
+    serial_answers: int = 100
+    fuzz: int = 100_000
 
 
 @dataclass
@@ -57,15 +101,10 @@ class Result:
 def all_pieces(amounts: Amounts) -> list[str]:
     """Names of the pieces, each `campaign-seed-amount`, in an order that mixes the campaigns."""
     names: list[list[str]] = []
-    for campaign, amount, size in (
-        ("tcp", amounts.tcp_jobs, JOBS_A_PIECE),
-        ("rtu", amounts.rtu_jobs, JOBS_A_PIECE),
-        ("rtu-over-tcp", amounts.rtu_over_tcp_jobs, JOBS_A_PIECE),
-        ("service-kills", amounts.service_kills, KILLS_A_PIECE),
-        ("controller-kills", amounts.controller_kills, KILLS_A_PIECE),
-        ("fuzz", amounts.fuzz_cases, FUZZ_A_PIECE),
-    ):
-        names.append([f"{campaign}:{number}:{count}" for number, count in enumerate(_shares(amount, size), start=1)])
+    for name, amount in asdict(amounts).items():
+        campaign = name.replace("_", "-")
+        shares = enumerate(_shares(amount, SIZES[campaign]), start=1)
+        names.append([f"{campaign}:{number}:{count}" for number, count in shares])
     return [name for row in _round_robin(names) for name in row]
 
 
@@ -100,9 +139,7 @@ def run_piece(name: str, folder: Path | None = None) -> Result:
 
 def _run_in(folder: Path, campaign: str, number: int, count: int) -> Result:
     _log_to(folder / "campaign.log")
-    if campaign in ("tcp", "rtu", "rtu-over-tcp"):
-        return _faulted(folder, campaign, number, count)  # type: ignore[arg-type]
-    return _killed(folder, campaign, number, count)
+    return (_killed if campaign in BLOWS else _faulted)(folder, campaign, number, count)
 
 
 def faulted_terms(transport: Transport, number: int, jobs: int) -> Terms:
@@ -120,28 +157,49 @@ def faulted_terms(transport: Transport, number: int, jobs: int) -> Terms:
     )
 
 
+def incident_terms(campaign: str, number: int, jobs: int) -> Terms:
+    """The terms of the n-th piece of a campaign of incidents: line faults are few, so that it is those that tell."""
+    copied, fits = campaign == "copied-journals", campaign in ("spare-controllers", "torn-values")
+    return Terms(
+        seed=number,
+        jobs=jobs,
+        transport="rtu-over-tcp" if number % 3 == 0 and not copied else "tcp",
+        risk=0.02 if number % 2 == 0 and not copied else 0.0,
+        has_clock=number % 5 != 4 or fits,
+        word_order="little" if number % 4 in (1, 2) else "big",
+        payload_capacity=CAPACITIES[number % 3],
+        slow_program=number % 3 == 1,
+    )
+
+
 def killing_terms(campaign: str, number: int, kills: int) -> Killing:
     """The terms of the n-th piece of kills."""
     return Killing(
         seed=number,
         kills=kills,
-        victim="service" if campaign == "service-kills" else "controller",
+        victim="controller" if campaign.startswith("controller") else "service",
         word_order="little" if number % 2 == 0 else "big",
         payload_capacity=(1984, 64)[number // 2 % 2],
         forgetful=campaign == "controller-kills" and number % 2 == 1,
-        transport={0: "rtu", 3: "rtu-over-tcp"}.get(number % 5, "tcp") if campaign == "service-kills" else "tcp",
+        transport={0: "rtu", 3: "rtu-over-tcp"}.get(number % 5, "tcp") if campaign in OVER_ALL_LINES else "tcp",
     )
 
 
-def _faulted(folder: Path, transport: Transport, number: int, jobs: int) -> Result:
-    terms = faulted_terms(transport, number, jobs)
-    outcome = asyncio.run(FaultedCell(folder, terms).run(60 + SECONDS_A_JOB * jobs))
-    return _result(transport, terms, outcome, sum(outcome.outcomes.values()), outcome.restarts)
+def _faulted(folder: Path, campaign: str, number: int, jobs: int) -> Result:
+    for transport in LINE:
+        if transport == campaign:
+            terms, cell = faulted_terms(transport, number, jobs), FaultedCell
+            break
+    else:
+        terms, cell = incident_terms(campaign, number, jobs), INCIDENTS[campaign]
+    outcome = asyncio.run(cell(folder, terms).run(60 + cell.seconds_a_job * jobs))
+    done = outcome.restarts if campaign == "copied-journals" else outcome.outcomes
+    return _result(campaign, terms, outcome, sum(done.values()), outcome.restarts)
 
 
 def _killed(folder: Path, campaign: str, number: int, kills: int) -> Result:
     terms = killing_terms(campaign, number, kills)
-    cell = KilledCell(folder, terms)
+    cell = BLOWS[campaign](folder, terms)
     toll = asyncio.run(cell.kill_service() if terms.victim == "service" else cell.kill_controller())
     return _result(campaign, terms, toll, sum(toll.kills.values()), toll.kills)
 
@@ -173,11 +231,3 @@ def _log_to(path: Path) -> None:
     logging.getLogger().handlers[:] = [handler]
     logging.getLogger("combtrace").setLevel(logging.INFO)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
-
-
-def total(results: list[dict[str, Any]], key: str) -> Counter[str]:
-    """The sum of one of the results' tables."""
-    found: Counter[str] = Counter()
-    for result in results:
-        found.update(result[key])
-    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import logging
 from collections import Counter
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,9 @@ import pytest
 
 from tests.soak.faulted_cell import FaultedCell, Terms
 from tests.soak.killed_cell import KilledCell, Killing
-from tests.soak.pieces import Amounts, all_pieces, faulted_terms, killing_terms
-from tests.soak.promises import PROMISES, Evidence, Taken, judge
-from tests.soak.report import write_report
+from tests.soak.pieces import INCIDENTS, Amounts, all_pieces, faulted_terms, incident_terms, killing_terms
+from tests.soak.promises import PROMISES, Evidence, Findings, Side, Taken, judge, judge_twins
+from tests.soak.report import NAMES, write_report
 
 SLICES = [
     Terms(seed=901, jobs=15, risk=0.06),
@@ -58,7 +59,9 @@ SQUARE = (((0, 0), (100, 0), (100, 100), (0, 100)),)
 
 def row(job: int, outcome: str | None = "accepted", reason: int | None = None, **values: Any) -> dict[str, Any]:
     found = {"job_id": job, "outcome": outcome, "reason": reason, "detail": None, "session": 9}
-    return {**found, "trigger_session": 9, "trigger_counter": job, **values}
+    second = f"2026-01-01T00:00:{job % 60:02}"
+    found |= {"taken_at": f"{second}+00:00", "settled_at": f"{second}.500+00:00"}
+    return {**found, "trigger_kind": "controller", "trigger_session": 9, "trigger_counter": job, **values}
 
 
 def evidence() -> Evidence:
@@ -125,6 +128,22 @@ def invented(given: Evidence) -> None:
     given.jobs.append(row(3, "refused", 110))
 
 
+def numbered_twice(given: Evidence) -> None:
+    given.jobs.append(row(2, "refused", 151, taken_at="2026-01-01T00:01:00+00:00"))
+
+
+def untold(given: Evidence) -> None:
+    given.said = ["ACK 1", "DONE 1 4 100", "ACK 2"]
+
+
+def told_falsely(given: Evidence) -> None:
+    given.said = ["ACK 2", "DONE 2 4 100"]
+
+
+def told_another_reason(given: Evidence) -> None:
+    given.said = ["ACK 2", "FAIL 2 110 no_block_found"]
+
+
 def impolite(given: Evidence) -> None:
     given.verdict_kinds["value-split"] = 1
 
@@ -142,6 +161,10 @@ CRIMES = {
     lost: {"trigger-lost"},
     repeated: {"trigger-repeated"},
     invented: {"trigger-invented"},
+    numbered_twice: {"number-repeated"},
+    untold: {"answer-missing"},
+    told_falsely: {"answer-wrong"},
+    told_another_reason: {"answer-wrong"},
     impolite: {"against-protocol"},
 }
 
@@ -160,7 +183,8 @@ def test_each_broken_promise_is_found_broken(crime: Any, kinds: set[str]) -> Non
 
 
 def test_every_promise_can_be_found_broken() -> None:
-    assert set().union(*CRIMES.values()) | {"ended"} == set(PROMISES)
+    told_by_cells = {"ended", "both-go-on", "expired-in-time"}  # each has its test below
+    assert set().union(*CRIMES.values()) | told_by_cells == set(PROMISES)
 
 
 def test_a_denied_job_is_forgiven_only_a_controller_that_lost_its_memory() -> None:
@@ -168,6 +192,72 @@ def test_a_denied_job_is_forgiven_only_a_controller_that_lost_its_memory() -> No
     denied(given)
     given.memory_lost = True
     assert judge(given).counts == Counter()
+
+
+def answered(job: int, second: int) -> dict[str, Any]:
+    return {"event": "answer", "job": job, "answer": 11, "whole": False, "at": f"2026-01-01T00:00:{second:02}+00:00"}
+
+
+@pytest.mark.parametrize("reason", [153, 155])
+def test_a_denied_job_is_forgiven_another_service_only_below_a_job_that_had_ended(reason: int) -> None:
+    given = evidence()
+    given.jobs[0] = row(1, "failed", reason)
+    given.other_service = True
+    given.events += [answered(1, 0), answered(2, 2)]  # what came later, and its own answer, excuse nothing
+    assert set(judge(given).counts) == {"falsely-denied"}
+    given.events.append(answered(2, 1))
+    assert judge(given).counts == Counter()
+    given.other_service = False
+    assert set(judge(given).counts) == {"falsely-denied"}
+
+
+def test_a_job_that_was_taken_back_later_counts_in_the_session_in_which_it_was_accepted() -> None:
+    given = evidence()
+    given.jobs.append(row(1, "accepted", session=10))
+    assert judge(given).counts == Counter()
+    given.jobs[0] = row(1, "accepted", session=11)
+    assert set(judge(given).counts) == {"stale"}
+
+
+def test_a_denied_job_is_forgiven_a_controller_that_was_taken_away() -> None:
+    given = evidence()
+    given.jobs[0] = row(1, "failed", 156)
+    assert set(judge(given).counts) == {"falsely-denied"}
+    given.gone = frozenset({1})
+    assert judge(given).counts == Counter()
+    given.jobs[0] = row(1, None)
+    assert "unsettled" in judge(given).counts, "it must end all the same"
+
+
+def test_a_job_found_at_the_controller_is_not_its_number_given_again() -> None:
+    given = evidence()
+    given.jobs.insert(0, row(1, taken_at="2026-01-01T00:01:00+00:00", trigger_kind="found", trigger_counter=None))
+    assert judge(given).counts == Counter()
+
+
+def encountered(first: list[dict[str, Any]], second: list[dict[str, Any]], *, by_first: bool = True) -> set[str]:
+    """What is found of two services that both measured job 7, where the controller took the one's contour."""
+    other = (((0, 0), (100, 0), (100, 101), (0, 100)),)
+    taken = [Taken(7, SQUARE if by_first else other)]
+    findings = Findings()
+    noticed_at = datetime.fromisoformat("2026-01-01T00:00:08+00:00")
+    judge_twins((Side(first, {7: SQUARE}), Side(second, {7: other})), taken, [], noticed_at, 0.8, findings)
+    return set(findings.counts)
+
+
+def test_of_two_services_with_one_number_each_may_claim_only_what_is_its_own() -> None:
+    other = row(1027, "failed", 155)
+    assert encountered([row(7)], [other]) == set()
+    assert encountered([row(7)], [row(7)]) == {"number-repeated", "falsely-accepted"}
+    assert encountered([row(7, "failed", 155)], [other]) == {"falsely-denied"}
+    assert encountered([row(7)], [row(1007, None)]) == {"unsettled"}
+    assert encountered([row(7)], [other], by_first=False) == {"falsely-accepted"}
+
+
+def test_of_two_services_with_one_number_only_one_may_go_on() -> None:
+    late = row(9, "refused", 110)
+    assert encountered([row(7), late], [row(1027, "failed", 155)]) == set()
+    assert encountered([row(7), late], [row(1029, "refused", 110)]) == {"both-go-on"}
 
 
 # --- pieces and report ------------------------------------------------------------------------------------------------
@@ -185,12 +275,25 @@ def test_the_pieces_amount_to_what_was_asked_and_each_has_its_own_terms() -> Non
         "rtu-over-tcp": 500,
         "service-kills": 500,
         "controller-kills": 100,
+        "service-stops": 100,
+        "controller-stops": 50,
+        "restored-journals": 1200,
+        "copied-journals": 40,
+        "foreign-owners": 240,
+        "spare-controllers": 360,
+        "changed-settings": 200,
+        "torn-values": 350,
+        "small-disks": 40,
+        "serial-answers": 100,
         "fuzz": 100_000,
     }
     assert len(set(names)) == len(names)
     terms = [faulted_terms("tcp", number, 1) for number in range(1, 41)]
     assert {term.word_order for term in terms} == {"big", "little"}
     assert {term.payload_capacity for term in terms if term.word_order == "little"} == {1984, 64, 602, 24}
+    assert set(sums) == set(NAMES), "each has its row in the report"
+    for campaign in INCIDENTS:
+        assert {incident_terms(campaign, number, 1).word_order for number in range(1, 5)} == {"big", "little"}
     assert {killing_terms("service-kills", number, 1).payload_capacity for number in range(1, 9)} == {1984, 64}
 
 

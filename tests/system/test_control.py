@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from service.control import ControlError, ask
+from service.control import ask
+from tests.nobody import needs_root, python_as_nobody
 from tests.system.cell import Cell
 from tests.system.processes import combtrace, until
 from tests.system.terminal import Terminal
@@ -36,6 +37,16 @@ def cell(tmp_path: Path, terminal: Terminal) -> Iterator[Cell]:
 
 def state_of(cell: Cell) -> str:
     return str(ask(cell.folder / "state", {"command": "status"})["state"])
+
+
+def connected(cell: Cell) -> socket.socket:
+    """A client of the control socket, however deep the test's folder lies: addresses hold 107 bytes."""
+    client = socket.socket(socket.AF_UNIX)
+    client.settimeout(10)
+    folder = os.open(cell.folder / "state", os.O_PATH)
+    client.connect(f"/proc/self/fd/{folder}/control.sock")
+    os.close(folder)
+    return client
 
 
 def test_a_halt_holds_over_a_restart_until_it_is_resumed(cell: Cell, terminal: Terminal) -> None:
@@ -77,9 +88,7 @@ def test_a_halt_is_done_whatever_its_reason_holds(cell: Cell) -> None:
         status = json.loads(combtrace("status", *config, "--json").stdout)
         assert status["reason"].startswith(f"halted: {told} (")
         assert combtrace("resume", *config).returncode == 0
-    with socket.socket(socket.AF_UNIX) as client:
-        client.settimeout(10)
-        client.connect(str(cell.folder / "state" / "control.sock"))
+    with connected(cell) as client:
         client.sendall(b'{"command": "halt", "reason": "\\udce4"}\n')
         assert json.loads(client.makefile("rb").readline()) == {"ok": True, "state": "Halted"}
     assert "udce4" in combtrace("status", *config).stdout
@@ -111,10 +120,7 @@ def test_a_daemon_can_be_halted_while_its_configuration_is_being_written(cell: C
 def test_the_socket_is_the_owners_and_groups_and_serves_several_and_odd_clients(cell: Cell) -> None:
     path = cell.folder / "state" / "control.sock"
     assert stat.S_IMODE(path.stat().st_mode) == 0o660
-    clients = [socket.socket(socket.AF_UNIX) for _ in range(3)]
-    for client in clients:
-        client.settimeout(10)
-        client.connect(str(path))
+    clients = [connected(cell) for _ in range(3)]
     for line, expected in (
         (b"\x00\xff no json\n", "no line of JSON"),
         (b'{"command": "explode"}\n', "expected one of end, halt, reset, resume, status, trigger"),
@@ -147,26 +153,15 @@ def test_a_dead_daemons_socket_is_told_and_taken_over(cell: Cell) -> None:
     assert not (cell.folder / "state" / "control.sock").exists()
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="needs root, to become somebody without rights")
+@needs_root
 def test_without_rights_the_error_says_who_may(cell: Cell) -> None:
     cell.folder.chmod(0o755)
-    folder = os.open(cell.folder / "state", os.O_PATH)  # pytest's own folders are closed to others
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.setgroups([])
-        os.setgid(65534)
-        os.setuid(65534)
-        try:
-            ask(Path(f"/proc/self/fd/{folder}"), {"command": "halt"})
-            told = "it was done"
-        except ControlError as error:
-            told = str(error)
-        os.write(writing, told.encode())
-        os._exit(0)
-    os.waitpid(child, 0)
-    told = os.read(reading, 1000).decode()
-    for descriptor in (folder, reading, writing):
-        os.close(descriptor)
-    assert "you may not use it. User root and group root may" in told
+    done = python_as_nobody(
+        # By its descriptor: pytest's own folders are closed to others.
+        "import os; from pathlib import Path; from service.control import ControlError, ask\n"
+        "state = Path('/proc/self/fd') / str(os.open(sys.argv[1], os.O_PATH))",
+        "try:\n    print(ask(state, {'command': 'halt'}))\nexcept ControlError as error:\n    print(error)",
+        cell.folder / "state",
+    )
+    assert "you may not use it. User root and group root may" in done.stdout, done.stderr
     assert state_of(cell) == "Ready"

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from tests.real_parts import need_program
 from tests.system.cell import Cell
-from tests.system.processes import combtrace, free_port, jobs, until
+from tests.system.processes import COMBTRACE, ENVIRONMENT, ROOT, combtrace, free_port, jobs, until
 
 SAMPLES = Path(__file__).parents[2] / "service" / "samples"
 
@@ -22,10 +25,31 @@ def test_demo_goes_the_whole_way_and_says_what_a_person_wants_to_know(tmp_path: 
     for words in ("-> Ready", "-> SingleExecution", "method", "vertices", "mm²", "transfer", "equal to what was sent"):
         assert words in done.stdout
     assert re.search(r"size +\d+\.\d x \d+\.\d mm", done.stdout)
-    overlay = Path(done.stdout.splitlines()[-1].removeprefix("overlay: "))
+    overlay = Path(done.stdout.splitlines()[-1].removeprefix("picture: "))
     assert cv2.imread(str(overlay)).shape == (1200, 1600, 3)
     (job,) = jobs(tmp_path / "out" / "state" / "journal.sqlite")
     assert job["outcome"] == "accepted"
+
+
+def test_what_make_demo_says_fits_on_one_screen_and_ends_with_the_picture(tmp_path: Path) -> None:
+    make = need_program("make", "apt-get install make")
+    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
+        shutil.copy(ROOT / name, tmp_path)
+    installed = tmp_path / ".installed"
+    installed.touch()
+    command = tmp_path / "combtrace"
+    command.write_text(f'#!/bin/sh\nexec {" ".join(COMBTRACE)} "$@"\n')
+    command.chmod(0o755)
+    variables = [f"BIN={tmp_path}", f"STAMP={installed}"]
+    done = subprocess.run(
+        [make, "demo", *variables], cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    said = (done.stdout + done.stderr).splitlines()
+    rows = sum(max(1, -(-len(line) // 80)) for line in said)
+    assert rows <= 22, said  # of 24: one says that it installs, one is the prompt's
+    assert said[-1].startswith("picture: ")
+    assert (tmp_path / said[-1].removeprefix("picture: ")).exists()
 
 
 def test_demo_can_be_run_again_in_the_same_folder(tmp_path: Path) -> None:

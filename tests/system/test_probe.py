@@ -41,8 +41,11 @@ async def test_it_says_what_to_change(tmp_path: Path, server: str, shift: int, o
             said = await asyncio.to_thread(combtrace, "probe", "--write", "--config", config(tmp_path, port))
     assert said.stderr == ""
     assert said.returncode == (1 if changes else 0), said.stdout
-    told = [line.strip() for line in said.stdout.splitlines() if line.startswith("  ")]
+    told = [line.strip().split("  # was")[0] for line in said.stdout.splitlines() if "  # was" in line]
     assert told == changes
+    section = said.stdout.partition("\ncontroller:\n")[2]
+    if changes:
+        assert f"  kind: modbus-tcp\n  port: {port}\n" in section, "to paste it whole"
     assert ("FAULT" in said.stdout) == bool(changes)
     written = ("writing",) if shift else ("longest write", "writable", "test_echo")
     for part in ("round trip", "longest read", "readable", "heartbeat", *written):
@@ -70,3 +73,16 @@ async def test_a_controller_that_is_not_there_is_told_in_one_line(tmp_path: Path
     assert said.returncode == 1
     assert "FAULT controller    127.0.0.1:1: no connection: " in said.stdout
     assert said.stderr == ""
+
+
+async def test_what_is_to_be_changed_is_put_into_the_file_and_then_nothing_is(tmp_path: Path) -> None:
+    with TCP_SERVERS["libmodbus"]() as (_, port):
+        async with program(port, 500, "little"):
+            file = config(tmp_path, port)
+            first = await asyncio.to_thread(combtrace, "probe", "--write", "--apply", "--config", file)
+            again = await asyncio.to_thread(combtrace, "probe", "--write", "--apply", "--config", file)
+    assert (first.returncode, again.returncode) == (1, 0), first.stdout + again.stdout + again.stderr
+    assert "Probe again" in first.stdout
+    keys = ", word_order: little, link_address: 500, service_address: 516, contour_address: 532}"
+    text = file.read_text().splitlines()[2]
+    assert all(key in text for key in keys.strip(", }").split(", ")), text

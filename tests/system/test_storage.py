@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,7 @@ from tests.real_parts import missing
 from tests.soak.long_run import run
 from tests.system.cell import Cell
 from tests.system.processes import ENVIRONMENT, combtrace, jobs, until
-from tests.system.small_disk import CannotMount, mounted
+from tests.system.small_disk import CannotMount, fill, mounted
 
 MEGABYTE = 1_000_000
 
@@ -29,21 +28,6 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
             yield disk
     except CannotMount as why:
         missing(str(why))
-
-
-def fill(disk: Path, leave: int) -> Path:
-    """Somebody else's file, which leaves so many bytes free."""
-    file = disk / "somebody-else"
-    with suppress(OSError), file.open("wb") as stream:  # the daemon may have taken some meanwhile
-        while (room := free(disk) - leave) > 0:
-            stream.write(bytes(min(room, 64 * 1024)))
-            stream.flush()
-    return file
-
-
-def free(disk: Path) -> int:
-    found = os.statvfs(disk)
-    return found.f_bavail * found.f_frsize
 
 
 def test_on_a_disk_that_fills_evidence_gives_way_then_triggers_are_refused_and_all_comes_back(

@@ -94,6 +94,21 @@ def test_parameters_of_the_command_line_reach_the_method() -> None:
     assert coarse["area_px2"] > fine["area_px2"]
 
 
+def test_a_step_above_twice_the_core_is_told_once_and_traced_nevertheless() -> None:
+    sizes = ("--method", "sliding-matrix", "--core-px", "10", "--step-px")
+    done = combtrace("trace", RECTANGLE, RECTANGLE, *sizes, "21", "--json", "-")
+    assert len(done.stdout.splitlines()) == 2
+    assert done.stderr.count("step_px is 21, expected up to 20, twice core_px") == 1
+    assert "step_px is" not in combtrace("trace", RECTANGLE, *sizes, "20").stderr
+
+
+def test_a_core_by_hand_is_accepted_like_the_one_that_follows() -> None:
+    """The threshold follows from the cells, whoever gives the core."""
+    (by_hand,) = traced(RECTANGLE, "--method", "sliding-matrix", "--core-px", "10", "--step-px", "10")
+    (followed,) = traced(RECTANGLE, "--method", "sliding-matrix")
+    assert by_hand["area_px2"] == pytest.approx(followed["area_px2"], rel=0.01)
+
+
 def test_the_thickness_moves_the_plane() -> None:
     """Under a camera 1.2 m up, a plane 60 mm higher is seen 5 % nearer: the same pixels are fewer millimetres."""
     low = traced(RECTANGLE, "--calibration", CALIBRATION, "--thickness-mm", "0")[0]["area_mm2"]

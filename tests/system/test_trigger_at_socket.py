@@ -15,7 +15,7 @@ from service.control import MOST_STREAMS, ask
 from tests.system.cell import Cell
 from tests.system.processes import COMBTRACE, ENVIRONMENT, combtrace, jobs, until
 
-RECIPES = "recipes: [{number: 1, name: a}, {number: 2, name: b, max_area_mm2: 100}]\n"
+RECIPES = "recipes: [{number: 1, name: a}, {number: 2, name: b, min_area_mm2: 1, max_area_mm2: 100}]\n"
 SLOW = "{state_dir: state, queue_depth: 20}"
 
 
@@ -49,7 +49,7 @@ def test_a_trigger_is_acknowledged_and_its_end_told_by_line_and_status(cell: Cel
     assert "thickness 20.5 mm" in shown
     refused = trigger(cell, "--recipe", "2")
     assert (refused.returncode, refused.stdout) == (3, "ACK 2\nFAIL 2 112 area_out_of_limits\n")
-    assert "the recipe expects 0 to 100 mm²" in refused.stderr
+    assert "the recipe expects 1 to 100 mm²" in refused.stderr
     unknown = trigger(cell, "--recipe", "3")
     assert unknown.stdout == "ACK 3\nFAIL 3 122 unknown_recipe\n"
     none = trigger(cell, "--recipe", "70000")

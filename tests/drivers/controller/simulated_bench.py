@@ -27,6 +27,7 @@ class Bench:
     memory: RetainedMemory = field(default_factory=RetainedMemory)
     verdict: Verdict = field(default_factory=Verdict)
     has_clock: bool = True
+    clock_start_ms: int = 0
     started: bool = True
     session: int = SESSION
 
@@ -50,6 +51,7 @@ class Bench:
             new_session=lambda: session,
             judge=self.judge,
             has_clock=self.has_clock,
+            clock_start_ms=self.clock_start_ms,
         )
         self.now_ms = 0
 

@@ -28,9 +28,7 @@ class Tcp:
     """A conversation over TCP: the driver's frames, and the server's."""
 
     def __init__(self, earlier: int = 0) -> None:
-        self.frames: Frames = TcpFrames(DEVICE)
-        for _ in range(earlier):
-            self.frames.request(read_registers(0, 1))
+        self.frames: Frames = TcpFrames(DEVICE, earlier)
 
     def ask(self, request: Request) -> None:
         self.head = self.frames.request(request)[:4]

@@ -9,7 +9,7 @@ import pytest
 from drivers.controller.mailbox import MailboxLayout, Page, withdrawal
 from drivers.controller.simulated_contour import AcceptedContour
 from drivers.controller.simulated_memory import RetainedMemory
-from drivers.controller.simulated_program import TriggerNotPossible
+from drivers.controller.simulated_program import Pace, TriggerNotPossible
 from tests.drivers.controller.simulated_bench import EXTERIOR, SESSION, Bench, pages, sealed
 from tests.protocol_decoder import Link
 
@@ -56,6 +56,38 @@ def test_a_controller_without_a_clock_shows_0_for_ever_and_takes_contours_withou
     bench = Bench(has_clock=False)
     assert bench.scan(50).clock == 0
     assert bench.send(pages()[0]).ack_result == 1
+
+
+@pytest.mark.parametrize("word_order", ["big", "little"])
+def test_a_program_that_tears_leaves_32_bit_values_half_written_for_one_scan(word_order: str) -> None:
+    """And its heartbeat stands still until they are whole."""
+    bench = Bench(layout=MailboxLayout(word_order=word_order), clock_start_ms=65_450)
+    bench.program.pace = Pace(torn=True)
+    bench.write_service(test_value=0x0102FFFF)
+    half, whole = (0x0103_0001, 0x0103_0000) if word_order == "big" else (0x0000_0000, 0x0103_0000)
+    bench.registers[8:10] = [0, 1] if word_order == "big" else [1, 0]
+    torn, after = bench.scan(), bench.scan()
+    assert (torn.test_echo, after.test_echo) == (half, whole)
+    assert after.controller_heartbeat != torn.controller_heartbeat
+    clocks = [(bench.now_ms + 10 + 65_450, bench.scan().clock) for _ in range(15)]
+    torn_clocks = [(now, clock) for now, clock in clocks if abs(now - clock) > 10]
+    assert len(torn_clocks) == 1
+    ((now, clock),) = torn_clocks
+    assert now >= 65_536
+    assert abs(clock - now - (65_536 if word_order == "big" else -65_536)) <= 10
+
+
+def test_a_torn_last_job_comes_before_its_acknowledgement_and_no_heartbeat_lies_between() -> None:
+    bench = Bench()
+    bench.program.pace = Pace(torn=True, stepwise=True)
+    bench.registers[10:12] = [0, 65_535]
+    links = [bench.send(pages(job_id=65_536)[0]), *(bench.scan() for _ in range(5))]
+    assert 65_536 + 65_535 in [link.last_job for link in links]
+    assert (links[-1].last_job, links[-1].last_result, links[-1].ack_transfer) == (65_536, 1, 1)
+    assert all(link.last_job == 65_536 for link in links if link.ack_result or link.ack_transfer)
+    half = [link for link in links if link.last_result and link.last_job != 65_536]
+    assert len(half) >= 2
+    assert len({link.controller_heartbeat for link in half}) == 1
 
 
 # --- answers ----------------------------------------------------------------------------------------------------------

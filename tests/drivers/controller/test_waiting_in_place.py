@@ -35,7 +35,7 @@ async def connection(
 ) -> AsyncIterator[Connection]:
     monkeypatch.setattr(Promptness, "worth", lambda *_: True)
     near, _ = far
-    opened = Connection(TcpWire("there", 502), (near.fileno(), near.close), 1, 5.0)
+    opened = Connection(TcpWire("there", 502, begin=lambda: 0), (near.fileno(), near.close), 1, 5.0)
     yield opened
     opened.end(ControllerUnavailable("the test is over"))
 

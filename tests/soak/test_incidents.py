@@ -1,0 +1,85 @@
+"""A slice of each campaign of `make soak` that does more to both sides than lose requests and kill processes."""
+
+from __future__ import annotations
+
+import logging
+import random
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from tests.real_parts import missing
+from tests.soak.disk_cell import DiskCell
+from tests.soak.faulted_cell import FaultedCell, Terms
+from tests.soak.killed_cell import KilledCell, Killing
+from tests.soak.other_services import ForeignCell, TwinCell
+from tests.soak.restored_cell import RestoredCell
+from tests.soak.stopped_cell import StoppedCell
+from tests.soak.swapped_cell import SettingsCell, SpareCell
+from tests.soak.told_cell import ToldCell
+from tests.soak.torn_cell import TearingController, TornCell
+from tests.system.small_disk import CannotMount
+
+# What must have happened in each, by the names that the report gives it.
+SLICES: list[tuple[type[FaultedCell], Terms, set[str]]] = [
+    (RestoredCell, Terms(seed=910, jobs=12, risk=0.0, incidents=3), {"journal put back"}),
+    (ForeignCell, Terms(seed=912, jobs=4, risk=0.0, incidents=1), {"foreign owner after the commit"}),
+    (SpareCell, Terms(seed=914, jobs=8, risk=0.0, incidents=1), set()),
+    (SettingsCell, Terms(seed=915, jobs=8, risk=0.0, incidents=1), set()),
+    (TornCell, Terms(seed=916, jobs=12, risk=0.0, incidents=1), {"last_job half written", "clock half written"}),
+]
+
+
+@pytest.mark.parametrize(("cell", "terms", "happened"), SLICES, ids=lambda value: getattr(value, "__name__", ""))
+async def test_what_always_holds_holds(
+    tmp_path: Path, cell: type[FaultedCell], terms: Terms, happened: set[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.CRITICAL, "pymodbus")
+    came_to = await cell(tmp_path, terms).run(60)
+    assert came_to.findings.counts == Counter(), came_to.findings.texts
+    assert came_to.accepted >= 1
+    assert came_to.restarts.total() >= terms.incidents
+    assert happened <= came_to.restarts.keys()
+
+
+async def test_what_always_holds_holds_for_two_services_with_copies_of_one_journal(tmp_path: Path) -> None:
+    came_to = await TwinCell(tmp_path, Terms(seed=913, jobs=1, risk=0.0)).run(60)
+    assert came_to.findings.counts == Counter(), came_to.findings.texts
+    assert came_to.restarts.total() == 1
+
+
+@pytest.mark.parametrize(
+    ("cell", "killing"),
+    [
+        (StoppedCell, Killing(seed=917, kills=1, victim="service")),
+        (DiskCell, Killing(seed=919, kills=1, victim="service")),
+        (ToldCell, Killing(seed=920, kills=1, victim="service")),
+    ],
+    ids=["stopped", "disk", "serial line"],
+)
+async def test_what_always_holds_holds_for_processes(tmp_path: Path, cell: type[KilledCell], killing: Killing) -> None:
+    running = cell(tmp_path, killing)
+    try:
+        toll = await running.kill_service()
+    except CannotMount as why:
+        missing(str(why))
+    assert toll.findings.counts == Counter(), toll.findings.texts
+    assert toll.kills.total() == killing.kills
+    assert toll.acknowledged >= 2
+
+
+def test_a_controller_that_tears_shows_half_of_a_value_whose_halves_both_change_and_no_beat() -> None:
+    torn: Counter[str] = Counter()
+    clock = iter((0.0, 0.001, 0.002, 0.003, 0.020, 0.021))
+    clocks, beats = [], []
+    controller = TearingController(chance=random.Random(1), torn=torn, clock_start_ms=65_530, now=lambda: next(clock))
+    for _ in range(6):
+        controller._scan()
+        registers = controller.registers(0, 16)
+        clocks.append(registers[14] << 16 | registers[15])
+        beats.append(registers[1])
+    assert clocks[3:] in ([65_533, 131_069, 65_551], [65_533, 14, 65_551])
+    assert torn == {"clock half written": 1}
+    assert beats[4] == beats[3]
+    assert beats[5] != beats[4]

@@ -43,10 +43,13 @@ from drivers.controller.simulated import SimulatedController
 from service.config import Config, NoController
 from service.config_file import ConfigError, load_config
 from service.config_mistakes import describe
+from service.controller_clock import BEATS_TO_HOLD
+from service.executor import ROOM
 from service.ownership import WATCH_S
 from service.wiring import mailbox_layout, make_controller
 
 HEARTBEAT_S = 0.4
+HOLDS_S = 3.0  # two changes of a heartbeat that changes once a second, and more
 ANSWER_S = 5.0
 STARTED_S = 5.0
 BACK_S = 30.0
@@ -72,7 +75,7 @@ class Answered:
 
 
 class Bench:
-    """The mailbox of one controller, from `with` to its end. Job ids count up from the controller's `last_job`."""
+    """The mailbox of one controller, from `with` to its end. Job ids begin 1,000 above all that is found there."""
 
     def __init__(self, controller: Controller, layout: MailboxLayout, simulated: SimulatedController | None) -> None:
         self.layout = layout
@@ -83,13 +86,15 @@ class Bench:
         self._thread = threading.Thread(target=self._loop.run_forever, name="hil", daemon=True)
         self._block = ServiceBlock(service_state=READY, owner=1 + secrets.randbelow(0xFFFF))
         self._beating: asyncio.Task[None] | None = None
-        self._trouble: ControllerUnavailable | None = None
+        self._trouble: ControllerUnavailable | HilError | None = None
         self._transfer = 0
+        self._highest_job = 0
 
     def __enter__(self) -> Bench:
         self._thread.start()
         try:
             self._do(self._start())
+            self._highest_job = max(self._highest_job, self._held().last_job) + ROOM
         except ControllerError as error:
             self._close()
             raise HilError(f"{error}") from error
@@ -143,8 +148,9 @@ class Bench:
         self._do(self._beat())
 
     def new_job(self) -> int:
-        """A job_id above all that the controller knows."""
-        return self.link().last_job + 1
+        """A job_id above all that the controller knows, and that no call before gave."""
+        self._highest_job = max(self._highest_job, self.link().last_job) + 1
+        return self._highest_job
 
     def pages(
         self, job_id: int, rings_um: tuple[tuple[tuple[int, int], ...], ...] = (SQUARE_UM,), **changes: Any
@@ -246,9 +252,7 @@ class Bench:
         while True:
             try:
                 await self._controller.connect()
-                found = await self._controller.read_service()
-                if found.owner not in (0, self._block.owner):
-                    raise HilError(f"another service (owner {found.owner}) came meanwhile. Stop it before the test")
+                await self._check_owner()
                 await self._serve()
                 return
             except ControllerError:
@@ -270,6 +274,7 @@ class Bench:
     async def _watch_owner(self) -> None:
         """Raise HilError where another service lives; what a dead one left behind is taken over."""
         block = await self._controller.read_service()
+        self._highest_job = max(block.job_id, block.settled_job)
         self._transfer = secrets.randbelow(0xFFFF)
         if block.owner == 0:
             return
@@ -278,7 +283,14 @@ class Bench:
         if after.service_heartbeat != block.service_heartbeat:
             raise HilError(f"another service (owner {after.owner}) writes to this controller. Stop it before the test")
 
+    async def _check_owner(self) -> None:
+        """Raise HilError where another service has written: nothing is written over it."""
+        found = await self._controller.read_service()
+        if found.owner not in (0, self._block.owner):
+            raise HilError(f"another service (owner {found.owner}) came meanwhile. Stop it before the test")
+
     async def _beat(self) -> None:
+        await self._check_owner()
         self._block = replace(self._block, service_heartbeat=(self._block.service_heartbeat + 1) & 0xFFFF)
         await self._controller.write_service(self._block)
 
@@ -288,7 +300,7 @@ class Bench:
                 with suppress(ControllerRefused):  # busy for once; one that always refuses is told by `publish`
                     await self._beat()
                 await asyncio.sleep(HEARTBEAT_S)
-        except ControllerUnavailable as error:
+        except (ControllerUnavailable, HilError) as error:
             self._trouble = error
 
     async def _stop_beating(self) -> None:
@@ -297,12 +309,28 @@ class Bench:
             with suppress(asyncio.CancelledError):
                 await self._beating
 
+    def _held(self) -> LinkBlock:
+        """The link block as it stood over two changes of its heartbeat, so that none of it is half written.
+
+        Where the heartbeat stands still, which a test is there to tell: as it stands after a while.
+        """
+        give_up_at = time.monotonic() + HOLDS_S
+        before, changes = self.link(), 0
+        while changes < BEATS_TO_HOLD and time.monotonic() < give_up_at:
+            block = self.link()
+            held = replace(block, controller_heartbeat=before.controller_heartbeat, clock=before.clock) == before
+            changes = changes + (block.controller_heartbeat != before.controller_heartbeat) if held else 0
+            before = block
+        return before
+
     def _read(self) -> LinkBlock:
         return self._do(self._controller.read_link())
 
     def _do(self, step: Coroutine[Any, Any, T]) -> T:
         if self._trouble is not None:
             step.close()
+            if isinstance(self._trouble, HilError):
+                raise self._trouble
             raise HilError(f"the controller was lost: {self._trouble}. `reconnect` where that was meant to be")
         try:
             return asyncio.run_coroutine_threadsafe(step, self._loop).result()

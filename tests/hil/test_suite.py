@@ -17,9 +17,10 @@ import pytest
 
 from drivers.controller.simulated import SimulatedController
 from drivers.controller.simulated_contour import PageCopy
-from service.hil.bench import HilError, open_bench
+from service.hil.bench import HEARTBEAT_S, HilError, open_bench
 
 SERVICE_HEARTBEAT = 18
+SERVICE_OWNER = 27
 ROOT = Path(__file__).parents[2]
 
 
@@ -93,6 +94,30 @@ def test_a_second_service_that_lives_is_left_alone() -> None:
             pytest.fail("two benches on one controller")
         assert shared.verdict.clean or set(shared.verdict.counts) <= {"heartbeat-stalled"}
         assert not first.simulated
+
+
+def test_jobs_begin_a_thousand_above_all_that_is_found_and_none_is_given_twice() -> None:
+    with controller() as used:
+        url = f"tcp://127.0.0.1:{used.port}"
+        with open_bench(url, None) as first:
+            last = first.new_job()
+            assert first.withdraw(last).link.last_job == last
+            first.publish(job_id=last + 7, settled_job=last)
+        with open_bench(url, None) as second:
+            assert [second.new_job(), second.new_job()] == [last + 7 + 1001, last + 7 + 1002]
+
+
+def test_where_another_service_comes_in_between_nothing_is_written_over_it() -> None:
+    with controller() as shared, open_bench(f"tcp://127.0.0.1:{shared.port}", None) as bench:
+        own = shared.registers(SERVICE_OWNER, 1)[0]
+        another = own % 0xFFFF + 1
+        shared.write_as_another(another, 1)
+        with pytest.raises(HilError, match=f"owner {another}"):
+            bench.publish(trigger_ack=1)
+        time.sleep(3 * HEARTBEAT_S)
+        assert shared.registers(SERVICE_OWNER, 1) == (another,)
+        shared.write_as_another(own, 1)  # so that the bench can end as it should
+        bench.reconnect()
 
 
 def test_a_value_that_does_not_fit_is_told_and_the_heartbeat_goes_on_without_it() -> None:

@@ -70,6 +70,10 @@ class Cell:
         """Jobs that have ended."""
         return [job for job in jobs(self.journal) if job["outcome"] is not None]
 
+    def number(self, nth: int) -> int:
+        """The number of the n-th job, from 1; the first one's is drawn at the service's start."""
+        return int(jobs(self.journal)[0]["job_id"]) + nth - 1
+
     def ready(self) -> None:
         """Wait until the service says Ready."""
         until(lambda: "-> Ready" in self.service.text, what="Ready")

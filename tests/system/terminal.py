@@ -33,6 +33,12 @@ class Terminal:
         line, _, self._rest = self._rest.partition(b"\n")
         return line.decode("ascii").strip()
 
+    def acknowledged(self) -> int:
+        """The job that the next line acknowledges."""
+        word, job = self.line().split()
+        assert word == "ACK"
+        return int(job)
+
     def close(self) -> None:
         os.close(self._slave)
         os.close(self.master)

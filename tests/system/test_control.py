@@ -68,10 +68,10 @@ def test_a_halt_holds_over_a_restart_until_it_is_resumed(cell: Cell, terminal: T
     again = combtrace("resume", *config)
     assert (again.returncode, "nothing to resume" in again.stderr) == (1, True)
     terminal.type(b"TRIG\n")
-    assert terminal.line() == "ACK 1"
-    assert terminal.line().startswith("DONE 1 ")
+    job = terminal.acknowledged()
+    assert terminal.line().startswith(f"DONE {job} ")
     told = json.loads(combtrace("status", *config, "--json").stdout)
-    assert (told["state"], told["service_state"], told["settled_job"]) == ("Ready", 5, 1)
+    assert (told["state"], told["service_state"], told["settled_job"]) == ("Ready", 5, job)
     assert told["last_job"]["outcome"] == "accepted"
     assert {"kind": "serial", "what": "taken", "count": 1} in told["triggers"]
 
@@ -100,8 +100,8 @@ def test_a_reset_opens_everything_anew(cell: Cell, terminal: Terminal) -> None:
     assert "Ready -> Preoperational" in cell.service.text
     until(lambda: state_of(cell) == "Ready", what="Ready")
     terminal.type(b"TRIG\n")
-    assert terminal.line() == "ACK 1"
-    assert terminal.line().startswith("DONE 1 ")
+    job = terminal.acknowledged()
+    assert terminal.line().startswith(f"DONE {job} ")
 
 
 @pytest.mark.parametrize("content", ["triggers: [", "service: {state_dir: state}\ntriggers: 7\ncolour: red\n"])
@@ -123,7 +123,7 @@ def test_the_socket_is_the_owners_and_groups_and_serves_several_and_odd_clients(
     clients = [connected(cell) for _ in range(3)]
     for line, expected in (
         (b"\x00\xff no json\n", "no line of JSON"),
-        (b'{"command": "explode"}\n', "expected one of end, halt, reset, resume, status, trigger"),
+        (b'{"command": "explode"}\n', "expected one of confirm, end, halt, reset, resume, status, trigger"),
         (b'["status"]\n', "expected one of"),
     ):
         clients[0].sendall(line)

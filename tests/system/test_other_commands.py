@@ -56,7 +56,9 @@ def test_demo_can_be_run_again_in_the_same_folder(tmp_path: Path) -> None:
     assert combtrace("demo", "--output", tmp_path).returncode == 0
     again = combtrace("demo", "--output", tmp_path)
     assert again.returncode == 0
-    assert "job 2: accepted" in again.stdout
+    first, second = (int(job["job_id"]) for job in jobs(tmp_path / "state" / "journal.sqlite"))
+    assert f"job {second}: accepted" in again.stdout
+    assert second > first + 1000, "as at every start"
 
 
 def test_schema_prints_the_schema_that_config_yaml_names() -> None:

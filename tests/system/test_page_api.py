@@ -94,7 +94,7 @@ def test_a_trigger_becomes_a_job_with_its_evidence_and_a_note_of_who_asked(serve
     number = job["job_id"]
     assert ("anna", "127.0.0.1", "trigger", "recipe 1", f"job {number}") in served.notes()
     assert set(job["files"]) == {"frame.png", "overlay.jpg", "document.json"}
-    kept = served.cell.folder / "var" / "archive" / "0000000xxx"
+    kept = served.cell.folder / "var" / "archive" / f"{number // 1000:07d}xxx"
     for name, place in (("frame.png", "frame.png"), ("document.json", "accepted.json")):
         reply = served.client.get(f"/api/v1/jobs/{number}/files/{name}")
         assert reply.body == (kept / f"{number}-{place}").read_bytes()

@@ -33,9 +33,9 @@ def cell(tmp_path: Path, terminal: Terminal) -> Iterator[Cell]:
 
 def test_trig_is_acknowledged_once_durable_and_told_done_at_the_end(cell: Cell, terminal: Terminal) -> None:
     terminal.type(b"TRIG\r\n")
-    assert terminal.line() == "ACK 1"
+    taken = terminal.acknowledged()
     word, job, vertices, area = terminal.line().split()
-    assert (word, job) == ("DONE", "1")
+    assert (word, job) == ("DONE", str(taken))
     (settled,) = cell.settled()
     assert settled["outcome"] == "accepted"
     assert settled["trigger_kind"] == "serial"
@@ -45,8 +45,8 @@ def test_trig_is_acknowledged_once_durable_and_told_done_at_the_end(cell: Cell, 
 
 def test_an_unknown_recipe_is_acknowledged_and_ends_in_fail_122(cell: Cell, terminal: Terminal) -> None:
     terminal.type(b"TRIG recipe=77\n")
-    assert terminal.line() == "ACK 1"
-    assert terminal.line() == "FAIL 1 122 unknown_recipe"
+    job = terminal.acknowledged()
+    assert terminal.line() == f"FAIL {job} 122 unknown_recipe"
 
 
 def test_ping_stat_and_nonsense_are_answered(cell: Cell, terminal: Terminal) -> None:
@@ -75,10 +75,11 @@ def test_triggers_in_a_burst_give_one_job_and_refusals_that_are_counted(cell: Ce
     terminal.type(b"TRIG\n" * 4)
     replies = [terminal.line() for _ in range(5)]
     assert replies.count("NAK 120 busy") == 3
-    assert replies[0] == "ACK 1"
-    assert replies[-1].startswith("DONE 1")
+    job = cell.number(1)
+    assert replies[0] == f"ACK {job}"
+    assert replies[-1].startswith(f"DONE {job} ")
     terminal.type(b"STAT\n")
-    assert terminal.line() == "STAT Ready 0 1 3 0 ok"
+    assert terminal.line() == f"STAT Ready 0 {job} 3 0 ok"
 
 
 def test_the_trigger_command_waits_for_the_end(cell: Cell, terminal: Terminal, tmp_path: Path) -> None:
@@ -106,4 +107,4 @@ def test_the_trigger_command_waits_for_the_end(cell: Cell, terminal: Terminal, t
     assert done.returncode == 0, done.stderr
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["ACK", "DONE"]
     assert refused.returncode == 3
-    assert refused.stdout.splitlines()[-1] == "FAIL 2 122 unknown_recipe"
+    assert refused.stdout.splitlines()[-1] == f"FAIL {cell.number(2)} 122 unknown_recipe"

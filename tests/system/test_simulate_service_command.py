@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from contextlib import contextmanager
 from pathlib import Path
@@ -68,14 +69,16 @@ def test_a_controller_that_asks_gets_shape_after_shape_or_a_reason(tmp_path):
     assert [len(contour["millimetres"]["exterior"]) for contour in accepted[:4]] == [4, 1500, 4, 1500]
     assert [len(contour["millimetres"]["holes"]) for contour in accepted[:2]] == [2, 0]
     assert all(contour["flags"] & (FROM_NO_CAMERA | ALIGNED) == FROM_NO_CAMERA | ALIGNED for contour in accepted)
-    outcomes = [(job["outcome"], job["reason"]) for job in jobs(tmp_path / "state" / "journal.sqlite")[:4]]
+    journal = jobs(tmp_path / "state" / "journal.sqlite")
+    outcomes = [(job["outcome"], job["reason"]) for job in journal[:4]]
     assert outcomes == [("accepted", None), ("accepted", None), ("refused", 131), ("accepted", None)]
     verdict = json.loads((tmp_path / "verdict.json").read_text())
     assert verdict["clean"], verdict["violations"]
     told = service.text
-    assert "page 4 of 4 of job 2: 1 rings, 1500 vertices" in told
-    assert "ack_result 1 (accepted), last_job 2" in told
-    assert "reject_reason 131 (self_intersecting), settled_job 3" in told
+    second, third = (job["job_id"] for job in journal[1:3])
+    assert f"page 4 of 4 of job {second}: 1 rings, 1500 vertices" in told
+    assert f"ack_result 1 (accepted), last_job {second}" in told
+    assert f"reject_reason 131 (self_intersecting), settled_job {third}" in told
 
 
 def test_a_controller_of_another_make_takes_the_contour_of_a_file_once(tmp_path):
@@ -84,13 +87,16 @@ def test_a_controller_of_another_make_takes_the_contour_of_a_file_once(tmp_path)
     with linuxcnc_mailbox(tmp_path) as (port, taken):
         done = once(tmp_path / "state", port, "--contours", path, "--registers")
         assert done.returncode == 0, done.stderr
-        assert "job 1 accepted: 4 vertices, 5000.0 mm²" in done.stdout
+        first = re.match(r"job (\d+) accepted: 4 vertices, 5000.0 mm²", done.stdout)
+        assert first is not None
         again = once(tmp_path / "state", port, "--contours", path)
-        assert "job 2 accepted" in again.stdout
+        second = re.match(r"job (\d+) accepted", again.stdout)
+        assert second is not None
+        assert int(second[1]) > int(first[1]) + 1000, "as at every start"
     assert [contour.rings for contour in taken] == [[[tuple(point) for point in RECTANGLE]]] * 2
     assert taken[0].uncertainty_mm == 0.4
     assert taken[0].flags == FROM_NO_CAMERA | LAST_PAGE
-    assert "33: 0001 0000 0001 0001 0001 0001 0012" in done.stderr  # the header, word by word
+    assert f"33: 0001 0000 {int(first[1]):04X} 0001 0001 0001 0012" in done.stderr  # the header, word by word
 
 
 def test_registers_that_a_stranger_serves_hold_the_contour_where_the_configuration_says(tmp_path):
@@ -105,7 +111,7 @@ def test_registers_that_a_stranger_serves_hold_the_contour_where_the_configurati
             *("--once", "--shape", "rectangle", "--at", "-10", "5"),
         )
         assert done.returncode == 0, done.stderr
-        assert "job 1 written" in done.stdout
+        assert re.match(r"job \d+ written", done.stdout)
         client = ModbusTcpClient("127.0.0.1", port=port, timeout=5)
         assert client.connect()
         header = client.read_holding_registers(500, count=32).registers
@@ -127,7 +133,7 @@ def test_a_contour_that_breaks_a_limit_is_refused_and_nothing_of_it_is_sent(tmp_
     with simulated_controller(tmp_path) as port:
         done = once(tmp_path / "state", port, *options)
     assert done.returncode == 3
-    assert f"job 1 refused: {reason}" in done.stdout
+    assert re.match(rf"job \d+ refused: {reason}", done.stdout)
     assert "page 1" not in done.stderr
     assert lines(tmp_path / "accepted.jsonl") == []
 

@@ -31,6 +31,7 @@ class Stage:
         self, folder: Path, terminal: Terminal, *, by_hand: bool = False, scenario: str = "", **more: str
     ) -> None:
         self.terminal = terminal
+        self.number = 0
         self.pictures = folder / "pictures"
         self.done = folder / "done"
         for path in (self.pictures, self.done):
@@ -49,7 +50,7 @@ class Stage:
         """A job is begun."""
         self.cell.ready()
         self.terminal.type(b"TRIG\n")
-        assert self.terminal.line() == "ACK 1"
+        self.number = self.terminal.acknowledged()
 
     def hand_over(self) -> None:
         """The picture comes."""
@@ -105,9 +106,9 @@ def test_during_the_frame_the_job_is_accepted_where_the_picture_comes_in_time(
     terminal.type(b"TRIG\n")
     assert terminal.line() == "NAK 120 busy"
     stage.hand_over()
-    assert terminal.line().startswith("DONE 1 ")
+    assert terminal.line().startswith(f"DONE {stage.number} ")
     assert stage.ended()["outcome"] == "accepted"
-    assert [contour["job_id"] for contour in lines(stage.cell.accepted)] == [1]
+    assert [contour["job_id"] for contour in lines(stage.cell.accepted)] == [stage.number]
 
 
 def test_during_the_frame_the_job_is_aborted_where_no_picture_comes(
@@ -152,7 +153,7 @@ def test_during_the_transfer_a_job_that_nobody_decides_stays_in_flight_for_the_n
     stage.sent()
     stage.terminate()
     assert stage.ended()["outcome"] is None
-    assert "job 1 stays in flight; the next start settles it" in stage.cell.service.text
+    assert f"job {stage.number} stays in flight; the next start settles it" in stage.cell.service.text
     stage.cell.controller.kill()
     stage.cell.scenario = ""
     stage.cell.controller = stage.cell.start_controller()

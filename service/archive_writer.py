@@ -36,7 +36,7 @@ from service.evidence import (
     plain_bytes,
     table_digest,
 )
-from service.journal import Job, JournalError
+from service.journal import FOUND, Job, JournalError
 from service.recipe_exports import exports_of
 from service.table_file import TableRecord, table_bytes
 
@@ -233,6 +233,8 @@ class ArchiveWriter:
         job_id, drafted = evidence.job.job_id, None
         with self._opened_archive() as archive:
             has_draft = archive.has(job_id, DRAFT)
+            if evidence.job.trigger.kind == FOUND and archive.document_of(job_id) is not None:
+                return  # it ended before its journal was lost, and this one knows less of it
         try:
             if has_draft:
                 draft = load_draft(self._archive.path, job_id)

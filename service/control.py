@@ -1,4 +1,4 @@
-"""A local socket by which a person's commands reach the running daemon: one line of JSON asked, one line answered.
+"""A local socket by which a person's commands reach the running daemon: a line of JSON asked, one or more answered.
 
 Who may use it is decided by the file system: the socket has mode 0660 and lies in the state folder.
 """
@@ -14,7 +14,8 @@ import pwd
 import socket
 import stat
 import struct
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,15 @@ LONGEST_REASON = 200
 IDLE_S = 10.0
 RETRY_S = 1.0
 MOST_CLIENTS = 16
+MOST_STREAMS = 8  # of them, those that wait for the end of a job: a halt has to find a place
 PEER_CREDENTIALS = struct.Struct("3i")  # process, user, group: unix(7), SO_PEERCRED
 ANSWER_BOUND_S = 15.0
 
 Handler = Callable[[Mapping[str, Any], str], Awaitable[dict[str, Any]]]
 """Gets the request and who asks; gives what is answered. Raises CommandRefused."""
+
+Stream = Callable[[Mapping[str, Any], str], AsyncIterator[dict[str, Any]]]
+"""The same with several answers, as they come; the connection is closed after the last."""
 
 
 class CommandRefused(Exception):
@@ -47,10 +52,14 @@ class ControlError(Exception):
 class ControlServer:
     """Answers commands. A socket file that is there already is a dead daemon's: the state folder is locked by us."""
 
-    def __init__(self, folder: Path, commands: Mapping[str, Handler]) -> None:
+    def __init__(
+        self, folder: Path, commands: Mapping[str, Handler], streams: Mapping[str, Stream] | None = None
+    ) -> None:
         self._folder = folder
         self._commands = commands
-        self._clients = 0
+        self._streams = streams or {}
+        self._streaming = 0
+        self._clients: set[asyncio.Task[Any]] = set()
 
     async def run(self) -> None:
         """Serve for ever, from when the disk lets the socket be made."""
@@ -68,20 +77,26 @@ class ControlServer:
     async def _run(self) -> None:
         with _bound(self._folder) as listener:
             server = await asyncio.start_unix_server(self._serve, sock=listener, limit=LONGEST_LINE)
-            async with server:
-                await server.serve_forever()
+            try:
+                await asyncio.get_running_loop().create_future()
+            finally:
+                server.close()
+                for client in self._clients:  # one that waits for the end of a job must not hold up ours
+                    client.cancel()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self._clients += 1
+        task = asyncio.current_task()
+        assert task is not None
+        self._clients.add(task)
         try:
-            if self._clients > MOST_CLIENTS:
+            if len(self._clients) > MOST_CLIENTS:
                 writer.write(_line({"ok": False, "error": f"{MOST_CLIENTS} clients are served already. Try again"}))
                 return
             await self._answer_all(reader, writer)
         except (OSError, TimeoutError) as error:
             log.debug("a client went: %s", error)
         finally:
-            self._clients -= 1
+            self._clients.discard(task)
             with contextlib.suppress(OSError):
                 writer.close()
 
@@ -96,23 +111,49 @@ class ControlServer:
                 return
             if not line.endswith(b"\n"):
                 return
-            writer.write(_line(await self._answer(line, who)))
-            async with asyncio.timeout(IDLE_S):
-                await writer.drain()
+            try:
+                request = json.loads(line)
+            except ValueError:
+                request = None
+            name = request.get("command") if isinstance(request, dict) else None
+            stream = self._streams.get(name) if isinstance(name, str) else None
+            if stream is not None:
+                await self._tell_all(stream, request, who, writer)
+                return
+            await _send(writer, await self._answer(request, name, who))
 
-    async def _answer(self, line: bytes, who: str) -> dict[str, Any]:
-        try:
-            request = json.loads(line)
-        except ValueError:
+    async def _answer(self, request: Any, name: Any, who: str) -> dict[str, Any]:
+        if request is None:
             return {"ok": False, "error": "no line of JSON"}
-        name = request.get("command") if isinstance(request, dict) else None
         handler = self._commands.get(name) if isinstance(name, str) else None
         if handler is None:
-            return {"ok": False, "error": f"command {name!r}: expected one of {', '.join(sorted(self._commands))}"}
+            known = ", ".join(sorted([*self._commands, *self._streams]))
+            return {"ok": False, "error": f"command {name!r}: expected one of {known}"}
         try:
             return {"ok": True, **await handler(request, who)}
         except CommandRefused as refused:
             return {"ok": False, "error": str(refused)}
+
+    async def _tell_all(
+        self, stream: Stream, request: Mapping[str, Any], who: str, writer: asyncio.StreamWriter
+    ) -> None:
+        if self._streaming >= MOST_STREAMS:
+            await _send(writer, {"ok": False, "error": f"{MOST_STREAMS} wait for ends of jobs already. Try again"})
+            return
+        self._streaming += 1
+        try:
+            async for answer in stream(request, who):
+                await _send(writer, {"ok": True, **answer})
+        except CommandRefused as refused:
+            await _send(writer, {"ok": False, "error": str(refused)})
+        finally:
+            self._streaming -= 1
+
+
+async def _send(writer: asyncio.StreamWriter, answer: Mapping[str, Any]) -> None:
+    writer.write(_line(answer))
+    async with asyncio.timeout(IDLE_S):
+        await writer.drain()
 
 
 def reason_text(given: str) -> str:
@@ -123,14 +164,26 @@ def reason_text(given: str) -> str:
 
 def ask(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
     """What the daemon of a state folder answers; raise ControlError, also where it refuses."""
+    for answer in answers(folder, request, ANSWER_BOUND_S):
+        return answer
+    raise ControlError(f"{folder / SOCKET_NAME}: the daemon ended before it answered. See its log")
+
+
+def answers(folder: Path, request: Mapping[str, Any], bound_s: float) -> Iterator[dict[str, Any]]:
+    """All that the daemon of a state folder answers within `bound_s`, as it comes; raise ControlError as `ask` does."""
     path = folder / SOCKET_NAME
+    give_up_at_s = time.monotonic() + bound_s
     try:
         with _reached(folder) as address, socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-            client.settimeout(ANSWER_BOUND_S)
+            client.settimeout(bound_s)
             client.connect(address)
             client.sendall(_line(request))
-            with client.makefile("rb") as answers:
-                answer = answers.readline()
+            with client.makefile("rb") as lines:
+                while line := lines.readline():
+                    yield _told(line, path)
+                    client.settimeout(max(give_up_at_s - time.monotonic(), 0.001))
+    except ConnectionResetError:
+        return  # it went: whoever waits for more sees that there is none
     except PermissionError as error:
         raise ControlError(f"{path}: you may not use it. {_who_may(path)}; run as one of them, or with sudo") from error
     except (FileNotFoundError, ConnectionRefusedError, NotADirectoryError) as error:
@@ -139,8 +192,11 @@ def ask(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
         ) from error
     except OSError as error:
         raise ControlError(f"{path}: the daemon does not answer: {error.strerror or error}") from error
+
+
+def _told(line: bytes, path: Path) -> dict[str, Any]:
     try:
-        told = json.loads(answer)
+        told = json.loads(line)
     except ValueError as error:
         raise ControlError(f"{path}: the daemon ended before it answered. See its log") from error
     if not told.pop("ok", False):

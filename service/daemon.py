@@ -18,6 +18,7 @@ from service.archive_writer import ArchiveWriter
 from service.beat import until_beat
 from service.camera_watch import CameraWatch, camera_is_being_opened
 from service.control import ControlServer
+from service.control_triggers import ControlTriggers
 from service.executor import Executor
 from service.health import Fault, Health
 from service.journal import Job, Journal, JournalError, TriggerStamp
@@ -150,7 +151,9 @@ class Daemon:
         operations = Operations(
             parts.health, parts.executor, self.supervisor, Halt(parts.state_dir), self._before_reset
         )
-        self.supervisor.add(CONTROL_PART, ControlServer(parts.state_dir, operations.commands()).run)
+        triggers = ControlTriggers(parts.executor, parts.journal)
+        server = ControlServer(parts.state_dir, operations.commands(), triggers.streams())
+        self.supervisor.add(CONTROL_PART, server.run)
         if parts.page is not None:
             self.supervisor.add("page", partial(parts.page.run, operations))
 

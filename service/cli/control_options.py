@@ -19,17 +19,22 @@ def add_daemon_argument(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def state_folder(args: argparse.Namespace) -> Path:
+    """Where the daemon's socket is; raise UserError where the configuration is none."""
+    from service.config_file import ConfigError, state_dir_of
+
+    try:
+        return Path(args.state_dir or state_dir_of(args.config))
+    except ConfigError as error:
+        raise UserError(f"{error}. Or name its state folder with --state-dir") from error
+
+
 def asked(args: argparse.Namespace, **request: Any) -> dict[str, Any]:
     """The daemon's answer; raise UserError, 2 for a file that is none, 1 where it does not answer or refuses."""
-    from service.config_file import ConfigError, state_dir_of
     from service.control import ControlError, ask
 
     try:
-        folder = args.state_dir or state_dir_of(args.config)
-    except ConfigError as error:
-        raise UserError(f"{error}. Or name its state folder with --state-dir") from error
-    try:
-        return ask(folder, request)
+        return ask(state_folder(args), request)
     except ControlError as error:
         raise UserError(str(error), EXIT_FAILED) from error
 

@@ -21,7 +21,8 @@ from pathlib import Path
 from queue import SimpleQueue
 from xml.etree import ElementTree
 
-from tests.rules.table import ROOT, RULES, Rule
+from tests.rules.rule import ROOT, Rule
+from tests.rules.table import RULES
 
 PARTS = ("contour", "drivers", "service", "tests", "pyproject.toml")
 BOUND_S = 60  # a test that no longer ends has failed too

@@ -10,7 +10,8 @@ import pytest
 
 from tests.rules.mutate import FAILED, PASSED, told
 from tests.rules.page import PAGE, fresh
-from tests.rules.table import RULES, Rule, source_of
+from tests.rules.rule import Rule, source_of
+from tests.rules.table import RULES
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.said)

@@ -199,6 +199,15 @@ def test_a_job_that_failed_before_a_frame_leaves_its_document(tmp_path: Path) ->
     assert sorted(contents(tmp_path)) == ["7-failed.json"]
 
 
+def test_a_job_that_a_lost_journal_had_ended_keeps_its_evidence(tmp_path: Path) -> None:
+    with writer(tmp_path) as built:
+        built.keep(evidence(ended()))
+    before = contents(tmp_path)
+    with writer(tmp_path, in_flight=(7,)) as built:
+        built.keep(Evidence(replace(ended(), trigger=TriggerStamp("found")), Measurer(None)))
+    assert contents(tmp_path) == before
+
+
 def on_disk(path: Path) -> int:
     return sum(-(-file.stat().st_size // 4096) * 4096 for file in path.rglob("*") if file.is_file())
 

@@ -146,7 +146,7 @@ def test_the_socket_is_the_owners_and_groups_and_serves_several_and_odd_clients(
     clients = [connected(cell) for _ in range(3)]
     for line, expected in (
         (b"\x00\xff no json\n", "no line of JSON"),
-        (b'{"command": "explode"}\n', "expected one of confirm, halt, reset, resume, status"),
+        (b'{"command": "explode"}\n', "expected one of confirm, end, halt, reset, resume, status, trigger"),
         (b'["status"]\n', "expected one of"),
     ):
         clients[0].sendall(line)

@@ -1,0 +1,53 @@
+"""One rule of the protocol: by which code it is kept, and which test fails without it."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+TRANSFER, LINK, EXECUTOR, CYCLE = "service/transfer.py", "service/link.py", "service/executor.py", "service/cycle.py"
+JOURNAL, OWNERSHIP, CLOCK = "service/journal.py", "service/ownership.py", "service/controller_clock.py"
+IN_CLOCK, IN_DOUBT = "tests/service/test_controller_clock.py", "tests/service/test_transfer_in_doubt.py"
+TRIGGERS, IN_ANSWERS = "service/triggers.py", "tests/service/test_serial_answers.py"
+IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_RESUMING, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (
+    f"tests/service/test_{name}.py"
+    for name in (
+        *("transfer", "transfer_pages", "link", "executor", "cycle", "cycle_after_restart"),
+        *("ownership", "journal", "journal_recovery"),
+    )
+)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One rule.
+
+    said: its place in protocol.md and what it says. code: `file::Class.function` that keeps it; test: `file::function`
+    that fails without it. With the line `there` of the code turned into `without`, the rule is taken out.
+    """
+
+    said: str
+    code: str
+    test: str
+    there: str
+    without: str
+
+    def taken_out(self) -> str:
+        """The text of the code's file without the rule."""
+        text = (ROOT / self.code.partition("::")[0]).read_text(encoding="utf-8")
+        whole = source_of(self.code)
+        return text.replace(whole, whole.replace(self.there, self.without, 1))
+
+
+def source_of(name: str) -> str:
+    """The source of `file::Class.function`; AssertionError where it does not exist."""
+    path, _, names = name.partition("::")
+    text = (ROOT / path).read_text(encoding="utf-8")
+    node: ast.AST = ast.parse(text)
+    for part in names.split("."):
+        found = [child for child in ast.iter_child_nodes(node) if getattr(child, "name", None) == part]
+        assert found, f"{name} does not exist"
+        node = found[-1]
+    return ast.get_source_segment(text, node) or ""

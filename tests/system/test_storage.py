@@ -91,7 +91,7 @@ def test_a_damaged_journal_is_set_aside_and_numbers_and_evidence_go_on(tmp_path:
     try:
         cell.goes_on(2)
         second = cell.number(2)
-        until(lambda: list(tmp_path.glob(f"archive/*/{second}-*.json")), what="evidence")
+        until(lambda: list(tmp_path.glob(f"archive/*/{second}-accepted.json")), what="evidence")
         cell.service.kill()
         highest = max(job["job_id"] for job in jobs(cell.journal))
         for part in ("journal.sqlite-wal", "journal.sqlite-shm"):

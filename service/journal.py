@@ -29,7 +29,6 @@ HEADER_REGISTERS = 31
 PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
 LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
 LARGEST_OWNER = 0xFFFF
-FOUND = "found"  # kind of trigger of jobs that only the controller's block told of
 RESTORED = (
     "job_id, taken_at, trigger_kind, line, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
     " withdraw_reason"
@@ -297,8 +296,8 @@ class Journal:
             if in_flight_in is not None and job_id > highest:
                 db.execute(
                     "INSERT INTO jobs (job_id, taken_at, trigger_kind, recipe, thickness_um, session, withdraw_reason)"
-                    " VALUES (?, ?, ?, 0, 0, ?, ?)",
-                    (job_id, self._stamp(), FOUND, in_flight_in, int(Reason.SERVICE_RESTARTED)),
+                    " VALUES (?, ?, 'found', 0, 0, ?, ?)",
+                    (job_id, self._stamp(), in_flight_in, int(Reason.SERVICE_RESTARTED)),
                 )
 
     def restore(self, rows: list[tuple[Any, ...]], pair: tuple[int, int]) -> None:

@@ -90,7 +90,7 @@ def test_a_damaged_journal_is_set_aside_and_numbers_and_evidence_go_on(tmp_path:
     cell = Cell(tmp_path, trigger_every_s=0.3, more="archive: {path: archive, min_free_bytes: 0}\n")
     try:
         cell.goes_on(2)
-        until(lambda: list(tmp_path.glob("archive/*/2-*.json")), what="evidence")
+        until(lambda: list(tmp_path.glob("archive/*/2-accepted.json")), what="evidence")
         cell.service.kill()
         highest = max(job["job_id"] for job in jobs(cell.journal))
         for part in ("journal.sqlite-wal", "journal.sqlite-shm"):

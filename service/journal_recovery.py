@@ -59,7 +59,8 @@ def open_journal(
     if kept is not None:
         alarm += _restore(kept, journal)
     text = (
-        f"a new journal: jobs from {highest + 1 if highest else otherwise_from} on, or above the controller's last_job"
+        f"a new journal: jobs from {highest + 1 if highest else otherwise_from} on, "
+        "or from 1000 above that and above what the controller knows"
     )
     log.log(logging.CRITICAL if alarm else logging.INFO, "%s%s: %s", alarm, path, text)
     return journal

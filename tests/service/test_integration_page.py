@@ -52,12 +52,12 @@ def test_the_picture_is_what_the_script_draws_now() -> None:
 
 TOLD = {
     2: "read   trigger_counter 1",
-    3: "trigger_ack 1, job_id 1, session_ack",
+    3: "trigger_ack 1, job_id {job}, session_ack",
     5: "wrote  transfer 0 ",
-    6: "wrote  page 1 of 1 of job 1",
+    6: "wrote  page 1 of 1 of job {job}",
     7: "(the commit)",
-    10: "ack_result 1 (accepted), last_job 1, last_result 1",
-    12: "service_state 5 (ready), reject_reason 0, settled_job 1",
+    10: "ack_result 1 (accepted), last_job {job}, last_result 1",
+    12: "service_state 5 (ready), reject_reason 0, settled_job {job}",
 }
 """What the service's log says of the picture's events, those that pass between the two."""
 
@@ -71,13 +71,14 @@ def test_the_picture_shows_the_order_in_which_service_and_controller_really_writ
         *("simulate-service", "--controller", f"127.0.0.1:{port}", "--state", tmp_path / "state"),
     )
     try:
-        until(lambda: "settled_job 1\n" in service.text, what="a settled job")
+        settled = until(lambda: re.search(r"settled_job (\d+)\n", service.text), what="a settled job")
     finally:
         service.stop()
         controller.stop()
     lines = service.text.splitlines()
     begun = next(n for n, line in enumerate(lines) if TOLD[2] in line)
-    places = [next((n for n, line in enumerate(lines) if n >= begun and told in line), -1) for told in TOLD.values()]
+    told = [text.format(job=settled[1]) for text in TOLD.values()]
+    places = [next((n for n, line in enumerate(lines) if n >= begun and text in line), -1) for text in told]
     assert places == sorted(places)
     assert places[0] == begun
     changes = {number for signal in SIGNALS for number, _ in signal.values}

@@ -219,8 +219,8 @@ def test_a_foreign_owner_later_stops_all_writing_until_a_person_says_so() -> Non
     assert not watched.see(OURS, 1)
 
 
-@example([(THEIRS, 0, 0.0), (THEIRS, 0, 0.0), (THEIRS, 0, 2.9)], written=False)  # hardly ever drawn
-@example([(OURS, 0, 0.0), (OURS, 0, 0.0), (OURS, 0, 1.4)], written=False)
+@example(readings=[(THEIRS, 0, 0.0), (THEIRS, 0, 0.0), (THEIRS, 0, 2.9)], written=False)  # hardly ever drawn
+@example(readings=[(OURS, 0, 0.0), (OURS, 0, 0.0), (OURS, 0, 1.4)], written=False)
 @given(
     st.lists(st.tuples(st.sampled_from([0, OURS, THEIRS, 300]), st.integers(0, 1), st.floats(0, 2.9)), max_size=60),
     st.booleans(),

@@ -33,9 +33,9 @@ class Terminal:
         line, _, self._rest = self._rest.partition(b"\n")
         return line.decode("ascii").strip()
 
-    def acknowledged(self) -> int:
+    def acknowledged(self, bound_s: float = 10) -> int:
         """The job that the next line acknowledges."""
-        word, job = self.line().split()
+        word, job = self.line(bound_s).split()
         assert word == "ACK"
         return int(job)
 

@@ -10,12 +10,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from pymodbus.client import ModbusTcpClient
 
 from service.control import ask
 from tests.nobody import needs_root, python_as_nobody
 from tests.system.cell import Cell
 from tests.system.processes import combtrace, until
 from tests.system.terminal import Terminal
+
+SERVICE_BLOCK, OWNER = 16, 11
 
 
 @pytest.fixture
@@ -98,6 +101,26 @@ def test_a_reset_opens_everything_anew(cell: Cell, terminal: Terminal) -> None:
     reset = combtrace("reset", "--config", cell.folder / "config.yaml")
     assert reset.returncode == 0, reset.stderr
     assert "Ready -> Preoperational" in cell.service.text
+    until(lambda: state_of(cell) == "Ready", what="Ready")
+    terminal.type(b"TRIG\n")
+    job = terminal.acknowledged()
+    assert terminal.line().startswith(f"DONE {job} ")
+
+
+def test_after_another_service_only_a_persons_word_has_the_daemon_go_on(cell: Cell, terminal: Terminal) -> None:
+    config = ("--config", cell.folder / "config.yaml")
+    nothing = combtrace("confirm", *config)
+    assert (nothing.returncode, "nothing waits for a person's word" in nothing.stderr) == (1, True)
+    with ModbusTcpClient("127.0.0.1", port=cell.port) as another:
+        block = another.read_holding_registers(SERVICE_BLOCK, count=16, device_id=1).registers
+        block[OWNER] ^= 1
+        assert not another.write_registers(SERVICE_BLOCK, block, device_id=1).isError()
+        until(lambda: state_of(cell) == "Error", what="Error")
+        assert "another service" in combtrace("status", *config).stdout
+        found = another.read_holding_registers(SERVICE_BLOCK, count=16, device_id=1).registers
+        assert found == block, "nothing is written over it"
+    confirmed = combtrace("confirm", *config)
+    assert (confirmed.returncode, "watched anew" in confirmed.stdout) == (0, True), confirmed.stderr
     until(lambda: state_of(cell) == "Ready", what="Ready")
     terminal.type(b"TRIG\n")
     job = terminal.acknowledged()

@@ -138,8 +138,8 @@ def test_a_reason_is_seen_in_the_fail_line_the_register_and_the_log(
     """The pictures come in the order of the cases: run together, not picked."""
     case = CASES[number - 1]
     terminal.type(f"TRIG recipe={number}\n".encode())
-    job = int(terminal.line(30).removeprefix("ACK "))
-    assert job == number, "the cases before this one must run too: each takes one picture"
+    job = terminal.acknowledged(30)
+    assert job == cell.number(number), "the cases before this one must run too: each takes one picture"
     assert terminal.line(60) == f"FAIL {job} {case.code} {case.name}"
     until(lambda: registers(cell) == (case.code, job), what=f"reject_reason {case.code} of job {job}")
     outcome = Reason(case.code).outcome
@@ -219,7 +219,7 @@ def test_fixed_marks_tell_a_moved_camera(tmp_path: Path) -> None:
 def text_after(folder: Path, ends: list[tuple[int, int, str]], **options: Any) -> str:
     """The daemon's log after a job for each of the folder's pictures, whose end is told everywhere.
 
-    ends: job, code, name; code 0 is an accepted one.
+    ends: which job, from 1, code, name; code 0 is an accepted one.
     """
     terminal = Terminal()  # a line of its own: the other daemon listens on the other one
     started = Cell(
@@ -231,9 +231,10 @@ def text_after(folder: Path, ends: list[tuple[int, int, str]], **options: Any) -
     )
     try:
         started.ready()
-        for job, code, name in ends:
+        for nth, code, name in ends:
             terminal.type(b"TRIG\n")
-            assert terminal.line(30) == f"ACK {job}"
+            job = terminal.acknowledged(30)
+            assert job == started.number(nth)
             assert terminal.line(60).startswith(f"FAIL {job} {code} {name}" if code else f"DONE {job} ")
             until(lambda code=code, job=job: registers(started) == (code, job), what=f"reject_reason {code}")
             assert code == 0 or f"job {job} refused: {code} {name}: " in started.service.text

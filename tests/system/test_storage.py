@@ -90,7 +90,8 @@ def test_a_damaged_journal_is_set_aside_and_numbers_and_evidence_go_on(tmp_path:
     cell = Cell(tmp_path, trigger_every_s=0.3, more="archive: {path: archive, min_free_bytes: 0}\n")
     try:
         cell.goes_on(2)
-        until(lambda: list(tmp_path.glob("archive/*/2-accepted.json")), what="evidence")
+        second = cell.number(2)
+        until(lambda: list(tmp_path.glob(f"archive/*/{second}-accepted.json")), what="evidence")
         cell.service.kill()
         highest = max(job["job_id"] for job in jobs(cell.journal))
         for part in ("journal.sqlite-wal", "journal.sqlite-shm"):
@@ -103,7 +104,7 @@ def test_a_damaged_journal_is_set_aside_and_numbers_and_evidence_go_on(tmp_path:
         assert (next(tmp_path.glob("journal.sqlite.damaged-*"))).exists()
         new = [job["job_id"] for job in jobs(cell.journal) if job["trigger_kind"] != "found"]
         assert min(new) > highest, "found: the last one, taken back as the controller knew of it"
-        again = combtrace("replay", "2", "--config", tmp_path / "config.yaml")
+        again = combtrace("replay", str(second), "--config", tmp_path / "config.yaml")
         assert "byte for byte as they were" in again.stdout, again.stderr
     finally:
         cell.stop()

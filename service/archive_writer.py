@@ -36,7 +36,7 @@ from service.evidence import (
     plain_bytes,
     table_digest,
 )
-from service.journal import FOUND, Job, JournalError
+from service.journal import Job, JournalError
 from service.recipe_exports import exports_of
 from service.table_file import TableRecord, table_bytes
 
@@ -69,13 +69,18 @@ class ArchiveWriter:
         archive: Archive,
         find: Callable[[int], Job | None] = lambda _job_id: None,
         in_flight: Collection[int] = (),
+        last_taken: int = 0,
         *,
         depth: int = DEPTH,
     ) -> None:
-        """find: a job in the journal; raises JournalError. in_flight: jobs whose evidence will come after a restart."""
+        """find: a job in the journal; raises JournalError. in_flight: jobs whose evidence will come after a restart.
+
+        last_taken: the highest number in the journal; one above it may be found at the controller yet.
+        """
         self._archive = archive
         self._find = find
         self._in_flight = frozenset(in_flight)
+        self._last_taken = last_taken
         self._lock = threading.Lock()  # of the archive
         self._queue: queue.Queue[Evidence | None] = queue.Queue(depth)
         self._thread = threading.Thread(target=self._run, name="archive", daemon=True)
@@ -225,7 +230,7 @@ class ArchiveWriter:
                 raise ArchiveError(f"job {job_id}: its evidence is completed at the next start: {error}") from error
             if job is not None and job.outcome is not None:
                 self._keep(Evidence(job, None))
-            else:
+            elif job_id <= self._last_taken:
                 with self._opened_archive() as archive:
                     archive.forget(job_id)
 
@@ -233,8 +238,8 @@ class ArchiveWriter:
         job_id, drafted = evidence.job.job_id, None
         with self._opened_archive() as archive:
             has_draft = archive.has(job_id, DRAFT)
-            if evidence.job.trigger.kind == FOUND and archive.document_of(job_id) is not None:
-                return  # it ended before its journal was lost, and this one knows less of it
+            if evidence.frame is None and not has_draft and archive.document_of(job_id) is not None:
+                return  # it had ended before its journal was lost or restored, and less is known of it now
         try:
             if has_draft:
                 draft = load_draft(self._archive.path, job_id)

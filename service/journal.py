@@ -30,7 +30,6 @@ PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many 
 LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
 LARGEST_OWNER = 0xFFFF
 LATER = 32768  # a trigger counter that is less ahead than this is later, one that is more is earlier
-FOUND = "found"  # kind of trigger of jobs that only the controller's block told of
 RESTORED = (
     "job_id, taken_at, trigger_kind, line, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
     " target, withdraw_reason"
@@ -335,8 +334,8 @@ class Journal:
             if unknown:
                 db.execute(
                     "INSERT INTO jobs (job_id, taken_at, trigger_kind, recipe, thickness_um, session, withdraw_reason)"
-                    " VALUES (?, ?, ?, 0, 0, ?, ?)",
-                    (found.job_id, self._stamp(), FOUND, session, int(Reason.SERVICE_RESTARTED)),
+                    " VALUES (?, ?, 'found', 0, 0, ?, ?)",
+                    (found.job_id, self._stamp(), session, int(Reason.SERVICE_RESTARTED)),
                 )
         return GoneOn(pair if later else None, found.job_id if unknown else None)
 

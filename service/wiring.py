@@ -276,7 +276,8 @@ def _make_archive(config: Config, journal: Journal) -> ArchiveWriter | None:
         return None
     limits = ArchiveLimits(settings.max_bytes, settings.min_free_bytes)
     in_flight = [job.job_id for job in journal.unsettled()]
-    return ArchiveWriter(Archive(settings.path, limits), journal.find, in_flight)
+    last = journal.last_taken()
+    return ArchiveWriter(Archive(settings.path, limits), journal.find, in_flight, last.job_id if last else 0)
 
 
 def opening_of(config: Config) -> Opening:

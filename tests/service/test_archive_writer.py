@@ -53,10 +53,14 @@ def nobody(_job_id: int) -> Job | None:
 
 @contextmanager
 def writer(
-    path: Path, find: Callable[[int], Job | None] = nobody, in_flight: tuple[int, ...] = (), max_bytes: int = 10**9
+    path: Path,
+    find: Callable[[int], Job | None] = nobody,
+    in_flight: tuple[int, ...] = (),
+    last_taken: int = 0,
+    max_bytes: int = 10**9,
 ) -> Iterator[ArchiveWriter]:
     """The writer of one process; what waits at its end is written, as a kill would not let it."""
-    built = ArchiveWriter(Archive(path, ArchiveLimits(max_bytes)), find, in_flight)
+    built = ArchiveWriter(Archive(path, ArchiveLimits(max_bytes)), find, in_flight, last_taken)
     built.start()
     try:
         yield built
@@ -126,7 +130,7 @@ def test_a_job_that_had_ended_when_the_kill_came_is_completed_at_the_start(tmp_p
 
 def test_a_draft_of_a_job_that_the_journal_does_not_know_goes(tmp_path: Path) -> None:
     drafted(tmp_path, evidence())
-    with writer(tmp_path) as built:
+    with writer(tmp_path, last_taken=7) as built:
         until(lambda: built.figures.bytes == 0)
     assert contents(tmp_path) == {}
 
@@ -204,8 +208,15 @@ def test_a_job_that_a_lost_journal_had_ended_keeps_its_evidence(tmp_path: Path) 
         built.keep(evidence(ended()))
     before = contents(tmp_path)
     with writer(tmp_path, in_flight=(7,)) as built:
-        built.keep(Evidence(replace(ended(), trigger=TriggerStamp("found")), Measurer(None)))
+        built.keep(Evidence(ended(), Measurer(None)))
     assert contents(tmp_path) == before
+
+
+def test_a_draft_whose_journal_was_lost_is_completed_where_the_controller_knows_the_job(tmp_path: Path) -> None:
+    drafted(tmp_path, evidence())
+    with writer(tmp_path) as built:  # an empty journal: the job is found and settled after the start
+        built.keep(Evidence(ended(), Measurer(None)))
+    assert {"7-accepted.json", "7-frame.png"} <= contents(tmp_path).keys()
 
 
 def on_disk(path: Path) -> int:

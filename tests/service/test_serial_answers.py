@@ -73,6 +73,9 @@ class Runner:
         await self.go.wait()
         return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"vertices": 4, "area_mm2": 5000.0})
 
+    def hindrance(self, _job: Job) -> str | None:
+        return None
+
     async def resume(self, job: Job) -> Job:
         await self.go.wait()
         return self.journal.settle(job.job_id, Outcome.FAILED, Reason.SERVICE_RESTARTED, "nothing of it was sent")

@@ -364,10 +364,10 @@ class Executor:
                 log.error("job %d: %s", job.job_id, hindrance)
                 self._health.report("in-flight", Fault(Reason.SERVICE_RESTARTED, hindrance))
                 return
-            log.warning("job %d was in flight when the service ended", job.job_id)
             self._report_in_flight(job.job_id)
             if not job.sent and not self._begun:  # the block at the controller may know more of it than the journal
                 return
+            log.warning("job %d was in flight when the service ended", job.job_id)
             await self._finish(await self._runner.resume(job))
         self._health.report("in-flight", None)
 

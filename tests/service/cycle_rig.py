@@ -39,7 +39,16 @@ def decoded(page: Page) -> Decoded:
 
 def measured(**changes: object) -> Measurement:
     contour = Contour(RECTANGLE)
-    good = Measurement("sliding-matrix", "bright", 20.0, contour, contour, 5000.0, 5000.0, thickness_mm=20.0)
+    good = Measurement(
+        "sliding-matrix",
+        "bright",
+        20.0,
+        pixels=contour,
+        millimetres=contour,
+        area_px2=5000.0,
+        area_mm2=5000.0,
+        thickness_mm=20.0,
+    )
     return replace(good, **changes)  # type: ignore[arg-type]
 
 

@@ -459,7 +459,7 @@ async def test_a_job_that_only_the_service_block_knows_is_taken_back(tmp_path: P
 
 
 async def test_a_job_that_the_journal_calls_unsent_is_settled_by_the_controller_where_the_block_knows_it(
-    tmp_path: Path,
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """A copy of the journal was taken after the trigger and before the contour was sent, and put back afterwards."""
     async with running(tmp_path) as bench:
@@ -473,6 +473,7 @@ async def test_a_job_that_the_journal_calls_unsent_is_settled_by_the_controller_
         await bench.link.on_found(left_behind(owner=owner, job_id=job.job_id, settled_job=0, trigger_ack=0))
         await until(lambda: bench.runner.resumed == [job.job_id])
         assert bench.runner.sent == [job.job_id], "as one that may have been sent"
+    assert caplog.text.count("was in flight when the service ended") == 1
 
 
 async def test_a_job_that_the_journal_calls_unsent_and_the_block_does_not_know_was_never_sent(tmp_path: Path) -> None:

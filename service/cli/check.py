@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_UNUSABLE
 
 if TYPE_CHECKING:
@@ -87,7 +88,8 @@ def _findings(args: argparse.Namespace) -> Iterator[Finding]:
 
 
 def _print(finding: Finding, to: TextIO) -> None:
-    print(f"{finding.level.label:<5} {finding.part:<12} {finding.text}", file=to)
+    colour = (Colour.GOOD, Colour.DOUBTFUL, Colour.BAD)[finding.level]
+    print(f"{painted(f'{finding.level.label:<5}', colour, to)} {finding.part:<12} {finding.text}", file=to)
     if finding.next_step:
         print(f"{'':<18} -> {finding.next_step}", file=to)
     to.flush()

@@ -8,7 +8,9 @@ import io
 import sys
 from collections.abc import Sequence
 
+from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_UNUSABLE, UserError
+from service.cli.examples import examples_of
 
 COMMANDS = (
     *("run", "trace", "demo", "check", "trigger", "simulate-controller", "simulate-service"),
@@ -16,7 +18,7 @@ COMMANDS = (
     *("board", "calibrate", "align", "verify", "repeat", "teach-table"),
     *("probe", "jobs", "replay"),
     *("status", "halt", "resume", "confirm", "reset", "install-service"),
-    *("schema", "reasons", "register-map"),
+    *("completion", "schema", "reasons", "register-map"),
 )
 
 DESCRIPTION = """\
@@ -75,6 +77,7 @@ def build_parser() -> argparse.ArgumentParser:
             name,
             help=module.HELP,
             description=module.DESCRIPTION,
+            epilog=examples_of(name),
             formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         module.add_arguments(command)
@@ -106,7 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UserError as error:
         if args.debug:
             raise
-        print(f"combtrace {args.command}: {error}", file=sys.stderr)
+        print(f"{painted(f'combtrace {args.command}:', Colour.BAD, sys.stderr)} {error}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
         return 130

@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from service.cli.colour import Colour, painted
 from service.cli.control_options import add_daemon_argument, asked
 from service.cli.errors import EXIT_FAILED, EXIT_OK
 
@@ -22,17 +23,38 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Configuration, form."""
     add_daemon_argument(parser)
     parser.add_argument("--json", action="store_true", help="all of it, as one JSON object")
+    parser.add_argument(
+        "--watch", action="store_true", help="go on until Ctrl-C: drawn anew on a terminal, else a line a change"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the status."""
+    """Print the status, or follow it."""
+    if args.watch:
+        from service.cli.status_watch import watch
+
+        return watch(args)
     status = asked(args, command="status")
     if args.json:
         print(json.dumps(status, ensure_ascii=False))
     else:
-        for name, text in lines(status):
-            print(f"{name:<9} {text}")
+        print(page(status))
     return EXIT_OK if status["state"] in WELL else EXIT_FAILED
+
+
+def page(status: dict[str, Any]) -> str:
+    """All of it for people, in colour on a terminal."""
+    return "\n".join(_painted(name, f"{name:<9} {text}", status) for name, text in lines(status))
+
+
+def _painted(name: str, line: str, status: dict[str, Any]) -> str:
+    if name == "state":
+        colour = (
+            Colour.GOOD if status["state"] in WELL else Colour.BAD if status["state"] == "Error" else Colour.DOUBTFUL
+        )
+        return painted(line, colour)
+    colours = {"fault": Colour.BAD, "warning": Colour.DOUBTFUL}
+    return painted(line, colours[name]) if name in colours else line
 
 
 def lines(status: dict[str, Any]) -> Iterator[tuple[str, str]]:

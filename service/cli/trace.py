@@ -8,8 +8,9 @@ import sys
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
+from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.export_options import Exports, add_export_arguments
 from service.cli.file_names import check_outputs, distinct_stems, output_path
@@ -74,10 +75,17 @@ def run(args: argparse.Namespace) -> int:
     with json_output(args.json) as write:
         for image in args.images:
             record, line, status = _trace_one(image, setup)
-            print(line, file=texts if status != EXIT_UNUSABLE else sys.stderr, flush=True)
+            stream = texts if status != EXIT_UNUSABLE else sys.stderr
+            print(_painted(line, image, status, stream), file=stream, flush=True)
             worst = max(worst, status, key=(EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE).index)
             write(json.dumps(record, ensure_ascii=False) + "\n")
     return worst
+
+
+def _painted(line: str, image: Path, status: int, stream: TextIO) -> str:
+    """The line with the picture's name, and that it is refused, in the verdict's colour."""
+    head = next(head for head in (f"{image}: refused:", f"{image}:", "") if line.startswith(head))
+    return painted(head, Colour.GOOD if status == EXIT_OK else Colour.BAD, stream) + line.removeprefix(head)
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,7 @@ async def test_requests_of_several_tasks_each_get_their_own_reply(there: Cell, c
 async def test_a_driver_that_was_closed_says_so_and_connects_again(controller: Controller) -> None:
     await controller.close()
     assert not controller.connected
-    with pytest.raises(ControllerUnavailable, match="not connected"):
+    with pytest.raises(ControllerUnavailable, match="no connection stands"):
         await controller.read_link()
     await controller.connect()
     assert controller.connected

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from service.cli.main import main
+from service.cli.examples import EXAMPLES, examples_of
+from service.cli.main import COMMANDS, EPILOG, build_parser, main
 from tests.system.processes import combtrace
-
-COMMANDS = ("run", "trace", "demo", "check", "simulate-controller", "trigger", "schema")
 
 
 def test_help_reads_like_a_manual_page() -> None:
@@ -28,6 +29,26 @@ def test_each_command_has_its_own_help(command: str) -> None:
     done = combtrace(command, "--help")
     assert done.returncode == 0
     assert len(done.stdout) > 100
+
+
+def test_every_command_shows_examples_in_its_help() -> None:
+    assert set(EXAMPLES) == set(COMMANDS)
+    help_text = combtrace("jobs", "--help").stdout
+    assert f"\n{examples_of('jobs')}\n" in help_text
+
+
+@pytest.mark.parametrize("line", [line for lines in EXAMPLES.values() for line, _ in lines])
+def test_every_example_is_a_command_as_the_parser_takes_it(line: str) -> None:
+    program, command, *rest = shlex.split(line.partition(" > ")[0])
+    assert (program, line in examples_of(command)) == ("combtrace", True)
+    assert build_parser().parse_args([command, *rest]).command == command
+
+
+def test_every_example_of_the_main_help_is_too() -> None:
+    lines = re.findall(r"^ +combtrace (.+)$", EPILOG, re.MULTILINE)
+    assert len(lines) >= 6
+    for line in lines:
+        build_parser().parse_args(shlex.split(line))
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["trace", "--help"], ["run", "--help"], ["--version"]])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pwd
+import re
 import shutil
 import signal
 import subprocess
@@ -103,11 +104,11 @@ class Bridge:
             )
         self.says("listening")
 
-    def says(self, text: str, bound_s: float = 30.0) -> str:
-        """Its log, once it holds the text."""
+    def says(self, pattern: str, bound_s: float = 30.0) -> str:
+        """Its log, once the pattern is found in it."""
         end = time.monotonic() + bound_s
-        while text not in (told := self.log.read_text(errors="replace")):
-            assert time.monotonic() < end, f"no {text!r} in:\n{told}"
+        while re.search(pattern, told := self.log.read_text(errors="replace")) is None:
+            assert time.monotonic() < end, f"no {pattern!r} in:\n{told}"
             assert self._process.poll() is None, f"the bridge has ended:\n{told}"
             time.sleep(0.02)
         return told

@@ -199,8 +199,7 @@ class Cycle:
         assert job.session is not None
         validity = self._validity(job.pages)
         lasts_s = validity.valid_for / 1000 or self._settings.lifetime_s
-        lifetime = Lifetime(self._now() + lasts_s, job.taken_at_s, lasts_s, self._now)
-        transfer = self._transfer(self._link, job, job.session, job.pages, lifetime)
+        transfer = self._transfer(self._link, job, job.session, job.pages, self._lifetime(job, lasts_s))
         if job.withdraw_reason is not None:
             detail = "a withdrawal that the restart cut short" if job.pages else "whether it was sent is not known"
             settlement = await transfer.withdraw(job.withdraw_reason, detail)
@@ -415,6 +414,10 @@ class Cycle:
             beat=self._beat,
         )
 
+    def _lifetime(self, job: Job, lasts_s: float) -> Lifetime:
+        """From now on, and not longer than that since it was taken."""
+        return Lifetime(self._now() + lasts_s, job.taken_at_s, lasts_s, self._now)
+
     def _validity(self, pages: tuple[Page, ...]) -> Validity:
         if not pages:
             return Validity()
@@ -477,7 +480,9 @@ class Cycle:
         if known is None or not known.sent or known.session is None or never_answered:
             return Settlement(Outcome.FAILED, Reason.INTERNAL_ERROR, detail)
         assert self._link is not None
-        transfer = self._transfer(self._link, job, known.session, known.pages, Lifetime(self._now()))
+        transfer = self._transfer(
+            self._link, job, known.session, known.pages, self._lifetime(job, self._settings.job_timeout_s)
+        )
         return await transfer.withdraw(Reason.INTERNAL_ERROR, detail)
 
 

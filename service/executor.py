@@ -84,7 +84,7 @@ class Executor:
         self.settled_job = 0
         self.last_settled: Job | None = None
         self._last_pair = journal.last_controller_trigger()
-        self._found = False
+        self._found = self._settling = False
         self._begun = link is None or not link.settings.handshake or link.settings.observe
         self._numbered_above_last_job = False
         # Two that start at once with one journal find the same: by chance they number differently.
@@ -118,17 +118,20 @@ class Executor:
         is not taken again, a job that had not ended there is taken back, and numbers go on well above.
         """
         assert self._link is not None
-        ours = block.owner == self._journal.owner
+        ours = block.owner == self._link.published.owner
         if (block.protocol_version, block.test_value) != (ServiceBlock().protocol_version, TEST_VALUE):
             block = replace(block, job_id=0, settled_job=0, trigger_ack=0)  # whatever stands there, it is no service's
         session = self._link.view.session if self._link.view else 0
-        gone_on = await self._until_done(self._journal.go_on_above, block, session, self._room)
+        running = self._health.job or 0
+        gone_on = await self._until_done(self._journal.go_on_above, block, session, self._room, running)
         self._numbered_above_last_job = False
         self._last_pair = await self._until_done(self._journal.last_controller_trigger)
         taken = await self._until_done(self._journal.last_taken)
         if taken is None or taken.job_id <= block.job_id:
-            self.settled_job = max(self.settled_job, block.settled_job)
-            self._link.publish(job_id=block.job_id, settled_job=self.settled_job, reject_reason=block.reject_reason)
+            self._link.publish(job_id=block.job_id)
+        if block.settled_job > self.settled_job:
+            self.settled_job = block.settled_job
+            self._link.publish(settled_job=block.settled_job, reject_reason=block.reject_reason)
         self._link.highest_known = max(self._link.highest_known, block.job_id, block.settled_job)
         self._link.publish(trigger_ack=self._last_pair[1], session_ack=self._last_pair[0])
         self._tell_found(gone_on, ours)
@@ -155,6 +158,8 @@ class Executor:
             except JournalError as error:
                 self._tell(f"journal: {error}")
                 self._health.report("journal", journal_fault(error))
+                if self._link is not None:
+                    self._link.on_round()  # its task waits here, and is alive
                 await asyncio.sleep(JOURNAL_PAUSE_S)
             else:
                 self._health.report("journal", None)
@@ -180,7 +185,7 @@ class Executor:
     @property
     def idle(self) -> bool:
         """True where no job is being taken or executed."""
-        return self._health.job is None and self._submitted is None and not self._taking
+        return self._health.job is None and self._submitted is None and not self._taking and not self._settling
 
     @property
     def waiting(self) -> int:
@@ -292,7 +297,11 @@ class Executor:
             self._wake.clear()
             if self._found and not self._taking:  # a job that is only being taken is none of before
                 self._found = False
-                await self._settle_in_flight()
+                self._settling = True
+                try:
+                    await self._settle_in_flight()
+                finally:
+                    self._settling = False
             if self._submitted is not None:
                 await self._execute_submitted(self._submitted)
                 continue
@@ -381,6 +390,7 @@ class Executor:
             try:
                 return self._journal.unsettled()  # in this thread: no trigger may come in between
             except JournalError as error:
+                self._beat()
                 self._tell(f"journal: {error}")
                 self._health.report("in-flight", journal_fault(error))
                 await asyncio.sleep(JOURNAL_PAUSE_S)

@@ -302,12 +302,13 @@ class Journal:
             )
         return Job(job_id, taken_at, trigger)
 
-    def go_on_above(self, found: ServiceBlock, session: int, room: int) -> GoneOn:
+    def go_on_above(self, found: ServiceBlock, session: int, room: int, running: int = 0) -> GoneOn:
         """Begin at a controller whose service block shows `found` in its session `session`; durable on return.
 
         New jobs are numbered from more than `room` above all that is known. The block's trigger counts as taken where
         it is later than ours, and its job, where it had not ended there and is not in the journal, becomes one of ours
-        that is to be taken back: the block may be another service's, and the journal may be an old one.
+        that is to be taken back: the block may be another service's, and the journal may be an old one. `running` is a
+        job of this life, which knows itself what was sent of it.
         """
         with self._transaction() as db:
             highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
@@ -323,8 +324,8 @@ class Journal:
             if session:  # one that this journal calls unsent may have been sent in a life that it does not know
                 db.execute(
                     "UPDATE jobs SET session = ?, withdraw_reason = ?"
-                    f" WHERE {UNSETTLED} AND session IS NULL AND job_id <= ?",
-                    (session, int(Reason.SERVICE_RESTARTED), found.job_id),
+                    f" WHERE {UNSETTLED} AND session IS NULL AND job_id <= ? AND job_id != ?",
+                    (session, int(Reason.SERVICE_RESTARTED), found.job_id, running),
                 )
             unknown = (
                 found.job_id > found.settled_job

@@ -112,6 +112,7 @@ class Link:
         self.highest_known = 0  # job number in the journal, or found in the service block
         self._confirmed_last_job: int | None = None
         self._session_written = 0  # the session in which the service block was last written
+        self._reading = 0  # reads whose reply was not looked at yet
         self._well_or_failed = False
         self._since: float | None = None
         self._turn = 0
@@ -248,7 +249,11 @@ class Link:
         """The controller's block, as two reads in a row show it; raise ControllerError."""
         for _ in range(READS_FOR_TWO_ALIKE):
             asked_at = self._now()
-            block = await self.controller.read_link()
+            self._reading += 1
+            try:
+                block = await self.controller.read_link()
+            finally:
+                self._reading -= 1
             if self._shows_the_same(block, asked_at):
                 return block
         self.view = None
@@ -465,14 +470,15 @@ class Link:
     def _beat_of_poll(self) -> None:
         """Poll in place where the controller lets us: at rest, waking the task each time costs more than the poll."""
         if self._nothing_new():
+            self.on_round()
             self._set_timer()
         else:
             self._wake.set()
 
     def _nothing_new(self) -> bool:
         """True where nothing is to be written and the controller's block, read now, shows what it showed."""
-        if not self.settings.handshake or self.view is None or self._service_due():
-            return False
+        if not self.settings.handshake or self.view is None or self._reading or self._service_due():
+            return False  # what another task has read and not yet looked at comes first
         asked_at = self._now()
         block = self.controller.glance()
         return block is not None and self._shows_the_same(block, asked_at)

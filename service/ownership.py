@@ -44,10 +44,12 @@ class Ownership:
     def __init__(self, owner: int, *, now: Callable[[], float] = time.monotonic) -> None:
         self.owner = owner
         self._now = now
+        self.epoch = 0  # starts of watching so far: what was confirmed in one says nothing in the next
         self.begin()
 
     def begin(self) -> None:
         """As at the start: at the start, and on a person's word."""
+        self.epoch += 1
         self._phase = _Phase.STARTING
         self._other = NOBODY
         self._beat: int | None = None

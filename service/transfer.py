@@ -255,10 +255,14 @@ class Transfer:
         while not ownership.ours:
             if ownership.conflict and not self._sent:
                 raise _Ended(Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, ownership.fault()))
+            if not self._sent and self._lifetime.over:
+                raise _Ended(
+                    Settlement(Outcome.FAILED, Reason.CONTROLLER_LOST, f"not before the job expired: {foreign}")
+                )
             try:
                 await self._see()
             except ControllerUnavailable:
-                await self._connected()
+                await self._reconnected()
             except ControllerError as error:
                 self._told(str(error))
             await asyncio.sleep(self._settings.poll_period_s)
@@ -378,16 +382,16 @@ class Transfer:
                 return None
         return await self._answer(transfer)
 
-    async def _clear(self) -> int:
-        """Step 2: the number of the connection on which `transfer` = 0 was confirmed."""
+    async def _clear(self) -> tuple[int, int]:
+        """Step 2: the connection on which `transfer` = 0 was confirmed, and since which start of ownership."""
         self._link.ownership.check()
         await self._link.controller.write_transfer(0)
-        return self._link.connections
+        return self._link.connections, self._link.ownership.epoch
 
-    def _check_may_go_on(self, clean: int) -> None:
-        """Raise ControllerError where steps 3 to 5 must not follow the step 2 confirmed on connection `clean`."""
+    def _check_may_go_on(self, clean: tuple[int, int]) -> None:
+        """Raise ControllerError where steps 3 to 5 must not follow the step 2 confirmed as `clean`."""
         self._link.ownership.check()
-        if self._link.connections != clean:
+        if (self._link.connections, self._link.ownership.epoch) != clean:
             raise ControllerUnavailable("the connection was opened anew: it begins again with transfer = 0")
 
     def _too_old(self) -> bool:

@@ -165,7 +165,7 @@ RULES = (
     ),
     Rule(
         "Transfer 2: also after a restart",
-        f"{CYCLE}::Cycle.resume",
+        f"{CYCLE}::Cycle._lifetime",
         f"{IN_RESUMING}::test_a_job_taken_longer_ago_than_it_is_valid_is_taken_back_after_a_restart_not_sent_again",
         "job.taken_at_s, lasts_s",
         "None, lasts_s",

@@ -240,6 +240,7 @@ async def test_a_job_in_flight_at_the_start_is_settled_before_any_trigger_is_tak
     try:
         await until(lambda: bench.runner.resumed == [old.job_id])
         assert bench.health.state is State.ERROR
+        assert not bench.executor.idle, "or a reset would start the parts anew in the midst of it"
         with pytest.raises(TriggerRefused):
             await bench.executor.submit(TriggerStamp("serial"))
         assert bench.link.published.trigger_ack == 6
@@ -605,3 +606,26 @@ async def test_after_65535_comes_1(tmp_path: Path) -> None:
         bench.controller_says(trigger_counter=1)
         await until(lambda: len(bench.settled) == 2)
         assert bench.link.published.missed_triggers == missed
+
+
+async def test_a_reason_that_the_service_block_shows_of_an_older_job_is_not_told_of_ours(tmp_path: Path) -> None:
+    """Ours had ended in the journal, and the kill came before the block was written."""
+    async with running(tmp_path) as bench:
+        job = await by_hand(bench)
+    async with running(tmp_path) as bench:
+        owner = bench.journal.owner
+        found = left_behind(owner=owner, job_id=job.job_id, settled_job=job.job_id - 1, reject_reason=112)
+        await bench.link.on_found(found)
+        assert (bench.link.published.settled_job, bench.link.published.reject_reason) == (job.job_id, 0)
+
+
+async def test_a_persons_word_leaves_the_job_that_runs_what_it_is(tmp_path: Path) -> None:
+    async with running(tmp_path) as bench:
+        bench.runner.go.clear()
+        job = (await bench.executor.submit(TriggerStamp("serial"))).job
+        await until(lambda: bench.health.job == job.job_id)
+        await bench.link.on_found(left_behind(job_id=job.job_id + 5, settled_job=job.job_id + 5))
+        running_still = bench.journal.find(job.job_id)
+        assert running_still is not None
+        assert not running_still.sent
+        bench.runner.go.set()

@@ -402,3 +402,20 @@ async def test_our_heartbeat_begins_anywhere_and_never_falls_into_anothers_step(
         beats.append({block.service_heartbeat for name, block in controller.requests if name == "write_service"})
     assert len(beats[0]) >= 20
     assert len(beats[0] & beats[1]) <= 2
+
+
+@pytest.mark.parametrize("observe", [True, False])
+async def test_a_link_that_only_looks_shows_that_it_lives(observe: bool) -> None:
+    """Also beside another service, where nothing is written: the watchdog must not start anew what waits for a person."""
+    controller = Glanced()
+    async with linked(controller, replace(QUICK, observe=observe)) as link:
+        rounds: list[int] = []
+        link.on_round = lambda: rounds.append(1)
+        if not observe:
+            link.publish(owner=100)
+            await until(lambda: link.fault() is None)
+            controller.service = replace(controller.service, owner=200)
+            await until(lambda: link.ownership.conflict)
+        seen, glances = len(rounds), controller.glances
+        await until(lambda: controller.glances > glances + 10)
+        assert len(rounds) > seen

@@ -69,19 +69,19 @@ def files(cell: Cell, number: int) -> list[str]:
 def test_a_job_in_flight_at_a_kill_is_told_and_is_as_complete_as_any_other(tmp_path: Path, terminal: Terminal) -> None:
     with running(tmp_path, terminal) as cell:
         terminal.type(b"TRIG\n")
-        assert terminal.line() == "ACK 1"
-        until(lambda: sent(cell, 1), what="the contour on its way")
+        first_number = terminal.acknowledged()
+        until(lambda: sent(cell, first_number), what="the contour on its way")
         killed_and_started(cell)
         word, number, vertices, area = terminal.line(30).split()
-        assert (word, number) == ("DONE", "1")
+        assert (word, int(number)) == ("DONE", first_number)
         cell.ready()
         until(lambda: "-> Ready" in cell.service.text.rpartition("was in flight")[2], what="Ready")
         terminal.type(b"TRIG\n")
         second = terminal.line().split()[1]
         assert terminal.line().startswith(f"DONE {second} ")
-        resumed, usual = archived(cell, 1, "accepted"), archived(cell, int(second), "accepted")
+        resumed, usual = archived(cell, first_number, "accepted"), archived(cell, int(second), "accepted")
         until(lambda: "draft.json" not in files(cell, int(second)), what="the end of the draft")
-        assert files(cell, 1) == files(cell, int(second)) == ["accepted.json", "frame.png", "overlay.jpg"]
+        assert files(cell, first_number) == files(cell, int(second)) == ["accepted.json", "frame.png", "overlay.jpg"]
         assert resumed.keys() == usual.keys()
         assert resumed["measurement"].keys() == usual["measurement"].keys()
         assert len(resumed["measurement"]["millimetres"]["exterior"]) == int(vertices)
@@ -92,31 +92,34 @@ def test_a_job_in_flight_at_a_kill_is_told_and_is_as_complete_as_any_other(tmp_p
         assert first["recipe_digest"] == other["recipe_digest"] is not None
         assert json.loads(first["transfer"])["crc32"]
         config = cell.folder / "config.yaml"
-        replayed = combtrace("replay", "1", "--config", config)
+        replayed = combtrace("replay", str(first_number), "--config", config)
         assert "byte for byte as they were" in replayed.stdout, replayed.stderr
-        assert "1-overlay.jpg" in combtrace("jobs", "show", "1", "--config", config).stdout
+        shown = combtrace("jobs", "show", str(first_number), "--config", config).stdout
+        assert f"{first_number}-overlay.jpg" in shown
 
 
 def test_a_job_of_which_nothing_was_sent_is_told_failed_after_the_restart(tmp_path: Path, terminal: Terminal) -> None:
     with running(tmp_path, terminal) as cell:
         terminal.type(b"TRIG\n")
-        assert terminal.line() == "ACK 1"
+        number = terminal.acknowledged()
         killed_and_started(cell)
-        assert terminal.line(30) == "FAIL 1 154 service_restarted"
-        assert archived(cell, 1, "failed")["job"]["reason_name"] == "service_restarted"
+        assert terminal.line(30) == f"FAIL {number} 154 service_restarted"
+        assert archived(cell, number, "failed")["job"]["reason_name"] == "service_restarted"
 
 
 def test_a_job_that_a_stop_cut_short_is_told_after_the_next_start(tmp_path: Path, terminal: Terminal) -> None:
     """The stop gives up waiting for the answer; the job is settled, and told, by the next start."""
     with running(tmp_path, terminal, "machine: {check_scans: 1200}") as cell:  # 12 s, longer than a stop waits
         terminal.type(b"TRIG\n")
-        assert terminal.line() == "ACK 1"
-        until(lambda: sent(cell, 1), what="the contour on its way")
+        number = terminal.acknowledged()
+        until(lambda: sent(cell, number), what="the contour on its way")
         assert cell.service.stop() == 0
         cell.service = cell.start_service()
         heard = terminal.line(60)
         (job,) = jobs(cell.journal)
-        assert heard.startswith("DONE 1 " if job["outcome"] == "accepted" else f"FAIL 1 {job['reason']} ")
+        assert heard.startswith(
+            f"DONE {number} " if job["outcome"] == "accepted" else f"FAIL {number} {job['reason']} "
+        )
 
 
 def test_whatever_the_moment_of_a_kill_every_acknowledged_job_is_told_its_end(
@@ -166,12 +169,13 @@ def test_the_trigger_command_hears_the_end_after_a_kill_and_a_restart(tmp_path: 
     try:
         with running(tmp_path, terminal) as cell, cable(terminal, panel):
             command = Process(tmp_path / "trigger.log", "trigger", "--port", panel.name)
-            until(lambda: sent(cell, 1), what="the contour on its way")
+            until(lambda: any(job["pages"] for job in jobs(cell.journal)), what="the contour on its way")
+            number = str(cell.number(1))
             cell.service.kill()
             time.sleep(1)
             cell.service = cell.start_service()
             assert command.ended(60) == EXIT_OK, command.text
-            assert [line.split()[:2] for line in command.text.splitlines()] == [["ACK", "1"], ["DONE", "1"]]
+            assert [line.split()[:2] for line in command.text.splitlines()] == [["ACK", number], ["DONE", number]]
     finally:
         panel.close()
 
@@ -190,13 +194,13 @@ def test_the_line_that_is_pulled_while_a_job_runs_hears_its_end_when_it_is_back(
     try:
         with running(tmp_path, cell_terminal) as cell:
             first.type(b"TRIG\n")
-            assert first.line() == "ACK 1"
-            until(lambda: sent(cell, 1), what="the contour on its way")
+            number = first.acknowledged()
+            until(lambda: sent(cell, number), what="the contour on its way")
             plug.unlink()
             first.close()
             until(cell.settled, what="the job's end")
             plug.symlink_to(second.name)
-            assert second.line(20).startswith("DONE 1 ")
+            assert second.line(20).startswith(f"DONE {number} ")
             assert cell.service.running
             cell.service.send(signal.SIGTERM)
     finally:

@@ -406,7 +406,7 @@ async def test_our_heartbeat_begins_anywhere_and_never_falls_into_anothers_step(
 
 @pytest.mark.parametrize("observe", [True, False])
 async def test_a_link_that_only_looks_shows_that_it_lives(observe: bool) -> None:
-    """Also beside another service, where nothing is written: the watchdog must not start anew what waits for a person."""
+    """Also beside another service: the watchdog must not start anew what waits for a person."""
     controller = Glanced()
     async with linked(controller, replace(QUICK, observe=observe)) as link:
         rounds: list[int] = []

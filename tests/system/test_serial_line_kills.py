@@ -57,7 +57,7 @@ def sent(cell: Cell, number: int) -> bool:
 
 
 def archived(cell: Cell, number: int, outcome: str) -> dict[str, Any]:
-    path = cell.folder / f"archive/0000000xxx/{number}-{outcome}.json"
+    path = cell.folder / f"archive/{number // 1000:07}xxx/{number}-{outcome}.json"
     until(path.exists, what=f"evidence of job {number}")
     return dict(json.loads(path.read_text()))
 

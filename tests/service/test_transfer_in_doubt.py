@@ -90,8 +90,17 @@ def seems_restarted(controller: ScriptedController) -> None:
     controller.link = replace(controller.link, session=10)
 
 
-@pytest.mark.parametrize("seems", [seems_ended, seems_restarted])
-async def test_nothing_is_sent_while_the_job_may_have_ended(seems: Callable[[ScriptedController], None]) -> None:
+def seems_accepted(controller: ScriptedController) -> None:
+    controller.link = replace(controller.link, last_job=JOB, last_result=1)
+
+
+@pytest.mark.parametrize(
+    ("seems", "outcome"),
+    [(seems_ended, Outcome.FAILED), (seems_restarted, Outcome.FAILED), (seems_accepted, Outcome.ACCEPTED)],
+)
+async def test_nothing_is_sent_while_the_job_may_have_ended(
+    seems: Callable[[ScriptedController], None], outcome: Outcome
+) -> None:
     controller = ScriptedController([Answer.NOT_READY])
     async with transferring(controller, PATIENT) as run:
         task = asyncio.ensure_future(run.end())
@@ -104,7 +113,7 @@ async def test_nothing_is_sent_while_the_job_may_have_ended(seems: Callable[[Scr
         assert controller.count("commit") == sent
         assert not task.done()
         controller.beating = True
-        assert (await task).outcome is Outcome.FAILED
+        assert (await task).outcome is outcome
 
 
 async def test_nothing_is_concluded_from_a_block_that_is_misread() -> None:

@@ -103,6 +103,7 @@ async def test_nothing_is_sent_while_the_job_may_have_ended(
 ) -> None:
     controller = ScriptedController([Answer.NOT_READY])
     async with transferring(controller, PATIENT) as run:
+        run.link.publish(job_id=JOB)
         task = asyncio.ensure_future(run.end())
         await until(lambda: controller.count("commit") == 2)
         controller.beating = False

@@ -353,7 +353,7 @@ async def another_comes(run: Run, controller: ScriptedController) -> tuple[async
 
 async def test_a_job_that_was_sent_stays_in_flight_beside_another_service_and_its_acceptance_settles_it() -> None:
     controller = ScriptedController([None])
-    async with transferring(controller) as run:
+    async with transferring(controller, replace(STEPS, ack_timeout_s=5), validity=page_of(30_000)) as run:
         task, written_so_far = await another_comes(run, controller)
         await asyncio.sleep(0.3)
         assert not task.done(), "it may be accepted still"
@@ -400,7 +400,7 @@ async def test_beside_another_service_and_without_a_limit_it_ends_after_job_time
 async def test_a_job_of_which_nothing_was_sent_fails_with_155_at_once() -> None:
     controller = ScriptedController([None])
     controller.link = replace(controller.link, controller_state=2)
-    async with transferring(controller, replace(STEPS, ready_timeout_s=5)) as run:
+    async with transferring(controller, replace(STEPS, ready_timeout_s=5), validity=page_of(30_000)) as run:
         run.link.publish(owner=OURS)
         task = asyncio.ensure_future(run.end())
         await until(lambda: run.link.ownership.ours)

@@ -248,12 +248,12 @@ async def test_a_session_of_0_is_disregarded() -> None:
 
     def blank_for_a_while() -> None:
         controller.link = type(kept)(test_echo=0x01020305, last_job=JOB + 5, last_result=1)
-        asyncio.get_running_loop().call_later(0.05, lambda: setattr(controller, "link", kept))
+        asyncio.get_running_loop().call_later(0.3, lambda: setattr(controller, "link", kept))
 
-    async with transferring(controller) as run:
+    async with transferring(controller, replace(QUICK, ready_timeout_s=5)) as run:
         controller.before_commit = blank_for_a_while
         task = asyncio.ensure_future(run.end())
-        await asyncio.sleep(0.09)
+        await asyncio.sleep(0.2)  # over many heartbeats, so that it would hold
         controller.before_commit = lambda: None
         assert (await task).outcome is Outcome.ACCEPTED
 

@@ -314,13 +314,11 @@ class Journal:
             highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
             adopted = max(found.job_id, found.settled_job, self._number("adopted_job"))
             known = max(highest, adopted, self._number("above")) or self._number("otherwise_from") - 1
-            values = {"adopted_job": adopted, "begin_above": min(known + room, LARGEST_JOB - 1)}
+            self._keep(adopted_job=adopted, begin_above=min(known + room, LARGEST_JOB - 1))
             pair = (found.session_ack, found.trigger_ack)
             later = _is_later(pair, self._last_pair(), session)
             if later:
-                values |= {"adopted_above": highest, "adopted_session": pair[0], "adopted_counter": pair[1]}
-            for key, value in values.items():
-                db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, str(value)))
+                self._keep(adopted_above=highest, adopted_session=pair[0], adopted_counter=pair[1])
             if session:  # one that this journal calls unsent may have been sent in a life that it does not know
                 db.execute(
                     "UPDATE jobs SET session = ?, withdraw_reason = ?"
@@ -348,9 +346,11 @@ class Journal:
             db.execute(f"UPDATE jobs SET owed = 1 WHERE line IS NOT NULL AND {UNSETTLED}")
             if pair[1]:
                 highest = max((row[0] for row in rows), default=0)
-                values = {"adopted_above": highest, "adopted_session": pair[0], "adopted_counter": pair[1]}
-                for key, value in values.items():
-                    db.execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, str(value)))
+                self._keep(adopted_above=highest, adopted_session=pair[0], adopted_counter=pair[1])
+
+    def _keep(self, **numbers: int) -> None:
+        """Numbers of `meta`, as they are from now on; within a transaction."""
+        self._db.executemany("INSERT OR REPLACE INTO meta VALUES (?, ?)", [(key, str(n)) for key, n in numbers.items()])
 
     def _number(self, key: str) -> int:
         """A number of `meta`, 0 where it is not there; within a transaction or the lock."""

@@ -33,6 +33,7 @@ from service.storage_watch import StorageWatch
 from service.supervisor import Supervisor
 from service.systemd import Notifier, Watchdog
 from service.trigger_queue import Ticket, TriggerRefused
+from service.triggers import SerialTrigger
 
 log = logging.getLogger("combtrace.daemon")
 
@@ -71,6 +72,7 @@ class Parts:
     triggers: list[tuple[str, Callable[[], Awaitable[None]]]] = field(default_factory=list)
     ports: list[str] = field(default_factory=list)
     serial_pool: ThreadPoolExecutor | None = None
+    lines: list[SerialTrigger] = field(default_factory=list)
     warm_up_s: float = 0.0
     notifier: Notifier = field(default_factory=Notifier)
     watchdog: Watchdog = field(default_factory=lambda: Watchdog(Notifier({})))
@@ -288,8 +290,11 @@ class Daemon:
         self._parts.executor.refuse_all_queued(TriggerRefused(Reason.ABORTED, "the service is being stopped"))
         loop = asyncio.get_running_loop()
         give_up_at = loop.time() + STOP_BOUND_S
-        while self._parts.health.job is not None and loop.time() < give_up_at:
+        while self._job_is_running_or_told() and loop.time() < give_up_at:
             await asyncio.sleep(WATCH_PERIOD_S / 5)
+
+    def _job_is_running_or_told(self) -> bool:
+        return self._parts.health.job is not None or any(line.telling for line in self._parts.lines)
 
     async def _end(self, keeping: asyncio.Task[None]) -> None:
         parts = self._parts

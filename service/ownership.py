@@ -15,6 +15,7 @@ from drivers.controller import ControllerError, ServiceBlock
 
 WATCH_S = 3.0  # how long a foreign heartbeat must stand still, and then how long our own owner must stand
 WATCH_OWN_S = 1.5  # how long a heartbeat beside our own number must stand still: a former life's does
+SHORT_PAUSE_S = 1.0  # without readings: a service that lives has moved its heartbeat by then
 NOBODY = 0  # in `owner`: registers that nobody has written yet
 OWN_BEATS_KEPT = 16  # of writes without a reply, one of which may land late
 
@@ -54,6 +55,8 @@ class Ownership:
         self._other = NOBODY
         self._beat: int | None = None
         self._since_s: float | None = None
+        self._seen_s = self._now()
+        self._interrupted = False
         self._moved = False
         self._taken_over = False  # from a number that is not ours: our own must stand for a while
         self._doubted = False
@@ -107,10 +110,8 @@ class Ownership:
             raise ForeignOwner(self.fault() or "another service's mark was read once in the service block")
 
     def disconnected(self) -> None:
-        """A pause without readings is no time of watching: begin it anew."""
-        if self._phase is _Phase.CLAIMING:
-            self._phase = _Phase.WATCHING
-        self._beat = self._since_s = None
+        """A pause without readings is no time of watching; a long one has it begin anew, see `saw`."""
+        self._interrupted = True
 
     def controller_restarted(self) -> None:
         """Its registers may show what was there at any time before: the next heartbeat beside our number is ours."""
@@ -131,7 +132,21 @@ class Ownership:
         """Take note of the service block as the controller holds it; True where the block may be written now."""
         if self.conflict:
             return False
+        self._take_pause()
         return self._saw_later(block) if self.begun else self._watch(block)
+
+    def _take_pause(self) -> None:
+        """After lost replies go on watching, without the pause; else a poor line would have it begin anew for ever."""
+        pause_s, self._seen_s = self._now() - self._seen_s, self._now()
+        if not self._interrupted:
+            return
+        self._interrupted = False
+        if pause_s <= SHORT_PAUSE_S:
+            self._since_s = None if self._since_s is None else self._since_s + pause_s
+            return
+        if self._phase is _Phase.CLAIMING:
+            self._phase = _Phase.WATCHING
+        self._beat = self._since_s = None
 
     def _saw_later(self, block: ServiceBlock) -> bool:
         if self._beats is None and block.owner == self.owner:

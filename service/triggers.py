@@ -176,8 +176,14 @@ class SerialTrigger:
         self._beat = beat
         self._replies: set[asyncio.Task[None]] = set()
         self._look = asyncio.Event()
+        self._telling = False
         self._of_before = 0  # the highest number of jobs whose acknowledgement, if any, was somebody else's
         self._acknowledged: set[int] = set()
+
+    @property
+    def telling(self) -> bool:
+        """Whether an end is about to be told; a line that is away has none."""
+        return self._telling or self._look.is_set()
 
     def job_ended(self, job: Job) -> None:
         """Told of each job's end, which may be owed to this line."""
@@ -263,10 +269,13 @@ class SerialTrigger:
         while True:
             await self._look.wait()
             self._look.clear()
+            self._telling = True
             try:
                 await self._tell_owed()
             except TriggerUnavailable as error:
                 log.warning("serial %s: the end of a job could not be told yet: %s", self._name, error)
+            finally:
+                self._telling = False
 
     async def _tell_owed(self) -> None:
         owed = [

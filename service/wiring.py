@@ -513,6 +513,7 @@ def _serial(parts: Parts, trigger: SerialTriggerSettings) -> Callable[[], Awaita
             beat=beat,
         )
         parts.executor.on_settled.append(line.job_ended)
+        parts.lines.append(line)
         return line.run
     stamp = TriggerStamp(trigger.mode)
     return SerialPulses(make_pulses(trigger), trigger.port, stamp, *shared, parts.serial_pool, beat=beat).run

@@ -186,7 +186,8 @@ def test_a_claim_whose_write_was_lost_with_the_connection_is_watched_anew() -> N
         pass
     watched.ownership.writing(1)
     watched.ownership.disconnected()
-    assert watched.see_for(2.9, THEIRS, itertools.repeat(7)) == [False] * 29
+    assert not watched.see(THEIRS, 7, after_s=1.1)
+    assert watched.see_for(2.8, THEIRS, itertools.repeat(7)) == [False] * 28
     assert any(watched.see_for(0.3, THEIRS, itertools.repeat(7)))
 
 
@@ -196,6 +197,39 @@ def test_a_pause_without_a_connection_is_no_time_of_watching() -> None:
     watched.ownership.disconnected()
     assert not watched.see(THEIRS, 7, after_s=60.0)
     assert watched.see_for(2.9, THEIRS, itertools.repeat(7)) == [False] * 29
+
+
+@pytest.mark.parametrize(("owner", "watch_s"), [(THEIRS, 3.0), (OURS, 1.5)])
+def test_a_line_that_loses_replies_is_watched_to_the_end_without_its_pauses(owner: int, watch_s: float) -> None:
+    watched = Watched()
+    seen_s = -0.1
+    while not watched.see(owner, 7):
+        seen_s += 0.1
+        if round(seen_s, 1) in (0.3, 0.8, 1.3, 1.4):
+            watched.ownership.disconnected()
+            assert not watched.see(owner, 7, after_s=0.4)
+    assert seen_s == pytest.approx(watch_s, abs=0.15)
+
+
+def test_a_heartbeat_that_moved_while_replies_were_lost_has_moved() -> None:
+    watched = Watched()
+    watched.see_for(1.0, THEIRS, itertools.repeat(7))
+    watched.ownership.disconnected()
+    assert not watched.see(THEIRS, 8, after_s=0.4)
+    assert watched.ownership.conflict
+
+
+def test_our_claim_stands_over_a_lost_reply() -> None:
+    watched = Watched()
+    while not watched.see(THEIRS, 7):
+        pass
+    watched.write(1)
+    assert all(watched.see_for(1.5, OURS, itertools.repeat(1)))
+    watched.ownership.disconnected()
+    assert watched.see(OURS, 1, after_s=0.5)
+    assert not watched.ownership.ours
+    assert all(watched.see_for(1.8, OURS, itertools.repeat(1)))
+    assert watched.ownership.ours
 
 
 def test_one_reading_alone_is_not_acted_on() -> None:

@@ -61,6 +61,21 @@ class Panel:
         return True
 
 
+class SlowPanel(Panel):
+    """A port that takes an end only once it may be written."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.writing = ""
+        self.may_write = threading.Event()
+
+    def write_line(self, text: str) -> None:
+        self.writing = text
+        if text.startswith("DONE"):
+            assert self.may_write.wait(30)
+        super().write_line(text)
+
+
 class Runner:
     """Ends jobs as soon as it is let to."""
 
@@ -84,6 +99,8 @@ class Runner:
 class Served:
     """A serial line with executor and journal, as one process of the service has them."""
 
+    line: SerialTrigger
+
     def __init__(self, folder: Path, panel: Panel, *, depth: int = 0) -> None:
         self.panel = panel
         self.journal = Journal(folder / "journal.sqlite")
@@ -99,9 +116,9 @@ async def served(folder: Path, panel: Panel, *, depth: int = 0, ready: bool = Tr
     built = Served(folder, panel, depth=depth)
     built.health.start()
     with ThreadPoolExecutor(1) as pool:
-        line = SerialTrigger(panel, LINE, built.executor, built.health, built.journal, lambda: "STAT", pool)
-        built.executor.on_settled.append(line.job_ended)
-        tasks = [asyncio.ensure_future(line.run())]
+        built.line = SerialTrigger(panel, LINE, built.executor, built.health, built.journal, lambda: "STAT", pool)
+        built.executor.on_settled.append(built.line.job_ended)
+        tasks = [asyncio.ensure_future(built.line.run())]
         if ready:
             tasks.append(asyncio.ensure_future(built.executor.run()))
         try:
@@ -228,3 +245,26 @@ async def test_jobs_of_a_damaged_journal_are_owed_to_their_line_still(tmp_path: 
     panel = Panel()
     async with served(tmp_path, panel):
         await heard(panel, "FAIL 1 154 service_restarted")
+
+
+async def test_an_end_that_is_being_told_is_known_to_be(tmp_path: Path) -> None:
+    panel = SlowPanel()
+    async with served(tmp_path, panel) as built:
+        panel.type("TRIG")
+        await until(lambda: panel.writing == "DONE 1 4 5000")
+        assert built.health.job is None
+        assert built.line.telling
+        panel.may_write.set()
+        await until(lambda: not built.line.telling)
+        assert panel.heard == ["ACK 1", "DONE 1 4 5000"]
+
+
+async def test_a_line_that_is_away_is_not_waited_for(tmp_path: Path) -> None:
+    panel = Panel()
+    async with served(tmp_path, panel) as built:
+        built.runner.go.clear()
+        panel.type("TRIG")
+        await heard(panel, "ACK 1")
+        panel.plugged = False
+        built.runner.go.set()
+        await until(lambda: built.journal.owed(LINE) and not built.line.telling)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 
-async def until(condition: Callable[[], Any], bound_s: float = 5.0) -> None:
+async def until(condition: Callable[[], Any], bound_s: float = 30.0) -> None:
     """Return when `condition` is true; fail after `bound_s`."""
     loop = asyncio.get_running_loop()
     give_up_at = loop.time() + bound_s

@@ -81,7 +81,7 @@ class Cell:
     def goes_on(self, count: int) -> None:
         """Wait until `count` more jobs have been accepted."""
         before = len(lines(self.accepted))
-        until(lambda: len(lines(self.accepted)) >= before + count, 30, f"{count} more accepted jobs")
+        until(lambda: len(lines(self.accepted)) >= before + count, 90, f"{count} more accepted jobs")
 
     def stop(self) -> None:
         for process in (self.service, self.controller):

@@ -39,18 +39,17 @@ class Process:
 
     def __init__(self, log: Path, *arguments: str | Path) -> None:
         self.log = log
-        self._file = log.open("ab")
-        self._process = subprocess.Popen(
-            [*COMBTRACE, *map(str, arguments)], stdout=self._file, stderr=subprocess.STDOUT, env=ENVIRONMENT
-        )
+        with log.open("ab") as file:
+            self._process = subprocess.Popen(
+                [*COMBTRACE, *map(str, arguments)], stdout=file, stderr=subprocess.STDOUT, env=ENVIRONMENT
+            )
 
     def kill(self) -> None:
         """kill -9."""
         self._process.kill()
         self._process.wait()
-        self._file.close()
 
-    def stop(self, bound_s: float = 20) -> int:
+    def stop(self, bound_s: float = 60) -> int:
         """SIGTERM, and its exit status."""
         self.send(signal.SIGTERM)
         return self.ended(bound_s)
@@ -59,7 +58,7 @@ class Process:
         """A signal."""
         self._process.send_signal(number)
 
-    def ended(self, bound_s: float = 20) -> int:
+    def ended(self, bound_s: float = 60) -> int:
         """Its exit status, once it has ended by itself."""
         try:
             return self._process.wait(bound_s)
@@ -67,7 +66,6 @@ class Process:
             if self._process.poll() is None:
                 self._process.kill()
                 self._process.wait()
-            self._file.close()
 
     def reload(self) -> None:
         """SIGHUP."""
@@ -86,7 +84,7 @@ class Process:
         return self.log.read_text(errors="replace")
 
 
-def until(condition: Callable[[], Any], bound_s: float = 20, what: str = "it") -> Any:
+def until(condition: Callable[[], Any], bound_s: float = 60, what: str = "it") -> Any:
     """What `condition` gives once it is true."""
     give_up_at = time.monotonic() + bound_s
     while not (result := condition()):

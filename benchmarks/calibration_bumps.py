@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from contour.board import mark_boxes
-from contour.sentinels import Sentinels, check_sentinels, see_sentinels
+from contour.calibration.fixed_marks import Sentinels, check_sentinels, see_sentinels
+from contour.camera_calibration.board import mark_boxes
 from contour.synthetic import CameraModel, camera_above
 from contour.synthetic.board_view import render_flat
 

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.board import Board
-from contour.board_detection import find_board
-from contour.calibrate import CameraResult, Setup, calibrate_camera
-from contour.geometry import Contour
-from contour.outline_match import compare
-from contour.polygon import cutting_polygon
+from contour.camera_calibration.board import Board
+from contour.camera_calibration.board_detection import find_board
+from contour.camera_calibration.calibrate import CameraResult, Setup, calibrate_camera
+from contour.geometry.comparison import compare
+from contour.geometry.rings import Contour
+from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import CameraModel, CellGeometry, Scene, Sensor, camera_above, l_shape, rectangle, render
 from contour.synthetic.board_poses import board_poses
 from contour.synthetic.board_view import board_camera, render_board
-from contour.tracing import TraceSettings, trace
+from contour.tracing.tracing import TraceSettings, trace
 
 SIZE = (1600, 1200)
 BOARDS = {

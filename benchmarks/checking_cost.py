@@ -12,11 +12,12 @@ from unittest.mock import patch
 
 from benchmarks.scenes import measured_scenes
 from benchmarks.trials import calibration_for
-from contour import tracing, wall_tips, wall_witnesses
 from contour.synthetic import render
-from service import measure
-from service.config import Recipe
-from service.measure import Measurer
+from contour.tracing import tracing, wall_tips
+from contour.walls import see_block as wall_witnesses
+from service.config.config import Recipe
+from service.measuring import measure
+from service.measuring.measure import Measurer
 
 ALLOWED = 0.15
 SCENE = "12mp"

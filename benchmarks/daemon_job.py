@@ -19,11 +19,11 @@ import cv2
 import numpy as np
 
 from service import wiring
-from service.archive import document_of
-from service.config_file import load_config
-from service.daemon import Daemon, Parts
-from service.journal import Job, TriggerStamp
+from service.config.config_file import load_config
+from service.daemon.daemon import Daemon, Parts
 from service.reasons import Outcome
+from service.records.archive import document_of
+from service.records.journal import Job, TriggerStamp
 from service.state import State
 from tests.system.cell import SAMPLES
 from tests.system.processes import Process, free_port

@@ -18,15 +18,15 @@ from benchmarks.page_section import put_section
 from benchmarks.random_scenes import random_scene
 from benchmarks.report import table
 from benchmarks.trials import calibration_for
-from contour.acceptance import Limits, Refusal, judge
-from contour.disagreement import disagreement
+from contour.acceptance.acceptance import Limits, Refusal, judge
+from contour.acceptance.disagreement import disagreement
 from contour.errors import ContourError
-from contour.geometry import Contour, Ring, densified, oriented_contour, signed_area
-from contour.offset import offset_contour
-from contour.polygon import cutting_polygon
+from contour.geometry.offset import offset_contour
+from contour.geometry.rings import Contour, Ring, densified, oriented_contour, signed_area
+from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import render
-from contour.tracing import TraceSettings, trace
-from service.config import Recipe
+from contour.tracing.tracing import TraceSettings, trace
+from service.config.config import Recipe
 
 SCENES = (996_500, 100)
 _LONG_PITCHES = 4.0

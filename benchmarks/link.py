@@ -27,8 +27,7 @@ import numpy as np
 from benchmarks.link_recovery import recoveries
 from benchmarks.rest import medians_percent
 from benchmarks.tcp_clients import CLIENTS, TURNS, Taken, Write, compare, send
-from drivers.controller.chunks import page_starts, spans
-from drivers.controller.mailbox import (
+from drivers.controller.mailbox.mailbox import (
     ContourMessage,
     MailboxLayout,
     Page,
@@ -36,9 +35,10 @@ from drivers.controller.mailbox import (
     encode_pages,
     micrometres,
 )
-from drivers.controller.modbus import ModbusRtuController, SerialLine
-from drivers.controller.requests import LONGEST_WRITE
-from service.link import Link, LinkSettings
+from drivers.controller.mailbox.page_spans import page_starts, spans
+from drivers.controller.modbus.client import ModbusRtuController, SerialLine
+from drivers.controller.modbus.requests import LONGEST_WRITE
+from service.link.link import Link, LinkSettings
 from tests.interop.programs import libmodbus_rtu
 from tests.system.cell import Cell
 

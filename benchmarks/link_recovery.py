@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-from drivers.controller.modbus import ModbusController, ModbusRtuOverTcpController, ModbusTcpController
-from service.link import Link, LinkSettings
+from drivers.controller.modbus.client import ModbusController, ModbusRtuOverTcpController, ModbusTcpController
+from service.link.link import Link, LinkSettings
 from tests.system.processes import COMBTRACE, free_port
 
 REPEATS = 20

@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from contour.board import Board
+from contour.camera_calibration.board import Board
 from contour.synthetic import Sensor, camera_above
 from contour.synthetic.board_poses import board_poses
 from contour.synthetic.board_view import board_camera, render_board

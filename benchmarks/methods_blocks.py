@@ -5,9 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 from benchmarks.metrics import agreement
-from contour.binarize import WallMask, binarize
-from contour.cells import Cells
-from contour.geometry import Contour, area
+from contour.geometry.rings import Contour, area
 from contour.synthetic import (
     CellGeometry,
     Clutter,
@@ -25,7 +23,9 @@ from contour.synthetic import (
     u_shape,
     with_holes,
 )
-from contour.tracing import TraceSettings, trace
+from contour.tracing.binarize import WallMask, binarize
+from contour.tracing.paper_cells import Cells
+from contour.tracing.tracing import TraceSettings, trace
 
 WIDTH, HEIGHT, MM_PER_PX = 500, 430, 0.6
 MIDDLE = (WIDTH * MM_PER_PX / 2, HEIGHT * MM_PER_PX / 2 - 11.0)

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.methods_blocks import CORE_AND_STEP, HEIGHT, WIDTH, block, cells, traced, walls
-from contour._cv import enclosed_area
-from contour.direct_scan import default_gap_px, default_width_px, scan_pairs
-from contour.geometry import Contour
-from contour.overlay import draw_overlay
-from contour.sliding_matrix import default_core_px, default_threshold, fill_windows
-from contour.tracing import TraceSettings
+from contour.geometry.rings import Contour
+from contour.image.opencv import enclosed_area
+from contour.image.overlay import draw_overlay
+from contour.tracing.direct_scan import default_gap_px, default_width_px, scan_pairs
+from contour.tracing.sliding_matrix import default_core_px, default_threshold, fill_windows
+from contour.tracing.tracing import TraceSettings
 
 Picture = NDArray[np.uint8]
 Colour = tuple[int, int, int]

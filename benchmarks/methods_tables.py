@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from benchmarks.methods_blocks import CORE_AND_STEP, cells, traced, walls
 from benchmarks.report import table
-from contour._cv import outer_contours
-from contour.direct_scan import default_gap_px, default_width_px, scan_pairs
-from contour.sliding_matrix import default_core_px, default_threshold, fill_windows
-from contour.tracing import TraceSettings
+from contour.image.opencv import outer_contours
+from contour.tracing.direct_scan import default_gap_px, default_width_px, scan_pairs
+from contour.tracing.sliding_matrix import default_core_px, default_threshold, fill_windows
+from contour.tracing.tracing import TraceSettings
 
 CLUTTER = ((0, 0), (20, 4), (80, 12))
 

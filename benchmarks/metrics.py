@@ -13,9 +13,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from contour.geometry import Contour, Ring
+from contour.geometry.rings import Contour, Ring
 from contour.synthetic import densified
-from contour.tracing import Rectifier
+from contour.tracing.tracing import Rectifier
 
 SPACING_PX = 0.5
 

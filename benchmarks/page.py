@@ -29,7 +29,7 @@ from playwright.sync_api import Response, sync_playwright
 
 from benchmarks.daemon import Figure
 from benchmarks.rest import processor_s
-from service.journal_reader import JobFilter, reading
+from service.records.journal_reader import JobFilter, reading
 from tests.real_parts import need_program
 from tests.system.cell import Cell
 from tests.system.page_client import Client

@@ -19,8 +19,8 @@ from benchmarks.metrics import Agreement, agreement
 from benchmarks.rivals import RIVALS, Hints, RivalFailed
 from benchmarks.trials import OWN_METHODS, Stopwatch
 from contour.errors import ContourError
-from contour.geometry import Contour
-from contour.tracing import TraceSettings, trace
+from contour.geometry.rings import Contour
+from contour.tracing.tracing import TraceSettings, trace
 
 ROOT = Path(__file__).resolve().parent.parent
 EDGE: dict[str, Literal["cut", "cells"]] = {

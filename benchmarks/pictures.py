@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import BenchScene
 from benchmarks.trials import Trial
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from contour.synthetic import Rendered
 
 Picture = NDArray[np.uint8]

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.scenes import DIM_BELOW, BenchScene, contrast_to_noise
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from contour.synthetic import (
     CellGeometry,
     Clutter,

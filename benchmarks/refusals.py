@@ -23,8 +23,8 @@ from benchmarks.scenes import BenchScene, measured_scenes, tuned_scenes
 from benchmarks.table_scenes import table_scenes
 from benchmarks.trials import calibration_for
 from contour.synthetic import render
-from service.config import Recipe
-from service.measure import Measurement, Measurer
+from service.config.config import Recipe
+from service.measuring.measure import Measurement, Measurer
 
 TITLE = "What is refused, and by what name"
 # Another block lies beside these: they are what `pieces: largest` is for.

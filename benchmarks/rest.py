@@ -18,8 +18,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
 
-from drivers.controller.modbus import ModbusTcpController
-from service.link import Link, LinkSettings
+from drivers.controller.modbus.client import ModbusTcpController
+from service.link.link import Link, LinkSettings
 
 ROOT = Path(__file__).parents[1]
 SETTLES_S = 2.0  # after a start, before the rest is measured

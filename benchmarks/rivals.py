@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from contour.geometry import Contour, Ring
+from contour.geometry.rings import Contour, Ring
 
 Picture = NDArray[np.uint8]
 HULL_POINTS = 20_000

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from contour.synthetic import (
     CellGeometry,
     Clutter,

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import BenchScene
 from benchmarks.trials import run_trial
-from contour.binarize import binarize
-from contour.direct_scan import scan_rows
-from contour.find_contours import largest_contour
-from contour.sliding_matrix import fill_windows
 from contour.synthetic import Rendered
+from contour.tracing.binarize import binarize
+from contour.tracing.direct_scan import scan_rows
+from contour.tracing.find_contours import largest_contour
+from contour.tracing.sliding_matrix import fill_windows
 
 ROUNDS = 7
 

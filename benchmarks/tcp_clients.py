@@ -17,8 +17,8 @@ from statistics import median
 
 from pymodbus.client import AsyncModbusTcpClient
 
-from drivers.controller.mailbox import MailboxLayout, Page
-from drivers.controller.modbus import ModbusController, ModbusTcpController
+from drivers.controller.mailbox.mailbox import MailboxLayout, Page
+from drivers.controller.modbus.client import ModbusController, ModbusTcpController
 from tests.interop.programs import compiled, libmodbus_tcp
 
 TURNS, ROUNDS = 15, 20  # the clients take turns, so that a busy moment meets all of them

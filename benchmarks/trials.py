@@ -12,12 +12,12 @@ import numpy as np
 from benchmarks.metrics import Agreement, agreement
 from benchmarks.rivals import RIVALS, Hints, RivalFailed
 from benchmarks.scenes import BenchScene
-from contour.calibration import CameraCalibration
+from contour.calibration.calibration import CameraCalibration
 from contour.errors import ContourError, ParameterError
-from contour.geometry import Contour
-from contour.polygon import cutting_polygon
+from contour.geometry.rings import Contour
+from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import CameraModel, Rendered
-from contour.tracing import Method, TraceSettings, trace
+from contour.tracing.tracing import Method, TraceSettings, trace
 
 TOLERANCE_MM = 0.1
 OWN_METHODS: tuple[Method, ...] = get_args(Method)

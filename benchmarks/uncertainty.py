@@ -1,7 +1,7 @@
 """Stated against true error: `python -m benchmarks.uncertainty` (`--help` for options).
 
 Measures on fresh random scenes and on the scenes for measuring; with `--write` plot and numbers go to docs/accuracy.md.
-`--calibrate` fits the coefficients of `contour/uncertainty.py` on other seeds and prints them, to be put in there.
+`--calibrate` fits the coefficients of `contour/outline/uncertainty.py` on other seeds and prints them.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from benchmarks.scenes import BenchScene, measured_scenes
 from benchmarks.trials import calibration_for
 from benchmarks.uncertainty_plot import PLOT, write_plot
 from contour.errors import ContourError
-from contour.outline_fit import FittedRing, fit_ring
+from contour.outline.fit import FittedRing, fit_ring
+from contour.outline.uncertainty import LEAST_PX, Coefficients, Stretches, bound, ring_stretches
 from contour.synthetic import Rendered, render
-from contour.tracing import TraceSettings, trace
-from contour.uncertainty import LEAST_PX, Coefficients, Stretches, bound, ring_stretches
-from contour.wall_evidence import BlockEvidence
-from contour.wall_witnesses import see_block
+from contour.tracing.tracing import TraceSettings, trace
+from contour.walls.see_block import see_block
+from contour.walls.wall_evidence import BlockEvidence
 
 CALIBRATED_ON = (985000, 300)
 MEASURED_ON = (999000, 150)

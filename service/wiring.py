@@ -14,21 +14,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.calibration import Calibration
+from contour.calibration.calibration import Calibration
 from drivers.camera import Camera
 from drivers.camera.averaging import AveragingCamera
-from drivers.camera.files import FileCamera
+from drivers.camera.files.camera import FileCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
-from drivers.controller import Controller, modbus
-from drivers.controller.mailbox import MailboxLayout
+from drivers.controller import Controller
+from drivers.controller.mailbox.mailbox import MailboxLayout
+from drivers.controller.modbus import client as modbus
 from drivers.trigger import LineTrigger, PulseTrigger
 from drivers.trigger.pulses import SerialBytes, SerialSignal
 from drivers.trigger.serial import SerialLineTrigger
-from service.archive import Archive, ArchiveLimits
-from service.archive_writer import ArchiveWriter
-from service.calibration_file import CalibrationChanged, CalibrationFileError, load_record
-from service.calibration_guard import CalibrationGuard, GuardLimits
-from service.config import (
+from service.config.config import (
     Config,
     ControllerTrigger,
     FilesCamera,
@@ -38,29 +35,33 @@ from service.config import (
     ModbusTcp,
     NoController,
 )
-from service.config import Metrics as MetricsSettings
-from service.config import Page as PageSettings
-from service.config import SerialTrigger as SerialTriggerSettings
-from service.cycle import Cycle, CycleSettings, MailboxFormat, Observation, Plan
-from service.daemon import Parts
-from service.executor import Executor
-from service.health import Fault, Health, journal_fault
-from service.journal import Journal, JournalError, TriggerStamp
-from service.link import Link, LinkSettings
-from service.lock import LockError, network_names, serial_name
-from service.measure import Measurer
-from service.opening import DiskRefuses, Opening, stand_in
+from service.config.config import Metrics as MetricsSettings
+from service.config.config import Page as PageSettings
+from service.config.config import SerialTrigger as SerialTriggerSettings
+from service.daemon.daemon import Parts
+from service.daemon.lock import LockError, network_names, serial_name
+from service.daemon.opening import DiskRefuses, Opening, stand_in
+from service.daemon.reload import BadPlan, Reloader
+from service.daemon.storage_watch import StorageLimits, StorageWatch
+from service.daemon.systemd import Notifier, Watchdog
+from service.export.recipe_exports import trial
+from service.jobs.cycle import Cycle, CycleSettings, MailboxFormat, Observation, Plan
+from service.jobs.executor import Executor
+from service.jobs.health import Fault, Health, journal_fault
+from service.jobs.status import status_line
+from service.jobs.trigger_queue import TriggerQueue
+from service.jobs.triggers import SerialPulses, SerialTrigger, interval_trigger
+from service.link.link import Link, LinkSettings
+from service.link.transfer import TransferCounter, TransferSettings
+from service.measuring.calibration_file import CalibrationChanged, CalibrationFileError, load_record
+from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
+from service.measuring.measure import Measurer
+from service.measuring.table_file import TableFileError, TableRecord, load_table
 from service.reasons import Reason
-from service.recipe_exports import trial
-from service.reload import BadPlan, Reloader
+from service.records.archive import Archive, ArchiveLimits
+from service.records.archive_writer import ArchiveWriter
+from service.records.journal import Journal, JournalError, TriggerStamp
 from service.state import State, StateMachine
-from service.status import status_line
-from service.storage_watch import StorageLimits, StorageWatch
-from service.systemd import Notifier, Watchdog
-from service.table_file import TableFileError, TableRecord, load_table
-from service.transfer import TransferCounter, TransferSettings
-from service.trigger_queue import TriggerQueue
-from service.triggers import SerialPulses, SerialTrigger, interval_trigger
 
 log = logging.getLogger("combtrace.daemon")
 
@@ -194,7 +195,7 @@ def sound_plan(config: Config) -> Plan:
 
 def _add_metrics(settings: MetricsSettings, parts: Parts, cycle: Cycle) -> None:
     try:
-        from service.metrics import MetricsError, Sources, serve
+        from service.daemon.metrics import MetricsError, Sources, serve
     except ImportError as error:
         parts.journal.close()
         parts.lock.release()
@@ -222,8 +223,8 @@ def _add_metrics(settings: MetricsSettings, parts: Parts, cycle: Cycle) -> None:
 def _add_page(config: Config, settings: PageSettings, parts: Parts, cycle: Cycle) -> None:
     """Serve the operator's page, which only then has to be installed."""
     try:
+        from service.web.daemon_access import Sources
         from service.web.server import PageError, make_page
-        from service.web.window import Sources
     except ModuleNotFoundError as error:
         parts.journal.close()
         parts.lock.release()

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.board import Board
+from contour.camera_calibration.board import Board
 from contour.synthetic.board_view import board_camera
 from contour.synthetic.camera import CameraModel
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.board import Board
+from contour.camera_calibration.board import Board
 from contour.synthetic.camera import CameraModel
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.scene import Sensor

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import ParameterError
-from contour.geometry import Contour, Ring
+from contour.geometry.rings import Contour, Ring
 from contour.synthetic.camera import densified
 from contour.synthetic.cells import CellGeometry, draw_lattice, lattice_centres, lattice_coordinates
 from contour.synthetic.outlines import signed_distance

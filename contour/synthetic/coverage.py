@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry import Ring
+from contour.geometry.rings import Ring
 
 
 def area_coverage(rings: Sequence[Ring], width: int, height: int) -> NDArray[np.float32]:

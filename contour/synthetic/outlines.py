@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import ParameterError
-from contour.geometry import Contour, Ring
+from contour.geometry.rings import Contour, Ring
 
 Point = tuple[float, float]
 

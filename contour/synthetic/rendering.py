@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from contour.synthetic.camera import CameraModel
 from contour.synthetic.depth import Relief, relief
 from contour.synthetic.scene import Scene

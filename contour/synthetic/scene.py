@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from contour.errors import ParameterError
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from contour.synthetic.camera import CameraModel
 from contour.synthetic.cells import CellGeometry
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from contour.synthetic.cells import Lattice, draw_lattice, lattice_centres, lattice_coordinates, wall_field
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import signed_distance

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import moved, signed_distance
 from contour.synthetic.scene import Scene

@@ -13,7 +13,7 @@ from drivers.controller.errors import (
     ControllerUnavailable,
     MailboxError,
 )
-from drivers.controller.mailbox import LinkBlock, Page, ServiceBlock
+from drivers.controller.mailbox.mailbox import LinkBlock, Page, ServiceBlock
 
 __all__ = [
     "ContourTooLarge",

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from service.atomic_file import file_mode, sync_folder
 from service.cli.errors import UserError
-from service.whole_file import file_mode, sync_folder
 
 
 @contextmanager

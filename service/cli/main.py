@@ -12,14 +12,15 @@ from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_UNUSABLE, UserError
 from service.cli.examples import examples_of
 
-COMMANDS = (
-    *("run", "trace", "demo", "check", "trigger", "simulate-controller", "simulate-service"),
-    *("cameras", "grab", "focus"),
-    *("board", "calibrate", "align", "verify", "repeat", "teach-table"),
-    *("probe", "jobs", "replay"),
-    *("status", "halt", "resume", "confirm", "reset", "install-service"),
-    *("completion", "schema", "reasons", "register-map"),
-)
+ROOMS = {
+    "daemon": ("run", "demo", "check", "trigger", "status", "halt", "resume", "confirm", "reset", "install-service"),
+    "pictures": ("cameras", "grab", "focus", "trace", "teach-table"),
+    "calibration": ("board", "calibrate", "align", "verify", "repeat"),
+    "controller": ("probe", "register-map", "simulate-controller", "simulate-service"),
+    "records": ("jobs", "replay"),
+    "": ("completion", "schema", "reasons"),
+}
+COMMANDS = tuple(name for names in ROOMS.values() for name in names)
 
 DESCRIPTION = """\
 NAME
@@ -87,7 +88,8 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _module(name: str):  # type: ignore[no-untyped-def]  # a command module: HELP, DESCRIPTION, add_arguments, run
-    return importlib.import_module(f"service.cli.{name.replace('-', '_')}")
+    room = next(room for room, names in ROOMS.items() if name in names)
+    return importlib.import_module(".".join(filter(None, ("service.cli", room, name.replace("-", "_")))))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -97,7 +99,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = build_parser()
     args = parser.parse_args(argv)
     if args.version:
-        from service.cli.run import version
+        from service.cli.daemon.run import version
 
         print(version())
         return 0

@@ -18,8 +18,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the schema."""
-    from service.config_file import config_schema
-    from service.scenario_file import scenario_schema
+    from service.commissioning.scenario_file import scenario_schema
+    from service.config.config_file import config_schema
 
     print(json.dumps(scenario_schema() if args.scenario else config_schema(), indent=2))
     return EXIT_OK

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from contour.geometry import Contour, oriented_contour
+from contour.geometry.rings import Contour, oriented_contour
 
 EXTERIOR, HOLES = "EXTERIOR", "HOLES"
 """Names of the layers that exterior and holes are on."""

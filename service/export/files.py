@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from service.atomic_file import write_whole
 from service.export.document import ExportDocument, ExportError
 from service.export.dxf import to_dxf
 from service.export.gcode import GcodeSettings, to_gcode
 from service.export.geojson import to_geojson
 from service.export.svg import to_svg
-from service.whole_file import write_whole
 
 
 def exported(form: str, document: ExportDocument, gcode: Callable[[], GcodeSettings]) -> bytes:

@@ -10,8 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from contour.geometry import Contour, Ring, oriented
-from contour.segments import contains, distances_to_ring
+from contour.geometry.rings import Contour, Ring, oriented
+from contour.geometry.segments import contains, distances_to_ring
 from service.export.document import ExportDocument, ExportError
 
 TEMPLATE = """\

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from contour.geometry import Ring
+from contour.geometry.rings import Ring
 from service.export.document import ExportDocument
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xml.sax.saxutils import escape
 
-from contour.geometry import Ring, bounding_box
+from contour.geometry.rings import Ring, bounding_box
 from service.export.document import EXTERIOR, HOLES, ExportDocument
 
 MARGIN_MM = 5.0

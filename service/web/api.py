@@ -16,20 +16,20 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
-from service.archived_job import EvidenceError, load_archived
-from service.evidence import FRAME, Evidence, job_fields
-from service.journal import Job
-from service.journal_reader import JobFilter, JournalUnreadable, reading
 from service.reasons import Language, Reason
-from service.web import answers
+from service.records.archived_job import EvidenceError, load_archived
+from service.records.evidence import FRAME, Evidence, job_fields
+from service.records.journal import Job
+from service.records.journal_reader import JobFilter, JournalUnreadable, reading
+from service.web import models as answers
+from service.web.commands import Orders, Refusal
+from service.web.daemon_access import DaemonSilent, Window
 from service.web.drawing import drawing
 from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept, tag_of
 from service.web.guard import BodyTooLarge, plain_address
 from service.web.live import MOST_VIEWERS, PERIOD_S, EventStream, Live
 from service.web.openapi import PREFIX, document
 from service.web.operations_table import MOST_JOBS, MOST_NOTES, OPERATIONS
-from service.web.orders import Orders, Refusal
-from service.web.window import DaemonSilent, Window
 
 M = TypeVar("M", bound=BaseModel)
 Endpoint = Callable[[Request], Awaitable[Response]]

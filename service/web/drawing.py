@@ -14,12 +14,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.calibration import Calibration
+from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
-from contour.geometry import Contour, area
-from service.archived_job import ArchivedJob, EvidenceError
-from service.calibration_file import CalibrationFileError, CalibrationRecord, record_of
-from service.web.answers import Axis, Drawing, Grid, SentinelMark
+from contour.geometry.rings import Contour, area
+from service.measuring.calibration_file import CalibrationFileError, CalibrationRecord, record_of
+from service.records.archived_job import ArchivedJob, EvidenceError
+from service.web.models import Axis, Drawing, Grid, SentinelMark
 
 Floats = NDArray[np.float64]
 

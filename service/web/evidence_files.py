@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from service.archive import folder_of
-from service.evidence import FRAME, OVERLAY
 from service.export.forms import ENDINGS
-from service.journal import Job
+from service.records.archive import folder_of
+from service.records.evidence import FRAME, OVERLAY
+from service.records.journal import Job
 
 DOCUMENT = "document.json"
 FILES = {

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.web.answers import Problem
+from service.web.models import Problem
 
 LARGEST_BODY = 4096
 READING = ("GET", "HEAD")

@@ -17,7 +17,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from service.reasons import Language, Reason
-from service.web.window import DaemonSilent, Window
+from service.web.daemon_access import DaemonSilent, Window
 
 TYPES = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml", "json": "application/json"}
 PAGE = "page.html"

@@ -10,8 +10,8 @@ from collections.abc import Awaitable, Callable
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from service.web.answers import ServiceState
-from service.web.window import DaemonSilent, Window
+from service.web.daemon_access import DaemonSilent, Window
+from service.web.models import ServiceState
 
 log = logging.getLogger("combtrace.page")
 

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import models_json_schema
 
-from service.web.answers import Problem
+from service.web.models import Problem
 
 REFERENCES = "#/components/schemas/{model}"
 PREFIX = "/api/v1"

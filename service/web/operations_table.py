@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.web import answers
+from service.web import models as answers
 from service.web.evidence_files import FILES, WIDTHS_PX
 from service.web.openapi import Operation, Parameter
 

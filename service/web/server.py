@@ -17,15 +17,15 @@ from starlette.requests import Request
 from starlette.responses import Response
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from service.config import Page as PageSettings
-from service.listening_socket import bound
-from service.operations import Operations
+from service.config.config import Page as PageSettings
+from service.daemon.listening_socket import bound
+from service.daemon.operations import Operations
 from service.web.api import Api, problem
+from service.web.commands import Orders
+from service.web.daemon_access import Sources, Window
 from service.web.guard import Guard
 from service.web.html import Pages
-from service.web.orders import Orders
 from service.web.tokens import TokenFile, TokenFileError
-from service.web.window import Sources, Window
 
 log = logging.getLogger("combtrace.page")
 

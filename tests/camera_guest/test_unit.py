@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from service.install_files import packaged
+from service.commissioning.install_files import packaged
 from tests.real_parts import need_program
 
 ROOT = Path(__file__).parents[2]

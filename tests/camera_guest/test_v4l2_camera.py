@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.tracing import TraceSettings, trace
+from contour.tracing.tracing import TraceSettings, trace
 from drivers.camera import CameraTimeout, CameraUnavailable
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.camera.v4l2.listing import list_cameras

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from contour.board import Board
-from contour.board_detection import BoardView
+from contour.camera_calibration.board import Board
+from contour.camera_calibration.board_detection import BoardView
 from contour.synthetic import CameraModel, camera_above
 from contour.synthetic.board_poses import BoardPose, board_poses
 from contour.synthetic.board_view import board_camera, render_board

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.wall_evidence import RingEvidence, WitnessKind
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 PITCH = 25.0
 

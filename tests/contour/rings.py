@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from contour.geometry import Ring, densified, largest_loop
+from contour.geometry.rings import Ring, densified, largest_loop
 
 SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
 """Counter-clockwise for y up, area 100."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from contour.board import mark_boxes
+from contour.camera_calibration.board import mark_boxes
 from contour.synthetic import CameraModel, camera_above
 from contour.synthetic.board_view import render_flat
 

@@ -4,15 +4,15 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.acceptance import Finding, Limits, Refusal, judge, judge_without_block
-from contour.comb_likeness import Comb
-from contour.error_budget import ErrorBudget
-from contour.geometry import Contour
-from contour.pieces import Piece
-from contour.polygon import Polygon
-from contour.quality import Quality
-from contour.region import Region
-from contour.tracing import Trace
+from contour.acceptance.acceptance import Finding, Limits, Refusal, judge, judge_without_block
+from contour.acceptance.error_budget import ErrorBudget
+from contour.acceptance.quality import Quality
+from contour.geometry.rings import Contour
+from contour.image.region import Region
+from contour.polygon.polygon import Polygon
+from contour.tracing.tracing import Trace
+from contour.walls.comb_likeness import Comb
+from contour.walls.pieces import Piece
 from tests.contour.rings import SQUARE
 
 FRAME = (640, 480)

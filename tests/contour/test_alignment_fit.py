@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contour.alignment_fit import AlignmentFit, AlignmentLimits, explained, fit_alignment
-from contour.calibration import Alignment
+from contour.calibration.calibration import Alignment
+from contour.camera_calibration.alignment_fit import AlignmentFit, AlignmentLimits, explained, fit_alignment
 
 MACHINE = Alignment(30.0, (1000.0, -50.0))
 PLACES = np.array([[0.0, 0.0], [400.0, 0.0], [400.0, 300.0], [0.0, 300.0], [200.0, 150.0]])

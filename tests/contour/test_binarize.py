@@ -2,9 +2,9 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.binarize import binarize
-from contour.cells import HEXAGON, measure_cells
 from contour.errors import ParameterError
+from contour.tracing.binarize import binarize
+from contour.tracing.paper_cells import HEXAGON, measure_cells
 from tests.contour.scenes import block
 
 
@@ -169,7 +169,7 @@ def test_a_level_off_the_grey_scale_is_refused(level: int) -> None:
 def test_a_picture_taken_for_large_gives_the_same_pitch(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = block("l", kind)
     plain = binarize(scene.picture)
-    monkeypatch.setattr("contour.binarize._EASY_PX", 60_000)
+    monkeypatch.setattr("contour.tracing.binarize._EASY_PX", 60_000)
     hasty = binarize(scene.picture)
     assert plain.cells is not None
     assert hasty.cells is not None
@@ -179,7 +179,7 @@ def test_a_picture_taken_for_large_gives_the_same_pitch(kind: str, monkeypatch: 
 
 
 def test_cells_too_fine_for_the_first_look_are_found_in_the_second(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("contour.binarize._EASY_PX", 12_000)
+    monkeypatch.setattr("contour.tracing.binarize._EASY_PX", 12_000)
     picture = (honeycomb(7, 1.5) // 255 * 120 + 60).astype(np.uint8)
     cells = binarize(picture).cells
     assert cells is not None

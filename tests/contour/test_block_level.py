@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contour.block_level import told_by_level
+from contour.acceptance.block_level import told_by_level
 
 SIDE = 60
 

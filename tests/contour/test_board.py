@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.board import Board
+from contour.camera_calibration.board import Board
 from contour.errors import ParameterError
 from contour.synthetic import Sensor, camera_above
 from contour.synthetic.board_view import render_board

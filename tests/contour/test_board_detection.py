@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.board import Board
-from contour.board_detection import find_board
+from contour.camera_calibration.board import Board
+from contour.camera_calibration.board_detection import find_board
 from contour.errors import BoardNotSeen
 from contour.synthetic import camera_above
 from contour.synthetic.board_poses import BoardPose

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contour.board import Board
-from contour.board_detection import BoardView
-from contour.calibrate import CameraResult, Setup, calibrate_camera
-from contour.calibration_verdict import Judgement
+from contour.camera_calibration.board import Board
+from contour.camera_calibration.board_detection import BoardView
+from contour.camera_calibration.calibrate import CameraResult, Setup, calibrate_camera
+from contour.camera_calibration.calibration_verdict import Judgement
+from contour.camera_calibration.length_check import KnownLength
 from contour.errors import CalibrationFailed
-from contour.length_check import KnownLength
 from contour.synthetic import camera_above
 from contour.synthetic.board_poses import BoardPose
 from tests.contour.board_scenes import CAMERA, CHARUCO, LENS, moved, noisy_view, noisy_views

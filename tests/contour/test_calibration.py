@@ -6,9 +6,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from contour.calibration import Alignment, CameraCalibration, SimpleCalibration, scales
+from contour.calibration.calibration import Alignment, CameraCalibration, SimpleCalibration, scales
 from contour.errors import CalibrationError
-from contour.geometry import signed_area
+from contour.geometry.rings import signed_area
 
 LOOKING_DOWN = np.array([np.pi, 0.0, 0.0])
 """Camera x along work x, camera y against work y, camera z down."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contour.cell_order import lattice_order, solidity
+from contour.walls.lattice_order import lattice_order, solidity
 
 
 def honeycomb(pitch: float, count: int) -> NDArray[np.float64]:

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contour.acceptance import Limits, Refusal, judge
-from contour.comb_likeness import Comb, surely_comb, unlike_comb
+from contour.acceptance.acceptance import Limits, Refusal, judge
 from contour.errors import NoBlockFound
-from contour.polygon import cutting_polygon
-from contour.tracing import TraceSettings, trace
+from contour.polygon.polygon import cutting_polygon
+from contour.tracing.tracing import TraceSettings, trace
+from contour.walls.comb_likeness import Comb, surely_comb, unlike_comb
 from tests.contour.scenes import block
 
 

@@ -8,10 +8,10 @@ import pytest
 from benchmarks.metrics import agreement
 from benchmarks.random_scenes import random_scene
 from benchmarks.trials import calibration_for
-from contour.coarse_block import coarse_block
-from contour.dark_material import dark_beyond, dark_edge, midway_to_table
 from contour.synthetic import render
-from contour.tracing import TraceSettings, trace
+from contour.tracing.tracing import TraceSettings, trace
+from contour.walls.coarse_block import coarse_block
+from contour.walls.dark_material import dark_beyond, dark_edge, midway_to_table
 
 
 def hausdorff_pitches(seed: int) -> float:

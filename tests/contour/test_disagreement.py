@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import shapely
 
-from contour.disagreement import disagreement
-from contour.geometry import Contour
+from contour.acceptance.disagreement import disagreement
+from contour.geometry.rings import Contour
 from contour.synthetic import Rendered
 from tests.contour.scenes import OUTLINES, block
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contour.calibration import SimpleCalibration
-from contour.error_budget import ErrorBudget, error_budget
-from contour.geometry import Contour
-from contour.position_uncertainty import PositionUncertainty
+from contour.acceptance.error_budget import ErrorBudget, error_budget
+from contour.calibration.calibration import SimpleCalibration
+from contour.calibration.position_uncertainty import PositionUncertainty
+from contour.geometry.rings import Contour
 from tests.contour.rings import SQUARE
 from tests.contour.test_calibration import camera
 

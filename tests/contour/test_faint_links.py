@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.faint_links import with_faint_links
+from contour.walls.faint_links import with_faint_links
 
 PITCH, SMALL_PITCH = 24.0, 13.0
 

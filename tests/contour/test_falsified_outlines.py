@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.falsified_outlines import report, too_fat, with_notch, with_spike
-from contour.geometry import Contour, area, contour_defect
+from contour.geometry.rings import Contour, area, contour_defect
 
 SQUARE = Contour(np.array([[100.0, 100.0], [500.0, 100.0], [500.0, 500.0], [100.0, 500.0]]))
 TURNED = Contour(SQUARE.exterior[::-1].copy())

@@ -4,7 +4,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contour.geometry import (
+from contour.geometry.rings import (
     Contour,
     area,
     bounding_box,

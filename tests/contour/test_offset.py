@@ -5,8 +5,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from contour.errors import MarginImpossible, ParameterError
-from contour.geometry import Contour, area, contour_defect, densified, signed_area
-from contour.offset import offset_contour
+from contour.geometry.offset import offset_contour
+from contour.geometry.rings import Contour, area, contour_defect, densified, signed_area
 from tests.contour.rings import SQUARE, simple_rings, star
 
 BLOCK = SQUARE * [40, 30]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contour.outline_fit import FittedRing, fit_ring
-from contour.outline_reach import supports
-from contour.outline_witnesses import cost, prepare
-from contour.wall_evidence import RingEvidence, WitnessKind
+from contour.outline.fit import FittedRing, fit_ring
+from contour.outline.reach import supports
+from contour.outline.witnesses import cost, prepare
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
 from tests.contour.outline_scenes import PITCH, distances, errors, rectangle, witnesses
 
 CORNER = np.array([300.0, 300.0])

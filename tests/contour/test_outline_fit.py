@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
-from contour.outline_fit import FittedRing, fit_ring
-from contour.wall_evidence import RingEvidence, WitnessKind
+from contour.outline.fit import FittedRing, fit_ring
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
 from tests.contour.outline_scenes import PITCH, area, blob, circle, distances, errors, perimeter, rectangle, witnesses
 
 

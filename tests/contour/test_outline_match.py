@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contour.errors import ParameterError
-from contour.geometry import Contour
-from contour.outline_match import compare, scatter_mm
+from contour.geometry.comparison import compare, scatter_mm
+from contour.geometry.rings import Contour
 
 L_SHAPE = Contour(np.array([[0.0, 0], [200, 0], [200, 80], [90, 80], [90, 150], [0, 150]]))
 HOLED = Contour(L_SHAPE.exterior, (np.array([[20.0, 20], [20, 60], [60, 60], [60, 20]]),))

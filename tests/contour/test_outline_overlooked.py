@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
-from contour.outline_fit import fit_ring
-from contour.outline_overlooked import overlooked, with_bounds
-from contour.wall_evidence import RingEvidence, WallPoints, WitnessKind
+from contour.outline.fit import fit_ring
+from contour.outline.missed_walls import overlooked, with_bounds
+from contour.walls.wall_evidence import RingEvidence, WallPoints, WitnessKind
 from tests.contour.outline_scenes import PITCH, along, circle, errors, perimeter, rectangle, witnesses
 
 BLOCK = rectangle(900.0, 600.0, angle=0.0)

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from contour.errors import PictureError
-from contour.geometry import Contour
-from contour.overlay import ACCEPTED, HOLE, REFUSED, VERTEX, draw_overlay
+from contour.geometry.rings import Contour
+from contour.image.overlay import ACCEPTED, HOLE, REFUSED, VERTEX, draw_overlay
 from tests.contour.rings import SQUARE
 
 OUTLINE = Contour(SQUARE * [50, 30] + [150.0, 150.0], (SQUARE[::-1] * 8 + [300.0, 250.0],))

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from contour.binarize import binarize
-from contour.direct_scan import direct_scan_ring, scan_pairs, scan_rows
 from contour.errors import NoBlockFound, ParameterError
-from contour.find_contours import largest_contour
-from contour.geometry import contour_defect, signed_area
-from contour.sliding_matrix import fill_windows, sliding_matrix_contour
+from contour.geometry.rings import contour_defect, signed_area
+from contour.tracing.binarize import binarize
+from contour.tracing.direct_scan import direct_scan_ring, scan_pairs, scan_rows
+from contour.tracing.find_contours import largest_contour
+from contour.tracing.sliding_matrix import fill_windows, sliding_matrix_contour
 from tests.contour import paper_literal
 from tests.contour.scenes import block
 

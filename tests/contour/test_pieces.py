@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.geometry import Contour, area
-from contour.pieces import pieces_beside
-from contour.tracing import TraceSettings, trace
+from contour.geometry.rings import Contour, area
+from contour.tracing.tracing import TraceSettings, trace
+from contour.walls.pieces import pieces_beside
 from tests.contour.scenes import block
 
 PITCH = 20.0

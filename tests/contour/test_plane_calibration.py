@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from contour.calibration import Alignment
+from contour.calibration.calibration import Alignment
+from contour.calibration.plane_calibration import PlaneCalibration
 from contour.errors import CalibrationError
-from contour.plane_calibration import PlaneCalibration
 from contour.synthetic import camera_above
 
 CAMERA = camera_above(1600, 1200, 0.375, tilt_deg=(5.0, -8.0), roll_deg=20.0)

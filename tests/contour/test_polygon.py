@@ -4,10 +4,10 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contour.calibration import Alignment, SimpleCalibration
+from contour.calibration.calibration import Alignment, SimpleCalibration
 from contour.errors import CalibrationError, ParameterError
-from contour.geometry import Contour, contour_defect, densified, hausdorff, signed_area
-from contour.polygon import PIXEL_TOLERANCE, Finish, Polygon, cutting_polygon
+from contour.geometry.rings import Contour, contour_defect, densified, hausdorff, signed_area
+from contour.polygon.polygon import PIXEL_TOLERANCE, Finish, Polygon, cutting_polygon
 from tests.contour.rings import SQUARE, blobs, simple_rings
 from tests.contour.test_calibration import camera
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import CalibrationError
-from contour.position_uncertainty import PositionUncertainty
 
 MAP = np.array([[[1.0, 2.0], [3.0, 4.0]], [[2.0, 4.0], [6.0, 8.0]]])
 SURE = PositionUncertainty(101, 51, [0.0, 50.0], [1.5, 3.0], MAP)

@@ -8,7 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.quality import Quality, QualityLimits, block_quality, lost_in_noise, picture_faults, quality_faults
+from contour.acceptance.quality import (
+    Quality,
+    QualityLimits,
+    block_quality,
+    lost_in_noise,
+    picture_faults,
+    quality_faults,
+)
 from tests.contour.scenes import block
 
 LIMITS = QualityLimits()

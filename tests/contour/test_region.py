@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from contour.errors import ParameterError
-from contour.geometry import hausdorff
-from contour.region import Region
-from contour.tracing import TraceSettings, trace
+from contour.geometry.rings import hausdorff
+from contour.image.region import Region
+from contour.tracing.tracing import TraceSettings, trace
 from tests.contour.scenes import block
 
 SETTINGS = TraceSettings()

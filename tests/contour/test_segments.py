@@ -6,7 +6,15 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from contour.segments import BoxTree, contains, distances_to_ring, first_meeting, near_pairs, segments_meet, turns
+from contour.geometry.segments import (
+    BoxTree,
+    contains,
+    distances_to_ring,
+    first_meeting,
+    near_pairs,
+    segments_meet,
+    turns,
+)
 from tests.contour.rings import SQUARE, random_blob, simple_rings
 
 coordinates = st.one_of(st.integers(-3, 3).map(float), st.floats(-1e6, 1e6))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from contour.calibration.fixed_marks import Mark, Sentinels, check_sentinels, see_sentinels
 from contour.errors import CalibrationError
-from contour.sentinels import Mark, Sentinels, check_sentinels, see_sentinels
 from tests.contour.sentinel_scenes import CAMERA, bumped, marked
 
 SEEN = see_sentinels(marked(CAMERA), "DICT_4X4_50")

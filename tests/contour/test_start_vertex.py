@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contour.geometry import Contour
-from contour.start_vertex import Start, begun_at, first_vertices
+from contour.geometry.rings import Contour
+from contour.polygon.start_vertex import Start, begun_at, first_vertices
 from tests.contour.rings import SQUARE, stars
 
 DIAMOND = np.array([[0.0, -50], [50, 0], [0, 50], [-50, 0]])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from benchmarks.metrics import agreement, distances, rectified_edges, samples
 from benchmarks.sample_scenes import CAMERA, THICKNESS_MM
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from contour.synthetic import blob, densified, disc_ring, rectangle, with_holes
 
 

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.acceptance import Refusal, judge_table
+from contour.acceptance.acceptance import Refusal, judge_table
 from contour.errors import CalibrationError, PictureError
-from contour.geometry import Contour, hausdorff
+from contour.geometry.rings import Contour, hausdorff
+from contour.image.taught_table import TableLimits, TaughtTable, look_at, teach
 from contour.synthetic import area_coverage
-from contour.taught_table import TableLimits, TaughtTable, look_at, teach
-from contour.tracing import TraceSettings, trace
+from contour.tracing.tracing import TraceSettings, trace
 from tests.contour.scenes import block
 
 LIMITS = TableLimits()

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import shapely
 
-from contour.binarize import binarize
 from contour.errors import NoBlockFound, ParameterError, PictureError
-from contour.geometry import contour_defect, signed_area
-from contour.sliding_matrix import coarse_step, default_core_px
+from contour.geometry.rings import contour_defect, signed_area
 from contour.synthetic import CellGeometry, Scene, camera_above, render
-from contour.tracing import TraceSettings, trace
+from contour.tracing.binarize import binarize
+from contour.tracing.sliding_matrix import coarse_step, default_core_px
+from contour.tracing.tracing import TraceSettings, trace
 from tests.contour.scenes import HEIGHT, MM_PER_PX, OUTLINES, WIDTH, block
 
 PAPER_METHODS = ("sliding-matrix", "direct-scan", "find-contours")

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.metrics import distances, samples
-from contour.outline_fit import fit_ring
-from contour.tracing import TraceSettings
-from contour.uncertainty import LEAST_PX, Coefficients, bound, ring_stretches, uncertainty
-from contour.wall_evidence import RingEvidence, WitnessKind
-from contour.wall_tips import wall_tips
+from contour.outline.fit import fit_ring
+from contour.outline.uncertainty import LEAST_PX, Coefficients, bound, ring_stretches, uncertainty
+from contour.tracing.tracing import TraceSettings
+from contour.tracing.wall_tips import wall_tips
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
 from tests.contour.outline_scenes import PITCH, blob, circle, perimeter, rectangle, witnesses
 from tests.contour.scenes import block
 

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from contour.errors import ParameterError
-from contour.geometry import Contour, contour_defect, densified, hausdorff
-from contour.vertex_budget import lies_within, within_budget
+from contour.geometry.rings import Contour, contour_defect, densified, hausdorff
+from contour.polygon.vertex_budget import lies_within, within_budget
 from tests.contour.rings import SQUARE
 from tests.contour.test_offset import contours, solid
 

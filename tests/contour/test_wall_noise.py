@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.wall_light import wall_light
-from contour.wall_mask import wall_mask, without_specks
+from contour.walls.lightness import wall_light
+from contour.walls.wall_mask import wall_mask, without_specks
 
 # Of the noise of single pixels, what the mask's light blur (3 × 3 binomial) leaves: (6 / 16) of its deviation.
 LEFT = 0.375

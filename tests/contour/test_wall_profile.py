@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from contour.wall_profile import EndModel, centred_axes, fit_ends, true_width
+from contour.walls.end_profile import EndModel, centred_axes, fit_ends, true_width
 
 SIZE, SUPER = 64, 8
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely import LinearRing, Point, Polygon
 
-from contour.ring_depth import depth_inside
+from contour.geometry.signed_distance import depth_inside
 
 RING = np.array([[0.0, 0.0], [10.0, 1.0], [9.0, 8.0], [5.0, 3.0], [1.0, 9.0]])
 

@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from contour.coarse_block import coarse_block
 from contour.errors import NoBlockFound, PictureError
 from contour.synthetic import (
     CameraModel,
@@ -26,11 +25,12 @@ from contour.synthetic import (
     signed_distance,
     with_holes,
 )
-from contour.wall_cells import probe
-from contour.wall_evidence import WitnessKind
-from contour.wall_light import wall_light
-from contour.wall_mask import wall_mask
-from contour.wall_witnesses import see_block
+from contour.walls.cell_scale import probe
+from contour.walls.coarse_block import coarse_block
+from contour.walls.lightness import wall_light
+from contour.walls.see_block import see_block
+from contour.walls.wall_evidence import WitnessKind
+from contour.walls.wall_mask import wall_mask
 
 
 def camera() -> CameraModel:

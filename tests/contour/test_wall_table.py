@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.coarse_block import coarse_block
-from contour.geometry import signed_area
-from contour.material_edge import material_edge
-from contour.wall_mask import wall_mask
+from contour.geometry.rings import signed_area
+from contour.tracing.closed_cells import material_edge
+from contour.walls.coarse_block import coarse_block
+from contour.walls.wall_mask import wall_mask
 
 
 def comb(table: float) -> tuple[np.ndarray, np.ndarray]:

@@ -24,8 +24,8 @@ from contour.synthetic import (
     signed_distance,
     with_holes,
 )
-from contour.tracing import Trace, TraceSettings
-from contour.wall_tips import wall_tips
+from contour.tracing.tracing import Trace, TraceSettings
+from contour.tracing.wall_tips import wall_tips
 
 SETTINGS = TraceSettings(method="wall-tips")
 CAMERA = camera_above(800, 600, 0.375, distance_mm=1500.0)

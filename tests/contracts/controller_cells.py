@@ -6,15 +6,15 @@ import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 
-from drivers.controller.mailbox import MailboxLayout
-from drivers.controller.modbus import (
+from drivers.controller.mailbox.mailbox import MailboxLayout
+from drivers.controller.modbus.client import (
     ModbusController,
     ModbusRtuController,
     ModbusRtuOverTcpController,
     ModbusTcpController,
     SerialLine,
 )
-from drivers.controller.simulated import SimulatedController
+from drivers.controller.simulated.controller import SimulatedController
 from tests.interop.programs import libmodbus_rtu, libmodbus_tcp
 from tests.pty_line import PtyLine
 from tests.serial_server import SerialServer

@@ -11,7 +11,7 @@ import pytest
 
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame
 from drivers.camera.averaging import AveragingCamera
-from drivers.camera.files import FileCamera
+from drivers.camera.files.camera import FileCamera
 from drivers.camera.simulated import SimulatedCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 

@@ -19,9 +19,9 @@ from drivers.controller import (
     Page,
     ServiceBlock,
 )
-from drivers.controller.mailbox import ContourMessage, MailboxLayout, encode_pages, micrometres
-from drivers.controller.modbus import ModbusTcpController
-from drivers.controller.simulated import SimulatedController
+from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, encode_pages, micrometres
+from drivers.controller.modbus.client import ModbusTcpController
+from drivers.controller.simulated.controller import SimulatedController
 from tests.contracts.controller_cells import PATIENT_S, SERVERS, WAYS, Cell, cell
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from drivers.controller import ControllerRefused
-from drivers.controller.mailbox import ContourMessage, MailboxLayout, Page, encode_pages, micrometres
-from drivers.controller.modbus import (
+from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, Page, encode_pages, micrometres
+from drivers.controller.modbus.client import (
     ModbusController,
     ModbusRtuController,
     ModbusRtuOverTcpController,
@@ -19,7 +19,7 @@ from drivers.controller.modbus import (
     RequestLimits,
     SerialLine,
 )
-from drivers.controller.simulated import ServerLimits, SimulatedController
+from drivers.controller.simulated.controller import ServerLimits, SimulatedController
 from tests.contracts.controller_cells import PATIENT_S, WAYS
 from tests.interop.programs import libmodbus_tcp
 from tests.pty_line import PtyLine

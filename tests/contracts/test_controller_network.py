@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from drivers.controller import ControllerError, ControllerUnavailable, LinkBlock, Page
-from drivers.controller.mailbox import ContourMessage, encode_pages
-from drivers.controller.modbus import ModbusTcpController
-from drivers.controller.simulated import AcceptedContour, SimulatedController
+from drivers.controller.mailbox.mailbox import ContourMessage, encode_pages
+from drivers.controller.modbus.client import ModbusTcpController
+from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
 from tests.drivers.controller.fault_proxy import Fate, FaultProxy
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")

@@ -22,11 +22,11 @@ from drivers.controller import (
     Page,
     ServiceBlock,
 )
-from drivers.controller.chunks import PAYLOAD_OFFSET, page_starts, spans
-from drivers.controller.line_check import BARRIER_COUNTS, SILENCE_S
-from drivers.controller.mailbox import BLOCK_REGISTERS, HEADER_REGISTERS
-from drivers.controller.modbus import ModbusRtuController, ModbusRtuOverTcpController, Rs485, SerialLine
-from drivers.controller.requests import LONGEST_READ
+from drivers.controller.mailbox.mailbox import BLOCK_REGISTERS, HEADER_REGISTERS
+from drivers.controller.mailbox.page_spans import PAYLOAD_OFFSET, page_starts, spans
+from drivers.controller.modbus.client import ModbusRtuController, ModbusRtuOverTcpController, Rs485, SerialLine
+from drivers.controller.modbus.late_replies import BARRIER_COUNTS, SILENCE_S
+from drivers.controller.modbus.requests import LONGEST_READ
 from tests.contracts.controller_cells import PATIENT_S
 from tests.drivers.controller.line_server import LineServer
 from tests.drivers.controller.rtu_frames import frame

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.controller.mailbox import Page, withdrawal
-from service.hil import Bench
+from drivers.controller.mailbox.mailbox import Page, withdrawal
+from service.commissioning.hil import Bench
 
 ACCEPTED, BAD_CRC, BAD_LAYOUT, EXPIRED, ACCEPTED_BEFORE, OUTDATED = 1, 2, 3, 5, 6, 8
 PAGE_MISSING, NOT_READY, WITHDRAWN = 9, 10, 11

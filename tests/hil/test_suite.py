@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 
-from drivers.controller.simulated import SimulatedController
-from drivers.controller.simulated_contour import PageCopy
-from service.hil.bench import HEARTBEAT_S, HilError, open_bench
+from drivers.controller.simulated.contour import PageCopy
+from drivers.controller.simulated.controller import SimulatedController
+from service.commissioning.hil.bench import HEARTBEAT_S, HilError, open_bench
 
 SERVICE_HEARTBEAT = 18
 SERVICE_OWNER = 27

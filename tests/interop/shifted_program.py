@@ -6,8 +6,8 @@ import asyncio
 import contextlib
 from collections.abc import AsyncIterator
 
-from drivers.controller.modbus import ModbusTcpController
-from drivers.controller.requests import read_registers, registers_of, stream_of, write_registers
+from drivers.controller.modbus.client import ModbusTcpController
+from drivers.controller.modbus.requests import read_registers, registers_of, stream_of, write_registers
 from tests.protocol_decoder import u32_from, words_of
 
 LINK, SERVICE = 0, 16

@@ -17,7 +17,7 @@ import shapely
 import yaml
 
 from benchmarks.sample_scenes import sample_scenes
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from tests.linuxcnc.machine import bridge_on, linuxcnc_session
 from tests.linuxcnc.way_picture import draw_way
 from tests.real_parts import need_program

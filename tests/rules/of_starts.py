@@ -124,7 +124,7 @@ RULES = (
     ),
     Rule(
         "Exactly once: numbers go on above a damaged journal's",
-        "service/journal_recovery.py::open_journal",
+        "service/records/journal_recovery.py::open_journal",
         f"{IN_RECOVERY}::test_what_was_moved_aside_counts_also_where_the_controller_knows_less",
         "highest = max([highest_archived(archive), *map(highest_job, set_aside(path))])",
         "highest = highest_archived(archive)",

@@ -7,10 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-TRANSFER, LINK, EXECUTOR, CYCLE = "service/transfer.py", "service/link.py", "service/executor.py", "service/cycle.py"
-JOURNAL, OWNERSHIP, CLOCK = "service/journal.py", "service/ownership.py", "service/controller_clock.py"
+TRANSFER, LINK, EXECUTOR, CYCLE = (
+    "service/link/transfer.py",
+    "service/link/link.py",
+    "service/jobs/executor.py",
+    "service/jobs/cycle.py",
+)
+JOURNAL, OWNERSHIP, CLOCK = (
+    "service/records/journal.py",
+    "service/link/ownership.py",
+    "service/link/controller_clock.py",
+)
 IN_CLOCK, IN_DOUBT = "tests/service/test_controller_clock.py", "tests/service/test_transfer_in_doubt.py"
-TRIGGERS, IN_ANSWERS = "service/triggers.py", "tests/service/test_serial_answers.py"
+TRIGGERS, IN_ANSWERS = "service/jobs/triggers.py", "tests/service/test_serial_answers.py"
 IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_RESUMING, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (
     f"tests/service/test_{name}.py"
     for name in (

@@ -11,18 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from drivers.camera.simulated import SimulatedCamera
-from drivers.controller.mailbox import Page
-from service.config import Recipe
-from service.cycle import Cycle, CycleSettings, Observation
-from service.evidence import Evidence
-from service.health import Health
-from service.journal import Job, Journal, TriggerStamp
-from service.link import Link, LinkSettings
-from service.measure import Measurement
+from drivers.controller.mailbox.mailbox import Page
+from service.config.config import Recipe
+from service.jobs.cycle import Cycle, CycleSettings, Observation
+from service.jobs.health import Health
+from service.link.link import Link, LinkSettings
+from service.link.transfer import TransferCounter, TransferSettings
+from service.measuring.measure import Measurement
+from service.records.evidence import Evidence
+from service.records.journal import Job, Journal, TriggerStamp
 from service.state import StateMachine
-from service.transfer import TransferCounter, TransferSettings
 from tests.protocol_decoder import Contour as Decoded
 from tests.protocol_decoder import decode_contour
 from tests.service.scripted_controller import ScriptedController

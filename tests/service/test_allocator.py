@@ -10,7 +10,7 @@ import pytest
 
 COUNT = """
 import ctypes, threading
-from service.allocator import ARENAS, keep_few_arenas
+from service.malloc import ARENAS, keep_few_arenas
 assert keep_few_arenas()
 allocate = ctypes.CDLL(None).malloc
 together = threading.Barrier(12)
@@ -41,7 +41,7 @@ def test_threads_share_few_arenas() -> None:
 HELD_BY_ONE = """
 import ctypes
 from pathlib import Path
-from service.allocator import give_back
+from service.malloc import give_back
 library = ctypes.CDLL(None)
 library.malloc.restype = ctypes.c_void_p
 library.free.argtypes = [ctypes.c_void_p]

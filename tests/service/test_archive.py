@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.archive import Archive, ArchiveError, ArchiveFull, ArchiveLimits, document_of, files_of
-from service.journal_recovery import highest_archived
 from service.reasons import Outcome
+from service.records.archive import Archive, ArchiveError, ArchiveFull, ArchiveLimits, document_of, files_of
+from service.records.journal_recovery import highest_archived
 
 GOOD, BAD = Outcome.ACCEPTED, Outcome.REFUSED
 BLOCK = 4096

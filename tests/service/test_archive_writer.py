@@ -13,18 +13,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contour.error_budget import ErrorBudget
-from contour.quality import Quality
+from contour.acceptance.error_budget import ErrorBudget
+from contour.acceptance.quality import Quality
 from drivers.camera import Frame
-from service.archive import Archive, ArchiveLimits, files_of
-from service.archive_writer import ArchiveWriter
-from service.archived_job import load_archived
-from service.config import Recipe
-from service.evidence import Evidence
-from service.job_pages import Envelope, contour_pages
-from service.journal import Job, Terms, TriggerStamp
-from service.measure import Measurer
+from service.config.config import Recipe
+from service.link.contour_message import Envelope, contour_pages
+from service.measuring.measure import Measurer
 from service.reasons import Outcome, Reason
+from service.records.archive import Archive, ArchiveLimits, files_of
+from service.records.archive_writer import ArchiveWriter
+from service.records.archived_job import load_archived
+from service.records.evidence import Evidence
+from service.records.journal import Job, Terms, TriggerStamp
 from tests.service.cycle_rig import measured
 
 RECIPE = Recipe(number=1, name="one", exports=["dxf", "geojson"])

@@ -6,7 +6,7 @@ from itertools import accumulate
 
 import pytest
 
-from service.beat import off_beat, until_beat
+from service.poll_timing import off_beat, until_beat
 
 
 @pytest.mark.parametrize(("now_s", "pause_s"), [(0.0, 0.05), (0.02, 0.03), (0.03, 0.07), (12.25, 0.05)])

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.board import Board
-from contour.board_detection import find_board
+from contour.camera_calibration.board import Board
+from contour.camera_calibration.board_detection import find_board
 from contour.synthetic.coverage import area_coverage
-from service.board_svg import MARGIN_MM, board_svg, ruler_mm
 from service.cli.main import main
+from service.measuring.board_svg import MARGIN_MM, board_svg, ruler_mm
 from tests.contour.board_scenes import CHARUCO, CHESSBOARD
 
 SVG = "{http://www.w3.org/2000/svg}"

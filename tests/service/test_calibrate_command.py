@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.board import Board
-from contour.calibration import CameraCalibration, SimpleCalibration
-from contour.plane_calibration import PlaneCalibration
+from contour.calibration.calibration import CameraCalibration, SimpleCalibration
+from contour.calibration.plane_calibration import PlaneCalibration
+from contour.camera_calibration.board import Board
 from contour.synthetic.board_poses import BoardPose, board_poses
-from service.calibration_file import load_calibration, load_record
 from service.cli.main import main
+from service.measuring.calibration_file import load_calibration, load_record
 from tests.contour.board_scenes import CHARUCO, SMALL, picture
 
 BOARD = ["--board", "charuco", "--squares", "11x8", "--square-mm", "30", "--marker-mm", "21"]

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import yaml
 
-from contour.calibration import Alignment, CameraCalibration, SimpleCalibration
-from contour.plane_calibration import PlaneCalibration
-from contour.position_uncertainty import PositionUncertainty
-from contour.sentinels import Mark, Sentinels
-from service.calibration_file import (
+from contour.calibration.calibration import Alignment, CameraCalibration, SimpleCalibration
+from contour.calibration.fixed_marks import Mark, Sentinels
+from contour.calibration.plane_calibration import PlaneCalibration
+from contour.calibration.position_uncertainty import PositionUncertainty
+from service.measuring.calibration_file import (
     CalibrationFileError,
     CalibrationRecord,
     calibration_hash,

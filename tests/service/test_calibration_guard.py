@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import yaml
 
-from contour.calibration import CameraCalibration
-from contour.position_uncertainty import PositionUncertainty
-from contour.sentinels import Sentinels, see_sentinels
-from service.calibration_file import CalibrationRecord, save_record
-from service.calibration_guard import CalibrationGuard, GuardLimits
+from contour.calibration.calibration import CameraCalibration
+from contour.calibration.fixed_marks import Sentinels, see_sentinels
+from contour.calibration.position_uncertainty import PositionUncertainty
 from service.cli.main import main
-from service.config import Recipe
-from service.measure import Measurer
+from service.config.config import Recipe
+from service.measuring.calibration_file import CalibrationRecord, save_record
+from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
+from service.measuring.measure import Measurer
 from service.reasons import Reason
 from tests.contour.sentinel_scenes import CAMERA, bumped, marked
 

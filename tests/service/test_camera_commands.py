@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contour.picture_figures import PictureFigures, picture_figures
-from service.cli.focus import focus_line
+from contour.image.picture_figures import PictureFigures, picture_figures
 from service.cli.main import main
+from service.cli.pictures.focus import focus_line
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from drivers.camera import CameraUnavailable
-from service.camera_watch import CHECK_S, RETRY_S, CameraWatch
-from service.health import Fault, Health
+from service.jobs.camera_watch import CHECK_S, RETRY_S, CameraWatch
+from service.jobs.health import Fault, Health
 from service.reasons import Reason
 from service.state import State, StateMachine
 

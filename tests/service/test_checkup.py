@@ -15,18 +15,18 @@ from pathlib import Path
 
 import pytest
 
-from service.checkup.devices import check_devices
-from service.checkup.files import check_files
-from service.checkup.finding import Finding, Level
-from service.checkup.listening import check_listening
-from service.checkup.page import check_page
-from service.checkup.running import holder
-from service.checkup.storage import check_storage
 from service.cli.main import main
-from service.config import Config
-from service.config_file import SAMPLES, load_config
-from service.journal import Journal, TriggerStamp
-from service.lock import Lock, NameLock, name_is_held
+from service.commissioning.checkup.devices import check_devices
+from service.commissioning.checkup.files import check_files
+from service.commissioning.checkup.finding import Finding, Level
+from service.commissioning.checkup.listening import check_listening
+from service.commissioning.checkup.page import check_page
+from service.commissioning.checkup.running import holder
+from service.commissioning.checkup.storage import check_storage
+from service.config.config import Config
+from service.config.config_file import SAMPLES, load_config
+from service.daemon.lock import Lock, NameLock, name_is_held
+from service.records.journal import Journal, TriggerStamp
 from tests.nobody import NOBODY, needs_root, open_folder, python_as_nobody
 
 
@@ -170,8 +170,8 @@ def test_what_the_user_may_not_use_names_the_group_that_may(reachable: Path) -> 
     os.chown(device, 0, group.gr_gid)
     path = written(reachable, more=f"triggers: [{{kind: serial, port: {device}}}]")
     done = python_as_nobody(
-        "from pathlib import Path; from service.config_file import load_config\n"
-        "import service.checkup.devices as devices; import service.checkup.storage as storage\n"
+        "from pathlib import Path; from service.config.config_file import load_config\n"
+        "from service.commissioning.checkup import devices, storage\n"
         "config = load_config(Path(sys.argv[1]))",
         "for one in (*devices.check_permissions(config), *storage.check_storage(config, running=False)):\n"
         "    print(one.level.label, one.part, one.text, one.next_step)",

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from service import config_reference
-from service.config import Config, FilesCamera, ModbusTcp, NoController, SerialTrigger
-from service.config_file import ConfigError, config_schema, default_config, load_config
+from service.config import reference as config_reference
+from service.config.config import Config, FilesCamera, ModbusTcp, NoController, SerialTrigger
+from service.config.config_file import ConfigError, config_schema, default_config, load_config
 
 ROOT = Path(__file__).parents[2]
 SMALL = "camera: {kind: files, path: in}\ncalibration: {file: c.yaml}\ncontroller: {kind: modbus-tcp}\n"
@@ -62,7 +62,7 @@ def test_line_1_of_the_shipped_config_names_the_schema() -> None:
 
 
 def test_schema_and_reference_are_fresh() -> None:
-    how = "run: python -m service.config_reference docs/configuration.md config.schema.json"
+    how = "run: python -m service.config.reference docs/configuration.md config.schema.json"
     assert (ROOT / "config.schema.json").read_text() == config_reference.schema_text(), how
     assert (ROOT / "docs" / "configuration.md").read_text() == config_reference.reference(), how
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from service.config_keys import KeysNotSet, with_keys
+from service.config.keys import KeysNotSet, with_keys
 
 BLOCK = """\
 # our line

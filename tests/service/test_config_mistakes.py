@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from service.config_file import ConfigError, load_config
+from service.config.config_file import ConfigError, load_config
 
 FILE = """\
 camera:

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox import LinkBlock
-from service.controller_clock import MODULUS, ControllerClock, Stamp
+from drivers.controller.mailbox.mailbox import LinkBlock
+from service.link.controller_clock import MODULUS, ControllerClock, Stamp
 
 SESSION = 9
 

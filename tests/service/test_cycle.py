@@ -14,14 +14,14 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from contour.error_budget import ErrorBudget
+from contour.acceptance.error_budget import ErrorBudget
 from contour.errors import ParameterError, PictureError
-from contour.geometry import Contour, area
+from contour.geometry.rings import Contour, area
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable, SceneMoved
-from drivers.controller.mailbox import Answer, Page
-from service.cycle import MailboxFormat
-from service.journal import TriggerStamp
+from drivers.controller.mailbox.mailbox import Answer, Page
+from service.jobs.cycle import MailboxFormat
 from service.reasons import Outcome, Reason
+from service.records.journal import TriggerStamp
 from service.state import State
 from tests.protocol_decoder import decode_contour
 from tests.service.cycle_rig import QUICK, RECTANGLE, SETTINGS, decoded, measured, rig
@@ -320,7 +320,7 @@ async def test_a_defect_without_handshake_ends_the_job_at_once(tmp_path: Path) -
 async def test_a_journal_that_fails_during_a_job_holds_it_up_is_told_once_and_loses_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.cycle.JOURNAL_PAUSE_S", 0.01)
+    monkeypatch.setattr("service.jobs.cycle.JOURNAL_PAUSE_S", 0.01)
     async with rig(tmp_path) as built:
         taken = built.journal.take(TriggerStamp("serial"))
         built.journal._db.execute("PRAGMA query_only = ON")
@@ -364,7 +364,7 @@ async def test_nothing_is_sent_before_measurement_and_evidence_are_durable(tmp_p
 async def test_a_disk_that_hangs_holds_no_contour_up_for_long(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("service.cycle.EVIDENCE_WAIT_S", 0.05)
+    monkeypatch.setattr("service.jobs.cycle.EVIDENCE_WAIT_S", 0.05)
     async with rig(tmp_path) as built:
         built.keeper.durable = Future()
         assert (await built.job()).outcome is Outcome.ACCEPTED

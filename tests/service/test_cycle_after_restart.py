@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox import Answer, Page, ServiceBlock
-from service.journal import Job, Terms, TriggerStamp
+from drivers.controller.mailbox.mailbox import Answer, Page, ServiceBlock
 from service.reasons import Outcome, Reason
+from service.records.journal import Job, Terms, TriggerStamp
 from tests.service.cycle_rig import QUICK, SETTINGS, Rig, rig
 from tests.service.scripted_controller import ScriptedController
 from tests.service.transferring import page

@@ -18,20 +18,20 @@ import pytest
 
 from drivers.camera import CameraUnavailable
 from drivers.camera.simulated import SimulatedCamera
-from drivers.controller.mailbox import Answer, ServiceBlock
-from service.config import Recipe
-from service.cycle import Cycle, CycleSettings
-from service.daemon import Daemon, Parts
-from service.executor import Executor
-from service.health import Health
-from service.journal import Job, Journal, TriggerStamp
-from service.link import Link, LinkSettings
-from service.lock import Lock, LockError
+from drivers.controller.mailbox.mailbox import Answer, ServiceBlock
+from service.config.config import Recipe
+from service.daemon.daemon import Daemon, Parts
+from service.daemon.lock import Lock, LockError
+from service.daemon.systemd import Notifier, Watchdog
+from service.jobs.cycle import Cycle, CycleSettings
+from service.jobs.executor import Executor
+from service.jobs.health import Health
+from service.jobs.trigger_queue import TriggerRefused
+from service.link.link import Link, LinkSettings
+from service.link.transfer import TransferCounter, TransferSettings
 from service.reasons import Outcome, Reason
+from service.records.journal import Job, Journal, TriggerStamp
 from service.state import State, StateMachine
-from service.systemd import Notifier, Watchdog
-from service.transfer import TransferCounter, TransferSettings
-from service.trigger_queue import TriggerRefused
 from tests.service.cycle_rig import Plan
 from tests.service.scripted_controller import ScriptedController
 
@@ -196,7 +196,7 @@ async def test_a_camera_that_goes_and_comes_back_is_error_and_ready_again(tmp_pa
 async def test_a_part_that_fails_by_a_defect_is_started_again_and_told(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.supervisor.SOUND_AFTER_S", 0.1)
+    monkeypatch.setattr("service.daemon.supervisor.SOUND_AFTER_S", 0.1)
     controller = ScriptedController()
     write, failures = controller.write_service, [ZeroDivisionError("a defect")]
 
@@ -220,8 +220,8 @@ async def test_a_part_that_fails_by_a_defect_is_started_again_and_told(
 async def test_a_stop_does_not_wait_for_a_camera_call_that_hangs_and_the_job_is_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr("service.daemon.STOP_BOUND_S", 0.2)
-    monkeypatch.setattr("service.daemon.THREADS_END_S", 0.2)
+    monkeypatch.setattr("service.daemon.daemon.STOP_BOUND_S", 0.2)
+    monkeypatch.setattr("service.daemon.daemon.THREADS_END_S", 0.2)
     let_go = threading.Event()
     async with running(tmp_path, ScriptedController()) as (built, task):
         await built.ready()
@@ -282,7 +282,7 @@ async def test_stopped_during_an_exposure_the_job_is_brought_to_its_end(tmp_path
 async def test_stopped_while_the_controller_is_silent_the_job_stays_in_flight_and_the_next_start_settles_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.daemon.STOP_BOUND_S", 0.2)
+    monkeypatch.setattr("service.daemon.daemon.STOP_BOUND_S", 0.2)
     controller = ScriptedController([None])
     async with running(tmp_path, controller) as (built, task):
         await built.ready()

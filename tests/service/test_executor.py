@@ -13,14 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox import LinkBlock, ServiceBlock
-from service.executor import ROOM, Executor, missed_between
-from service.health import Fault, Health
-from service.journal import Job, Journal, JournalError, TriggerStamp
-from service.link import Link, LinkSettings
+from drivers.controller.mailbox.mailbox import LinkBlock, ServiceBlock
+from service.jobs.executor import ROOM, Executor, missed_between
+from service.jobs.health import Fault, Health
+from service.jobs.trigger_queue import TriggerRefused
+from service.link.link import Link, LinkSettings
 from service.reasons import Outcome, Reason
+from service.records.journal import Job, Journal, JournalError, TriggerStamp
 from service.state import State, StateMachine
-from service.trigger_queue import TriggerRefused
 from tests.service.waiting import until
 
 
@@ -325,7 +325,7 @@ async def test_an_open_trigger_of_the_controller_goes_before_a_trigger_of_ours(t
 async def test_no_trigger_is_taken_before_the_journal_has_told_what_is_in_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.executor.JOURNAL_PAUSE_S", 0.02)
+    monkeypatch.setattr("service.jobs.executor.JOURNAL_PAUSE_S", 0.02)
     bench = Bench(tmp_path)
     unsettled, failures = bench.journal.unsettled, [JournalError("disk I/O error")] * 2
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from contour.geometry import Contour, area, signed_area
+from contour.geometry.rings import Contour, area, signed_area
+from service.cli.controller.simulate_service import SHAPES as OFFERED
 from service.cli.main import main
-from service.cli.simulate_service import SHAPES as OFFERED
-from service.config import Recipe
-from service.config_file import SAMPLES
+from service.commissioning.given_contours import GivenContour, GivenContours, GivenContoursError, read_contours
+from service.commissioning.given_shapes import SHAPES, shape
+from service.config.config import Recipe
+from service.config.config_file import SAMPLES
 from service.export.document import ExportDocument
 from service.export.geojson import to_geojson
-from service.given_contours import GivenContour, GivenContours, GivenContoursError, read_contours
-from service.given_shapes import SHAPES, shape
 from service.reasons import Reason
 
 SQUARE = [[0, 0], [100, 0], [100, 100], [0, 100]]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from service.operations import Halt
+from service.daemon.operations import Halt
 
 
 @pytest.fixture

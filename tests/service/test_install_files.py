@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from service.config_file import load_config
-from service.install_files import InstallError, packaged, unit, written_folders
+from service.commissioning.install_files import InstallError, packaged, unit, written_folders
+from service.config.config_file import load_config
 
 ROOT = Path(__file__).parents[2]
 PACKAGED = packaged()
@@ -30,7 +30,7 @@ def of_config(folder: Path, more: str, camera: str = "path: pictures") -> str:
 @pytest.mark.parametrize("name", PACKAGED)
 def test_the_packaged_files_are_those_that_the_command_writes(name: str) -> None:
     assert (ROOT / "packaging" / name).read_text() == PACKAGED[name], (
-        "write them anew: .venv/bin/python -m service.install_files packaging"
+        "write them anew: .venv/bin/python -m service.commissioning.install_files packaging"
     )
 
 

@@ -7,9 +7,9 @@ import re
 from pathlib import Path
 
 from benchmarks.timing_diagram import EVENTS, SIGNALS, diagram
-from drivers.controller.mailbox import HEADER_FIELDS, LINK_FIELDS, SERVICE_FIELDS, MailboxLayout, crc32_of
-from service.given_shapes import SHAPES
-from service.register_map import MEANINGS, register_map
+from drivers.controller.mailbox.mailbox import HEADER_FIELDS, LINK_FIELDS, SERVICE_FIELDS, MailboxLayout, crc32_of
+from service.commissioning.given_shapes import SHAPES
+from service.link.register_map import MEANINGS, register_map
 from tests.system.processes import Process, free_port, until
 
 DOCS = Path(__file__).parents[2] / "docs"

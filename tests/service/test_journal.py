@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox import Page
-from service.journal import Journal, JournalConflict, JournalError, JournalFull, Terms, TriggerStamp
-from service.journal_reader import reading
+from drivers.controller.mailbox.mailbox import Page
 from service.reasons import Outcome, Reason
+from service.records.journal import Journal, JournalConflict, JournalError, JournalFull, Terms, TriggerStamp
+from service.records.journal_reader import reading
 
 PAGE = Page(tuple(range(31)), (1, 2, 3, 4, 0xFFFF, 0))
 
@@ -97,7 +97,7 @@ def test_a_killed_process_leaves_its_taken_job_behind(tmp_path: Path) -> None:
     code = f"""
         import os
         from pathlib import Path
-        from service.journal import Journal, TriggerStamp
+        from service.records.journal import Journal, TriggerStamp
         job = Journal(Path({str(path)!r})).take(TriggerStamp("serial", recipe=4))
         print(job.job_id, flush=True)
         os.kill(os.getpid(), 9)
@@ -263,7 +263,7 @@ def test_a_journal_of_version_1_opens_with_all_it_held_and_goes_on(tmp_path: Pat
 def test_notes_of_who_asked_for_what_last_and_only_the_newest_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.journal.MOST_NOTES", 3)
+    monkeypatch.setattr("service.records.journal.MOST_NOTES", 3)
     path = version_1(tmp_path / "journal.sqlite")
     with reading(path) as reader:
         assert reader.notes(10) == []

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox import Page
-from service.journal import Journal, JournalDamaged, JournalError, TriggerStamp
-from service.journal_reader import JobFilter, JournalUnreadable, reading
-from service.journal_recovery import _move_aside, highest_archived, highest_job, open_journal, set_aside
+from drivers.controller.mailbox.mailbox import Page
 from service.reasons import Outcome
+from service.records.journal import Journal, JournalDamaged, JournalError, TriggerStamp
+from service.records.journal_reader import JobFilter, JournalUnreadable, reading
+from service.records.journal_recovery import _move_aside, highest_archived, highest_job, open_journal, set_aside
 
 PAGE = Page((1, 0, 7, 1, 1, 1, 4, *[0] * 24), (1, 2, 3, 4))
 UNIX_S = 1_795_000_000

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from drivers.controller.mailbox import LinkBlock
-from service.link import Link, LinkSettings, LinkUnsteady, steady
+from drivers.controller.mailbox.mailbox import LinkBlock
+from service.link.link import Link, LinkSettings, LinkUnsteady, steady
 from tests.service.scripted_controller import ScriptedController
 from tests.service.waiting import until
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from service.config import Config
-from service.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
+from service.config.config import Config
+from service.daemon.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
 from service.wiring import controller_names
 
 
@@ -31,7 +31,7 @@ def test_a_controller_is_locked_once_and_the_holder_is_named() -> None:
 
 def test_a_killed_process_holds_no_lock() -> None:
     code = (
-        "import time; from service.lock import NameLock; held = NameLock('test/killed');"
+        "import time; from service.daemon.lock import NameLock; held = NameLock('test/killed');"
         " print('held', flush=True); time.sleep(60)"
     )
     other = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
@@ -103,7 +103,7 @@ def test_a_lock_whose_file_was_taken_away_while_one_waited_to_hold_it_is_not_hel
         next(let_go, lambda: None)()
         flock(file, how)
 
-    monkeypatch.setattr("service.lock.fcntl.flock", late)
+    monkeypatch.setattr("service.daemon.lock.fcntl.flock", late)
     second = Lock(tmp_path / "lock")
     with pytest.raises(LockError, match="another combtrace"):
         Lock(tmp_path / "lock")

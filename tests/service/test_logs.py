@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from service.job_log import log_end
-from service.journal import Job, Terms, TriggerStamp
+from service.jobs.job_log import log_end
 from service.logs import BURST, WINDOW_S, Format, LineFormatter, LogHandler, event, journald_reads
 from service.reasons import Outcome, Reason
+from service.records.journal import Job, Terms, TriggerStamp
 from service.state import State, StateMachine
 
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from benchmarks.sample_scenes import THICKNESS_MM, sample_scenes
+from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import ParameterError, PictureError
-from contour.geometry import area, hausdorff
-from contour.position_uncertainty import PositionUncertainty
+from contour.geometry.rings import area, hausdorff
 from contour.synthetic import render
-from service.calibration_file import load_calibration
-from service.config import Recipe
-from service.measure import Measurer, trace_settings
+from service.config.config import Recipe
+from service.measuring.calibration_file import load_calibration
+from service.measuring.measure import Measurer, trace_settings
 from service.reasons import Reason
 
 SAMPLES = Path(__file__).parents[2] / "service" / "samples"

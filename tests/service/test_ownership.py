@@ -12,11 +12,11 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox import Answer, LinkBlock, ServiceBlock
-from service.link import Link
-from service.ownership import ForeignOwner, Ownership
+from drivers.controller.mailbox.mailbox import Answer, LinkBlock, ServiceBlock
+from service.link.link import Link
+from service.link.ownership import ForeignOwner, Ownership
+from service.link.transfer import Settlement, TransferSettings, Validity
 from service.reasons import Outcome, Reason
-from service.transfer import Settlement, TransferSettings, Validity
 from tests.service.scripted_controller import ScriptedController
 from tests.service.test_link import QUICK, linked
 from tests.service.transferring import JOB, Run, transferring
@@ -300,8 +300,8 @@ class Another:
 
 @pytest.fixture
 def short_watch(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.ownership.WATCH_S", 0.3)
-    monkeypatch.setattr("service.ownership.WATCH_OWN_S", 0.2)
+    monkeypatch.setattr("service.link.ownership.WATCH_S", 0.3)
+    monkeypatch.setattr("service.link.ownership.WATCH_OWN_S", 0.2)
 
 
 def written(controller: ScriptedController) -> set[str]:

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 
 from drivers.controller import ControllerUnavailable, ServiceBlock
-from drivers.controller.mailbox import MailboxLayout
-from drivers.controller.modbus import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
-from drivers.controller.requests import read_registers, registers_of, stream_of, write_register, write_registers
-from drivers.controller.simulated import FaultPlan, Pace, ServerLimits, SimulatedController
-from drivers.controller.simulated_faults import Fault, Target
-from service.probing import LOOK_PERIOD_S, Finding, Probe
-from service.restart_watch import RestartWatch
+from drivers.controller.mailbox.mailbox import MailboxLayout
+from drivers.controller.modbus.client import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
+from drivers.controller.modbus.requests import read_registers, registers_of, stream_of, write_register, write_registers
+from drivers.controller.simulated.controller import FaultPlan, Pace, ServerLimits, SimulatedController
+from drivers.controller.simulated.faults import Fault, Target
+from service.commissioning.probing import LOOK_PERIOD_S, Finding, Probe
+from service.daemon.restart_watch import RestartWatch
 from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 from tests.interop.programs import libmodbus_tcp
 from tests.interop.shifted_program import program

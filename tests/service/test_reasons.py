@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from contour.acceptance import Refusal
+from contour.acceptance.acceptance import Refusal
 from service.cli.main import main
 from service.reasons import Language, Outcome, Reason
-from service.reasons_page import page
+from service.reasons_doc import page
 
 ROOT = Path(__file__).parents[2]
 # written from the protocol's table
@@ -57,7 +57,7 @@ def test_what_the_core_refuses_for_stands_in_the_table_under_the_same_name() -> 
 
 
 def test_the_docs_page_is_fresh() -> None:
-    fresh = "python -m service.reasons_page docs/reasons.md"
+    fresh = "python -m service.reasons_doc docs/reasons.md"
     assert (ROOT / "docs" / "reasons.md").read_text(encoding="utf-8") == page(), f"write it anew: {fresh}"
 
 

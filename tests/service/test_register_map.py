@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox import HEADER_FIELDS, LINK_FIELDS, SERVICE_FIELDS, MailboxLayout
+from drivers.controller.mailbox.mailbox import HEADER_FIELDS, LINK_FIELDS, SERVICE_FIELDS, MailboxLayout
 from service.cli.main import main
-from service.register_map import MEANINGS, register_map
+from service.link.register_map import MEANINGS, register_map
 
 ROOT = Path(__file__).parents[2]
 ROW = re.compile(r"^\| (\d+)(?:–(\d+))? \| (\d+)(?:–(\d+))? \| (\w+) \|", re.MULTILINE)
@@ -25,7 +25,9 @@ def rows(page: str) -> dict[tuple[int, str], tuple[int, int, int]]:
 
 def test_the_page_is_what_the_codec_makes_now() -> None:
     page = (ROOT / "docs" / "register-map.md").read_text(encoding="utf-8")
-    assert page == register_map(MailboxLayout()), "write it anew: python -m service.register_map docs/register-map.md"
+    assert page == register_map(MailboxLayout()), (
+        "write it anew: python -m service.link.register_map docs/register-map.md"
+    )
 
 
 def test_every_register_of_the_layout_has_one_row_and_no_other_has() -> None:

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.simulated_faults import Fault
-from drivers.controller.simulated_scenario import EVENT_KINDS, Event, MachineSettings
-from service.config_file import ConfigError
-from service.scenario_file import load_scenario
-from service.scenario_reference import with_tables
+from drivers.controller.simulated.faults import Fault
+from drivers.controller.simulated.scenario import EVENT_KINDS, Event, MachineSettings
+from service.commissioning.scenario_file import load_scenario
+from service.commissioning.scenario_reference import with_tables
+from service.config.config_file import ConfigError
 
 DOCS = Path(__file__).parents[2] / "docs"
 EXAMPLES = sorted((DOCS / "scenarios").glob("*.yaml"))
@@ -91,4 +91,6 @@ def test_a_file_that_is_not_there_names_the_option(tmp_path: Path) -> None:
 
 def test_the_tables_of_the_page_are_fresh() -> None:
     page = (DOCS / "simulated-controller.md").read_text()
-    assert page == with_tables(page), "run python -m service.scenario_reference docs/simulated-controller.md"
+    assert page == with_tables(page), (
+        "run python -m service.commissioning.scenario_reference docs/simulated-controller.md"
+    )

@@ -14,14 +14,14 @@ from pathlib import Path
 import pytest
 
 from drivers.trigger import TriggerUnavailable
-from service.executor import Executor
-from service.health import Health
-from service.journal import Job, Journal, TriggerStamp
-from service.journal_recovery import open_journal
+from service.jobs.executor import Executor
+from service.jobs.health import Health
+from service.jobs.trigger_queue import TriggerQueue
+from service.jobs.triggers import MOST_OWED, SerialTrigger
 from service.reasons import Outcome, Reason
+from service.records.journal import Job, Journal, TriggerStamp
+from service.records.journal_recovery import open_journal
 from service.state import StateMachine
-from service.trigger_queue import TriggerQueue
-from service.triggers import MOST_OWED, SerialTrigger
 from tests.service.waiting import until
 
 LINE = "/dev/ttyPanel"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from service.serial_panel import ANSWER_WITHIN_S, GONE_AFTER_S, NoEnd, ask
+from service.jobs.serial_panel import ANSWER_WITHIN_S, GONE_AFTER_S, NoEnd, ask
 
 
 class Line:

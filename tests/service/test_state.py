@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from service.health import Fault, Health
+from service.jobs.health import Fault, Health
 from service.reasons import Reason
 from service.state import TRANSITIONS, IllegalTransition, State, StateMachine
 

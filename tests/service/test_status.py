@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from service.health import Fault, Health
+from service.jobs.health import Fault, Health
+from service.jobs.status import status_line
 from service.reasons import Reason
 from service.state import State, StateMachine
-from service.status import status_line
 
 
 @pytest.mark.parametrize("reason", list(Reason))

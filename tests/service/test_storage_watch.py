@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from service.health import Health
-from service.journal import Journal
+from service.daemon.storage_watch import StorageLimits, StorageWatch
+from service.jobs.health import Health
 from service.reasons import Reason
+from service.records.journal import Journal
 from service.state import State, StateMachine
-from service.storage_watch import StorageLimits, StorageWatch
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ async def test_too_little_free_is_error_with_storage_full_until_a_tenth_more_is_
     tmp_path: Path, journal: Journal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     free = [200]
-    monkeypatch.setattr("service.storage_watch.free_bytes", lambda _path: free[0])
+    monkeypatch.setattr("service.daemon.storage_watch.free_bytes", lambda _path: free[0])
     health = Health(StateMachine())
     health.start()
     watch = StorageWatch(journal, tmp_path / "journal.sqlite", health, None, StorageLimits(100))
@@ -47,7 +47,7 @@ async def test_a_disk_that_cannot_be_looked_at_is_a_fault(
     def gone(_path: Path) -> int:
         raise OSError(5, "Input/output error")
 
-    monkeypatch.setattr("service.storage_watch.free_bytes", gone)
+    monkeypatch.setattr("service.daemon.storage_watch.free_bytes", gone)
     health = Health(StateMachine())
     await StorageWatch(journal, tmp_path / "journal.sqlite", health, None, StorageLimits(100)).look()
     fault = health.fault("storage")

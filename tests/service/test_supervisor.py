@@ -8,10 +8,10 @@ from contextlib import asynccontextmanager, suppress
 
 import pytest
 
-from service import supervisor
-from service.health import Health
+from service.daemon import supervisor
+from service.daemon.supervisor import RESTART_PAUSES_S, Supervisor
+from service.jobs.health import Health
 from service.state import State, StateMachine
-from service.supervisor import RESTART_PAUSES_S, Supervisor
 from tests.service.waiting import until
 
 
@@ -71,7 +71,7 @@ async def test_the_pauses_grow_up_to_a_bound(monkeypatch: pytest.MonkeyPatch) ->
             pauses.append(seconds)
         await sleep(0)
 
-    monkeypatch.setattr("service.supervisor.asyncio.sleep", noted)
+    monkeypatch.setattr("service.daemon.supervisor.asyncio.sleep", noted)
 
     async def broken() -> None:
         raise ZeroDivisionError

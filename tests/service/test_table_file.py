@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.taught_table import TaughtTable
+from contour.image.taught_table import TaughtTable
 from service.cli.main import main
-from service.table_file import TableFileError, TableRecord, load_table, save_table
+from service.measuring.table_file import TableFileError, TableRecord, load_table, save_table
 from tests.contour.test_taught_table import grid_table, with_block
 
 

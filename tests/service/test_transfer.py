@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.controller.mailbox import Answer, LinkBlock, Page, ServiceBlock, withdrawal
-from service.link import READS_FOR_TWO_ALIKE
+from drivers.controller.mailbox.mailbox import Answer, LinkBlock, Page, ServiceBlock, withdrawal
+from service.link.link import READS_FOR_TWO_ALIKE
+from service.link.transfer import Settlement, TransferCounter, TransferSettings
 from service.reasons import Outcome, Reason
-from service.transfer import Settlement, TransferCounter, TransferSettings
 from tests.service.scripted_controller import ScriptedController
 from tests.service.transferring import JOB, QUICK, SESSION, page, transferring
 from tests.service.waiting import until

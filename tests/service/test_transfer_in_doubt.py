@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.controller.mailbox import Answer
+from drivers.controller.mailbox.mailbox import Answer
+from service.link.transfer import Lifetime
 from service.reasons import Outcome, Reason
-from service.transfer import Lifetime
 from tests.service.scripted_controller import ScriptedController
 from tests.service.transferring import JOB, QUICK, transferring
 from tests.service.waiting import until

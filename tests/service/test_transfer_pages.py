@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.controller.mailbox import Answer, ContourMessage, Page, encode_pages, withdrawal
+from drivers.controller.mailbox.mailbox import Answer, ContourMessage, Page, encode_pages, withdrawal
+from service.link.transfer import Settlement
 from service.reasons import Outcome, Reason
-from service.transfer import Settlement
 from tests.service.scripted_controller import ScriptedController
 from tests.service.transferring import JOB, QUICK, SESSION, transferring
 

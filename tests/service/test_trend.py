@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from service.cli.main import main
-from service.trend_file import TrendFileError, TrendLine, append_trend, read_trend
-from service.trend_plot import trend_svg
+from service.measuring.trend_file import TrendFileError, TrendLine, append_trend, read_trend
+from service.measuring.trend_plot import trend_svg
 
 BEGIN = datetime(2026, 3, 1, 8, tzinfo=UTC)
 OLD = """time,check,calibration,pictures,mean_mm,p95_mm,worst_mm,limit_mm,verdict

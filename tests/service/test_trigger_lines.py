@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.trigger_lines import (
+from service.jobs.trigger_lines import (
     Malformed,
     PingRequest,
     StatusRequest,

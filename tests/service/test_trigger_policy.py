@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from service.executor import Executor
-from service.health import Fault, Health
-from service.journal import Journal, TriggerStamp
+from service.jobs.executor import Executor
+from service.jobs.health import Fault, Health
+from service.jobs.trigger_queue import Queued, Ticket, TriggerQueue, TriggerRefused
+from service.jobs.triggers import interval_trigger
 from service.reasons import Outcome, Reason
+from service.records.journal import Journal, TriggerStamp
 from service.state import StateMachine
-from service.trigger_queue import Queued, Ticket, TriggerQueue, TriggerRefused
-from service.triggers import interval_trigger
 from tests.service.test_executor import HeldRunner
 from tests.service.waiting import until
 

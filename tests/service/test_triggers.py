@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from drivers.trigger import TriggerUnavailable
-from service.health import Health
-from service.journal import Journal
+from service.jobs.health import Health
+from service.jobs.triggers import SerialTrigger
+from service.records.journal import Journal
 from service.state import StateMachine
-from service.triggers import SerialTrigger
 
 
 class HalfDeadPort:

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import yaml
 
-from contour.calibration import Alignment, SimpleCalibration
-from contour.position_uncertainty import PositionUncertainty
-from service.calibration_file import CalibrationRecord, load_calibration, load_record, save_record
+from contour.calibration.calibration import Alignment, SimpleCalibration
+from contour.calibration.position_uncertainty import PositionUncertainty
 from service.cli.main import main
+from service.measuring.calibration_file import CalibrationRecord, load_calibration, load_record, save_record
 
 SAMPLES = Path(__file__).parents[2] / "service" / "samples"
 PICTURE = SAMPLES / "2-l-shape.jpg"

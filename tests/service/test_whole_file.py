@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from service.whole_file import write_whole
+from service.atomic_file import write_whole
 
 
 def test_the_old_file_is_there_until_the_new_one_is_whole_and_keeps_its_mode(tmp_path: Path) -> None:

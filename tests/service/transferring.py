@@ -9,10 +9,10 @@ from contextlib import asynccontextmanager, suppress
 
 import numpy as np
 
-from drivers.controller.mailbox import ContourMessage, Page, encode_pages, withdrawal
-from service.link import Link, LinkSettings
+from drivers.controller.mailbox.mailbox import ContourMessage, Page, encode_pages, withdrawal
+from service.link.link import Link, LinkSettings
+from service.link.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
 from service.reasons import Reason
-from service.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
 from tests.service.scripted_controller import ScriptedController
 
 JOB, SESSION = 7, 9

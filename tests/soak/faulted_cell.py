@@ -16,23 +16,23 @@ import numpy as np
 
 from drivers.camera import CameraUnavailable
 from drivers.camera.simulated import SimulatedCamera
-from drivers.controller.layout import MailboxLayout
-from drivers.controller.simulated import (
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.simulated.controller import (
     AcceptedContour,
     FaultPlan,
     Pace,
     SimulatedController,
     TriggerNotPossible,
 )
-from drivers.controller.simulated_faults import Fault
-from drivers.controller.simulated_frames import FramingName
+from drivers.controller.simulated.faults import Fault
+from drivers.controller.simulated.frames import FramingName
 from service import wiring
-from service.config import Config
-from service.cycle import Observation
-from service.daemon import Daemon, Parts
-from service.journal import TriggerStamp
+from service.config.config import Config
+from service.daemon.daemon import Daemon, Parts
+from service.jobs.cycle import Observation
+from service.jobs.trigger_queue import TriggerRefused
+from service.records.journal import TriggerStamp
 from service.state import State
-from service.trigger_queue import TriggerRefused
 from tests.soak.crossed_line import crossed_line
 from tests.soak.promises import Evidence, Findings, Taken, judge, micrometres
 from tests.soak.random_contours import RandomContours

@@ -20,10 +20,10 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 
-from drivers.controller.layout import MailboxLayout
-from drivers.controller.simulated import AcceptedContour, FaultPlan, SimulatedController, TriggerNotPossible
-from drivers.controller.simulated_faults import Fault, targets_of
-from drivers.controller.simulated_frames import Request
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.simulated.controller import AcceptedContour, FaultPlan, SimulatedController, TriggerNotPossible
+from drivers.controller.simulated.faults import Fault, targets_of
+from drivers.controller.simulated.frames import Request
 from tests.soak.crossed_line import crossed_line
 from tests.soak.faulted_cell import Transport
 from tests.soak.promises import Evidence, Findings, Rings, Taken, acks, judge, logged_contours, micrometres

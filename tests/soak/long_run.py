@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 
 from benchmarks.daemon import resident_megabytes
-from service.cli.run import FILE_THREADS
+from service.cli.daemon.run import FILE_THREADS
 from tests.system.cell import SAMPLES, Cell
 from tests.system.processes import until
 

@@ -11,11 +11,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from drivers.controller.simulated import TriggerNotPossible
-from service.cycle import Observation
-from service.daemon import Daemon, Parts
-from service.journal import TriggerStamp
-from service.trigger_queue import TriggerRefused
+from drivers.controller.simulated.controller import TriggerNotPossible
+from service.daemon.daemon import Daemon, Parts
+from service.jobs.cycle import Observation
+from service.jobs.trigger_queue import TriggerRefused
+from service.records.journal import TriggerStamp
 from tests.soak.faulted_cell import CALIBRATION, RECOVERY_S, FaultedCell, Incident, Outcome, Terms
 from tests.soak.promises import Evidence, Findings, Rings, Side, judge_twins, micrometres
 from tests.soak.restored_cell import copy_journal, put_back

@@ -6,8 +6,8 @@ import random
 
 import numpy as np
 
-from contour.geometry import Contour, area
-from service.measure import Measurement, Measurer
+from contour.geometry.rings import Contour, area
+from service.measuring.measure import Measurement, Measurer
 
 
 class RandomContours(Measurer):

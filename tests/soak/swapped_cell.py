@@ -7,7 +7,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from service.config import Config
+from service.config.config import Config
 from tests.soak.faulted_cell import FaultedCell, Incident, Terms
 from tests.soak.promises import Evidence
 from tests.system.processes import jobs

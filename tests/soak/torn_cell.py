@@ -15,9 +15,9 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
-from drivers.controller.simulated import SimulatedController, TriggerNotPossible
-from service.config import Config
-from service.journal import Journal
+from drivers.controller.simulated.controller import SimulatedController, TriggerNotPossible
+from service.config.config import Config
+from service.records.journal import Journal
 from tests.soak.faulted_cell import FaultedCell, Incident, Terms
 from tests.soak.promises import Evidence
 from tests.system.processes import jobs

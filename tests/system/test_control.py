@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from pymodbus.client import ModbusTcpClient
 
-from service.control import ask
+from service.daemon.control import ask
 from tests.nobody import needs_root, python_as_nobody
 from tests.system.cell import Cell
 from tests.system.processes import combtrace, until
@@ -181,7 +181,7 @@ def test_without_rights_the_error_says_who_may(cell: Cell) -> None:
     cell.folder.chmod(0o755)
     done = python_as_nobody(
         # By its descriptor: pytest's own folders are closed to others.
-        "import os; from pathlib import Path; from service.control import ControlError, ask\n"
+        "import os; from pathlib import Path; from service.daemon.control import ControlError, ask\n"
         "state = Path('/proc/self/fd') / str(os.open(sys.argv[1], os.O_PATH))",
         "try:\n    print(ask(state, {'command': 'halt'}))\nexcept ControlError as error:\n    print(error)",
         cell.folder / "state",

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.simulated import SimulatedController
+from drivers.controller.simulated.controller import SimulatedController
 from service.reasons import Outcome
 from service.state import State
 from tests.pty_line import PtyLine

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from drivers.controller import Page, ServiceBlock
-from drivers.controller.mailbox import MailboxLayout
-from drivers.controller.modbus import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
+from drivers.controller.mailbox.mailbox import MailboxLayout
+from drivers.controller.modbus.client import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
 from tests.interop.programs import TCP_SERVERS, libmodbus_rtu, mbpoll_reads
 from tests.protocol_decoder import decode_contour, decode_service
 from tests.pty_line import PtyLine

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.requests import READ_REGISTERS
-from drivers.controller.simulated import SimulatedController
-from drivers.controller.simulated_program import Pace
+from drivers.controller.modbus.requests import READ_REGISTERS
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.program import Pace
 from service import wiring
-from service.executor import ROOM
-from service.journal import TriggerStamp
+from service.jobs.executor import ROOM
 from service.reasons import Outcome
+from service.records.journal import TriggerStamp
 from service.state import State
 from service.wiring import WiringError
 from tests.drivers.controller.fault_proxy import Fate, FaultProxy
@@ -43,7 +43,7 @@ def other_door(controller: SimulatedController, writes: list[bytes] | None = Non
 
 @pytest.fixture
 def short_watch(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("service.ownership.WATCH_S", 1.2)  # longer than a heartbeat's period
+    monkeypatch.setattr("service.link.ownership.WATCH_S", 1.2)  # longer than a heartbeat's period
 
 
 async def test_a_second_daemon_of_this_machine_on_the_same_controller_does_not_start(tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ async def test_an_observer_settles_no_job_in_flight_and_says_what_to_put_back(tm
 async def test_settings_changed_while_a_job_is_in_flight_settle_it_only_once_they_are_put_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.daemon.STOP_BOUND_S", 0.2)
+    monkeypatch.setattr("service.daemon.daemon.STOP_BOUND_S", 0.2)
     async with SimulatedController(pace=Pace(check_scans=200)) as controller:
         async with wired(tmp_path, tcp(controller.port, ack_timeout_s=10)) as one:
             await one.ready()

@@ -19,8 +19,8 @@ from typing import Any
 
 import pytest
 
-from service.control import ask
-from service.web.answers import Drawing, Job, Jobs, Notes, Reasons, ServiceState
+from service.daemon.control import ask
+from service.web.models import Drawing, Job, Jobs, Notes, Reasons, ServiceState
 from tests.real_parts import need_program
 from tests.system.cell import Cell
 from tests.system.page_client import OTHER_TOKEN, TOKEN, Client, token_file

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from service.config_file import load_config
-from service.lock import NameLock
+from service.config.config_file import load_config
+from service.daemon.lock import NameLock
 from service.wiring import controller_names
 from tests.interop.programs import TCP_SERVERS
 from tests.interop.shifted_program import program

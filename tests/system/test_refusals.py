@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from pymodbus.client import ModbusTcpClient
 
-from contour.sentinels import see_sentinels
-from service.calibration_file import load_record, save_record
+from contour.calibration.fixed_marks import see_sentinels
+from service.measuring.calibration_file import load_record, save_record
 from service.reasons import Reason
 from tests.system.cell import SAMPLES, Cell
 from tests.system.processes import combtrace, until

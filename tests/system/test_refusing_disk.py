@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from service.control import ask
-from service.executor import ROOM
+from service.daemon.control import ask
+from service.jobs.executor import ROOM
 from tests.real_parts import missing
 from tests.system.cell import Cell
 from tests.system.page_client import Client, token_file

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from service.cli.run import FILE_THREADS
+from service.cli.daemon.run import FILE_THREADS
 from tests.real_parts import missing
 from tests.soak.long_run import run
 from tests.system.cell import Cell

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from service.control import MOST_STREAMS, ask
+from service.daemon.control import MOST_STREAMS, ask
 from tests.system.cell import Cell
 from tests.system.processes import COMBTRACE, ENVIRONMENT, combtrace, jobs
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from drivers.controller import ServiceBlock
-from drivers.controller.mailbox import ContourMessage, MailboxLayout, WordOrder, encode_pages, micrometres
-from drivers.controller.modbus import ModbusController, ModbusRtuOverTcpController, ModbusTcpController
-from drivers.controller.simulated import SimulatedController
+from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, WordOrder, encode_pages, micrometres
+from drivers.controller.modbus.client import ModbusController, ModbusRtuOverTcpController, ModbusTcpController
+from drivers.controller.simulated.controller import SimulatedController
 from tests.protocol_decoder import decode_contour
 from tests.real_parts import missing, need_program
 

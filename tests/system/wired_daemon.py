@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from contour.geometry import Contour
+from contour.geometry.rings import Contour
 from drivers.camera.simulated import SimulatedCamera
 from service import wiring
-from service.config import Config
-from service.daemon import Daemon, Parts
-from service.journal import Job, TriggerStamp
-from service.measure import Measurement
+from service.config.config import Config
+from service.daemon.daemon import Daemon, Parts
+from service.measuring.measure import Measurement
+from service.records.journal import Job, TriggerStamp
 from service.state import State
 from tests.service.waiting import until
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import FrameUnusable
-from drivers.camera.decode import decode_picture
+from drivers.camera.files.decode import decode_picture
 
 if TYPE_CHECKING:
     from drivers.camera.v4l2.formats import PictureFormat

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.camera import FrameUnusable
-from drivers.camera.decode import MAX_PIXELS, decode_picture, read_picture
-from drivers.camera.headers import HeaderError, read_header
+from drivers.camera.files.decode import MAX_PIXELS, decode_picture, read_picture
+from drivers.camera.files.headers import HeaderError, read_header
 
 HEIGHT, WIDTH = 97, 131
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.camera import CameraTimeout, CameraUnavailable, FrameUnusable
-from drivers.camera.files import FileCamera
+from drivers.camera.files.camera import FileCamera
 
 
 def write_picture(path, grey):

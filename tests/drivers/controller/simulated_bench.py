@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivers.controller.mailbox import ContourMessage, MailboxLayout, Page, crc32_of, encode_pages
-from drivers.controller.simulated_contour import AcceptedContour
-from drivers.controller.simulated_memory import RetainedMemory
-from drivers.controller.simulated_program import ControllerProgram, judge_by_geometry
-from drivers.controller.simulated_verdict import Verdict
-from drivers.controller.simulated_watch import ClientWatch
+from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, Page, crc32_of, encode_pages
+from drivers.controller.simulated.contour import AcceptedContour
+from drivers.controller.simulated.memory import RetainedMemory
+from drivers.controller.simulated.program import ControllerProgram, judge_by_geometry
+from drivers.controller.simulated.verdict import Verdict
+from drivers.controller.simulated.watch import ClientWatch
 from tests.protocol_decoder import Layout, Link, Service, encode_service
 
 EXTERIOR = np.array([[0, 0], [100_000, 0], [100_000, 50_000], [0, 50_000]])

@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.chunks import page_starts, spans
-from drivers.controller.requests import LONGEST_READ, LONGEST_WRITE
+from drivers.controller.mailbox.page_spans import page_starts, spans
+from drivers.controller.modbus.requests import LONGEST_READ, LONGEST_WRITE
 
 HEADER_PAIRS = [(2, 4), (8, 10), (10, 12), (12, 16), (16, 20), (20, 22), (22, 24), (24, 26), (28, 30)]
 

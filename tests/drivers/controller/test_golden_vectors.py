@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from drivers.controller.golden_vectors import as_text
+from drivers.controller.mailbox.golden_vectors import as_text
 from tests.protocol_decoder import decode_contour, decode_header, decode_link, decode_service, page_crc
 
 FILE = Path(__file__).parents[3] / "docs" / "golden-vectors.json"
@@ -24,7 +24,7 @@ def rings(contour: dict[str, Any]) -> tuple[tuple[tuple[int, int], ...], ...]:
 
 def test_the_file_is_what_the_codec_makes_now() -> None:
     assert FILE.read_text(encoding="utf-8") == as_text(), (
-        "write it anew: python -m drivers.controller.golden_vectors docs/golden-vectors.json"
+        "write it anew: python -m drivers.controller.mailbox.golden_vectors docs/golden-vectors.json"
     )
 
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.byte_channel import ByteChannel
-from drivers.controller.looking import RAREST, Looking
+from drivers.controller.modbus.byte_channel import ByteChannel
+from drivers.controller.modbus.looking import RAREST, Looking
 
 
 def waits_to_the_next_look(known: Looking) -> int:

@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from drivers.controller import ContourTooLarge, ControllerError, MailboxError
-from drivers.controller.mailbox import (
+from drivers.controller.mailbox.mailbox import (
     HEADER_FIELDS,
     LINK_FIELDS,
     SERVICE_FIELDS,
@@ -303,5 +303,5 @@ def test_every_mailbox_error_is_a_controller_error() -> None:
 
 
 def test_the_codec_is_imported_without_the_modbus_library() -> None:
-    program = "import sys, drivers.controller.mailbox; sys.exit('pymodbus' in sys.modules)"
+    program = "import sys, drivers.controller.mailbox.mailbox; sys.exit('pymodbus' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

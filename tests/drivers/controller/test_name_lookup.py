@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from drivers.controller import ControllerUnavailable
-from drivers.controller.modbus import ModbusTcpController
-from drivers.controller.name_lookup import addresses_of
-from drivers.controller.simulated import SimulatedController
+from drivers.controller.modbus.client import ModbusTcpController
+from drivers.controller.modbus.name_lookup import addresses_of
+from drivers.controller.simulated.controller import SimulatedController
 
 NAME = "cutter.plant.example"
 PATIENT_S = 30.0

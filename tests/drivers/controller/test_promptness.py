@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.promptness import HOLD_S, PROMPT_S, WAIT_S, Promptness
+from drivers.controller.modbus.reply_waiting import HOLD_S, PROMPT_S, WAIT_S, Promptness
 
 PROMPT = PROMPT_S / 10
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller import ControllerNonsense
-from drivers.controller.frames import Frames, RtuFrames, TcpFrames
-from drivers.controller.requests import (
+from drivers.controller.modbus.framing import Frames, RtuFrames, TcpFrames
+from drivers.controller.modbus.requests import (
     Request,
     read_registers,
     registers_of,

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from drivers.controller import ControllerError, ControllerUnavailable
-from drivers.controller.mailbox import ServiceBlock, encode_service
-from drivers.controller.simulated import AcceptedContour, SimulatedController
+from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
+from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
 from tests.drivers.controller.raw_client import SESSION, Client, page, simulated
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")

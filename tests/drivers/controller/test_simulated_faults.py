@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.layout import MailboxLayout
-from drivers.controller.simulated import FaultPlan, SimulatedController
-from drivers.controller.simulated_faults import FAULT_KINDS, Fault, targets_of
-from drivers.controller.simulated_frames import QUIET_S, BadFrame, RtuFraming, TcpFraming, crc16
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.simulated.controller import FaultPlan, SimulatedController
+from drivers.controller.simulated.faults import FAULT_KINDS, Fault, targets_of
+from drivers.controller.simulated.frames import QUIET_S, BadFrame, RtuFraming, TcpFraming, crc16
 from tests.drivers.controller.raw_client import Client, page, simulated
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")

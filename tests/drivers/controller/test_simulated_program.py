@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox import MailboxLayout, Page, withdrawal
-from drivers.controller.simulated_contour import AcceptedContour
-from drivers.controller.simulated_memory import RetainedMemory
-from drivers.controller.simulated_program import Pace, TriggerNotPossible
+from drivers.controller.mailbox.mailbox import MailboxLayout, Page, withdrawal
+from drivers.controller.simulated.contour import AcceptedContour
+from drivers.controller.simulated.memory import RetainedMemory
+from drivers.controller.simulated.program import Pace, TriggerNotPossible
 from tests.drivers.controller.simulated_bench import EXTERIOR, SESSION, Bench, pages, sealed
 from tests.protocol_decoder import Link
 

@@ -8,7 +8,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from drivers.controller.mailbox import MailboxLayout, Page, withdrawal
+from drivers.controller.mailbox.mailbox import MailboxLayout, Page, withdrawal
 from tests.drivers.controller.simulated_bench import EXTERIOR, SESSION, Bench, pages, sealed
 from tests.played_controller import PlayedController
 from tests.protocol_decoder import Layout

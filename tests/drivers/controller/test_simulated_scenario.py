@@ -8,9 +8,9 @@ from contextlib import asynccontextmanager, suppress
 
 import pytest
 
-from drivers.controller.mailbox import ServiceBlock, encode_service
-from drivers.controller.simulated import SimulatedController
-from drivers.controller.simulated_scenario import Event, MachineSettings, Play, Scenario, machine_options
+from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.scenario import Event, MachineSettings, Play, Scenario, machine_options
 from tests.drivers.controller.raw_client import SESSION, Client, page
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")

@@ -11,8 +11,8 @@ from collections.abc import AsyncIterator
 import pytest
 
 from drivers.controller import ControllerUnavailable
-from drivers.controller.mailbox import ServiceBlock, encode_service
-from drivers.controller.simulated import SimulatedController
+from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
+from drivers.controller.simulated.controller import SimulatedController
 from tests.drivers.controller.rtu_frames import crc16
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")

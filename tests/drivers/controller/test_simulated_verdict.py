@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.controller.mailbox import Page, ServiceBlock, encode_service
-from drivers.controller.simulated_verdict import KINDS, Verdict
+from drivers.controller.mailbox.mailbox import Page, ServiceBlock, encode_service
+from drivers.controller.simulated.verdict import KINDS, Verdict
 from tests.drivers.controller.raw_client import SESSION, Client, page, simulated
 from tests.drivers.controller.simulated_bench import sealed
 

@@ -7,9 +7,9 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from drivers.controller.connection import MOST_SINGLE_IN_A_ROW
-from drivers.controller.mailbox import MailboxLayout, Page, ServiceBlock
-from drivers.controller.modbus import LONGEST_EXCHANGE_S, ModbusRtuController, RequestLimits, SerialLine
+from drivers.controller.mailbox.mailbox import MailboxLayout, Page, ServiceBlock
+from drivers.controller.modbus.client import LONGEST_EXCHANGE_S, ModbusRtuController, RequestLimits, SerialLine
+from drivers.controller.modbus.request_queue import MOST_SINGLE_IN_A_ROW
 from tests.drivers.controller.line_server import LineServer
 from tests.pty_line import PtyLine
 

@@ -13,10 +13,10 @@ from collections.abc import AsyncIterator, Iterator
 import pytest
 
 from drivers.controller import ControllerUnavailable
-from drivers.controller.connection import Connection
-from drivers.controller.promptness import Promptness
-from drivers.controller.requests import read_registers, registers_of
-from drivers.controller.wires import TcpWire
+from drivers.controller.modbus.reply_waiting import Promptness
+from drivers.controller.modbus.request_queue import Connection
+from drivers.controller.modbus.requests import read_registers, registers_of
+from drivers.controller.modbus.transports import TcpWire
 
 READ = read_registers(0, 1)
 

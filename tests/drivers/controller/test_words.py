@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller import MailboxError
-from drivers.controller.words import Unpacking, fields, pack, words32
+from drivers.controller.mailbox.words import Unpacking, fields, pack, words32
 
 TABLE = fields((0, "short", "u16"), (1, "long", "u32"), (4, "signed", "i32"))
 ORDERS = st.sampled_from(["big", "little"])

@@ -12,10 +12,10 @@ from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
 from drivers.controller import ControllerNonsense, MailboxError
-from drivers.controller.chunks import page_starts, spans
-from drivers.controller.frames import Frames, RtuFrames, TcpFrames
-from drivers.controller.mailbox import decode_link, decode_service, encode_link, encode_service
-from drivers.controller.requests import (
+from drivers.controller.mailbox.mailbox import decode_link, decode_service, encode_link, encode_service
+from drivers.controller.mailbox.page_spans import page_starts, spans
+from drivers.controller.modbus.framing import Frames, RtuFrames, TcpFrames
+from drivers.controller.modbus.requests import (
     LONGEST_READ,
     Request,
     read_registers,

@@ -14,7 +14,7 @@ import pyogrio
 import pytest
 import shapely
 
-from contour.geometry import Contour, area
+from contour.geometry.rings import Contour, area
 from service.cli.main import main
 from service.export.document import ExportDocument, ExportError
 from service.export.dxf import to_dxf

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from contour.geometry import Contour, signed_area
+from contour.geometry.rings import Contour, signed_area
 from service.export.document import ExportDocument, ExportError
 from service.export.gcode import GcodeSettings, to_gcode
 from tests.real_parts import need_program

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from service.archived_job import ArchivedJob, EvidenceError
-from service.calibration_file import load_record
-from service.web.answers import Drawing, Grid
+from service.measuring.calibration_file import load_record
+from service.records.archived_job import ArchivedJob, EvidenceError
 from service.web.drawing import drawing, nice_step
+from service.web.models import Drawing, Grid
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"
 RECORD = load_record(SAMPLES / "calibration.yaml")

@@ -1,0 +1,216 @@
+"""How far a contour is from another account of the block: where the picture is busy at the scale of a cell.
+
+The other account knows the cell pitch and nothing else of what the tracing saw: the picture is reduced to about six
+pixels a pitch, what stands out from the mean over a pitch is averaged over a pitch, and the block is where that average
+is more than half of what it is in busy places nearby. Such an outline is good to about half a pitch, to one where a
+scratch or a shadow lies against the block, and has no sense of edges and corners; it is no contour to cut along, but it
+shows a part of the block left out, table taken for block, a spike or a notch too narrow to be either, and a contour
+that is too fat everywhere. One that is a cell too lean everywhere it cannot tell from a block in a soft shadow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.acceptance.block_level import told_by_level
+from contour.geometry.rings import Contour, Ring
+
+Picture = NDArray[np.uint8]
+Mask = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+_PITCH_PX = 6
+_SHARE_OF_LEVEL = 0.5
+_NEARBY_PITCHES = 8.0
+# Of the busiest places in the picture: less is table, however quiet its surroundings.
+_LEAST_SHARE = 0.3
+_BUSIEST_PERCENT = 98.0
+# A missing cell is no opening, and a scratch is no part of the block.
+_OPENING_PITCHES = 2.2
+_SCRATCH_PITCHES = 1.8
+# How far the busy region reaches beyond the block's edge: half of the window it is averaged over.
+_BLUR_PITCHES = 0.5
+_FRACTION_BITS = 4
+_POINTS_A_PITCH = 3.0
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """How far contour and busy region are apart at most, in pitches, and where, pixels (x, y).
+
+    pitches: width of the widest place where they differ, or how far a point of the contour lies from the busy region's
+    border, whichever is more. claimed: whether the contour has block there where the picture is quiet; else it leaves
+    busy picture out. outside_pitches: how far outside of the busy region the contour lies on the whole, the median
+    along all rings; negative inside.
+    """
+
+    pitches: float
+    place_px: tuple[float, float]
+    claimed: bool
+    outside_pitches: float
+
+    def moved(self, x: float, y: float) -> Disagreement:
+        """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
+        return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
+
+
+def disagreement(picture: Picture, contour: Contour, pitch_px: float) -> Disagreement:
+    """The widest disagreement between the contour, in pixels, and the busy part of `picture`, grey or BGR, uint8.
+
+    Width is that of the largest disc that fits into the difference; a spike or a notch has little, but its tip lies far
+    from the busy region's border. Busy parts that the contour does not reach do not count: several blocks are another
+    finding.
+    """
+    shrink = max(1, int(pitch_px / _PITCH_PX))
+    small = _reduced(picture, shrink)
+    pitch = pitch_px / shrink
+    busy = _without_small_gaps(_busy(small, pitch), (_OPENING_PITCHES * pitch) ** 2)
+    ours = _drawn(contour, busy.shape[:2], shrink)
+    around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * pitch)), np.uint8)
+    level = np.asarray(cv2.blur(small, (_odd(pitch), _odd(pitch))), np.uint8)
+    quiet_table = _but(_inverted(busy), around)
+    # Glare hides walls, and scratches crowd; but the one stays as light as the block, the other as the table.
+    told = told_by_level(level, np.asarray(cv2.bitwise_and(ours, busy), np.uint8), quiet_table)
+    # Squares cost a tenth of discs.
+    only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * pitch)) for mask in told)
+    theirs = _touched(_opened(_but(busy, only_table), _disc(_SCRATCH_PITCHES * pitch)), ours)
+    busy = np.asarray(cv2.bitwise_or(busy, only_block), np.uint8)
+    # The picture's border is no block, and block ends there.
+    outside = np.asarray(cv2.distanceTransform(_inverted(busy), cv2.DIST_L2, 3), np.float32)
+    inside = _distances(theirs)
+    points = _reduced_points(contour, pitch_px / _POINTS_A_PITCH, shrink)
+    farthest = [
+        (*_widest(_but(ours, busy)), True),
+        (*_widest(_but(theirs, around)), False),
+        (*_farthest(outside, points, 0.0), True),
+        (*_farthest(inside, points, _BLUR_PITCHES * pitch), False),
+    ]
+    apart, place, claims = max(farthest, key=lambda one: one[0])
+    x, y = ((value + 0.5) * shrink - 0.5 for value in place)
+    on_the_whole = float(np.median(_at(outside, points) - _at(inside, points)))
+    return Disagreement(apart / pitch, (x, y), claims, on_the_whole / pitch)
+
+
+def _reduced(picture: Picture, shrink: int) -> Picture:
+    if shrink == 1:
+        return picture
+    size = (max(1, picture.shape[1] // shrink), max(1, picture.shape[0] // shrink))
+    # A whole number of pixels each: averaging them is several times faster then.
+    whole = picture[: size[1] * shrink, : size[0] * shrink]
+    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _busy(small: Picture, pitch: float) -> Mask:
+    """Where the picture differs from its mean over a pitch as it does in comb, 0 or 255."""
+    window = _odd(pitch)
+    off = cv2.absdiff(small, cv2.blur(small, (window, window)))
+    if off.ndim == 3:
+        off = off.max(axis=2)
+    average = cv2.boxFilter(off, cv2.CV_32F, (window, window))
+    nearby = _odd(_NEARBY_PITCHES * pitch)
+    squares = cv2.boxFilter(average * average, cv2.CV_32F, (nearby, nearby))
+    # The mean that weighs busy places by how busy they are: beside the block it is the block's.
+    level = squares / np.maximum(cv2.boxFilter(average, cv2.CV_32F, (nearby, nearby)), 1e-3)
+    least = _LEAST_SHARE * float(np.percentile(level[::4, ::4], _BUSIEST_PERCENT))
+    busy = average > np.maximum(_SHARE_OF_LEVEL * level, least)
+    return np.asarray(busy, np.uint8) * np.uint8(255)
+
+
+def _without_small_gaps(mask: Mask, area_px2: float) -> Mask:
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(cv2.bitwise_not(mask), connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] < area_px2
+    small[0] = False
+    return np.asarray(np.where(small[labels], np.uint8(255), mask), np.uint8)
+
+
+def _opened(mask: Mask, shape: Mask) -> Mask:
+    """The mask without what is narrower than the shape."""
+    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, shape), np.uint8)
+
+
+def _drawn(contour: Contour, shape: tuple[int, int], shrink: int) -> Mask:
+    mask = np.zeros(shape, np.uint8)
+    rings = [_fixed_point((ring + 0.5) / shrink - 0.5) for ring in contour.rings]
+    cv2.fillPoly(mask, rings, 255, cv2.LINE_8, _FRACTION_BITS)
+    return mask
+
+
+def _fixed_point(ring: Ring) -> NDArray[np.int32]:
+    return np.asarray(np.rint(ring * (1 << _FRACTION_BITS)), np.int32)
+
+
+def _touched(mask: Mask, ours: Mask) -> Mask:
+    """The parts of `mask` that meet `ours`."""
+    count, labels, _, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
+    meets = np.bincount(labels[ours > 0], minlength=count) > 0
+    meets[0] = False
+    return np.asarray(np.where(meets[labels], np.uint8(255), np.uint8(0)), np.uint8)
+
+
+def _but(mask: Mask, other: Mask) -> Mask:
+    """What is in `mask` and not in `other`."""
+    return np.asarray(cv2.bitwise_and(mask, cv2.bitwise_not(other)), np.uint8)
+
+
+def _inverted(mask: Mask) -> Mask:
+    return np.asarray(cv2.bitwise_not(mask), np.uint8)
+
+
+def _distances(mask: Mask) -> Floats:
+    """Of each pixel in `mask` from what is not, pixels; 0 elsewhere. The picture's border ends a mask too."""
+    framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_CONSTANT)
+    return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1], np.float32)
+
+
+def _widest(difference: Mask) -> tuple[float, tuple[float, float]]:
+    """Diameter of the largest disc inside, in pixels, and its middle (x, y)."""
+    depth = _distances(difference)
+    y, x = np.unravel_index(int(depth.argmax()), depth.shape)
+    return 2.0 * float(depth[y, x]), (float(x), float(y))
+
+
+def _reduced_points(contour: Contour, spacing_px: float, shrink: int) -> NDArray[np.float64]:
+    """Points at equal spacing along all rings, in the reduced picture, shape (N, 2)."""
+    rings = [_along(ring, spacing_px) for ring in contour.rings]
+    return np.asarray((np.concatenate(rings) + 0.5) / shrink - 0.5, np.float64)
+
+
+def _along(ring: Ring, spacing: float) -> Ring:
+    closed = np.concatenate((ring, ring[:1]))
+    reached = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))))
+    at = np.linspace(0.0, reached[-1], max(4, int(np.ceil(reached[-1] / spacing))), endpoint=False)
+    between = np.column_stack((np.interp(at, reached, closed[:, 0]), np.interp(at, reached, closed[:, 1])))
+    # Tips are vertices, and as narrow as they like.
+    return np.concatenate((between, ring))
+
+
+def _at(values: Floats, points: NDArray[np.float64]) -> Floats:
+    """The values at the pixels that the points lie in, shape (N,)."""
+    last = np.array(values.shape[::-1]) - 1
+    x, y = np.clip(np.rint(points), 0, last).astype(np.intp).T
+    return np.asarray(values[y, x], np.float32)
+
+
+def _farthest(values: Floats, points: NDArray[np.float64], less: float) -> tuple[float, tuple[float, float]]:
+    """The largest value at a point, less so much, and that point (x, y)."""
+    there = _at(values, points)
+    k = int(there.argmax())
+    x, y = points[k].tolist()
+    return float(there[k]) - less, (x, y)
+
+
+def _disc(diameter: float) -> Mask:
+    size = _odd(diameter)
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
+
+
+def _square(side: float) -> Mask:
+    return np.ones((_odd(side), _odd(side)), np.uint8)
+
+
+def _odd(length: float) -> int:
+    return 2 * round(0.5 * length) + 1

@@ -1,0 +1,243 @@
+"""How well a picture shows a block's walls: sharpness, exposure, contrast, each measured and held against a limit.
+
+What is measured on a traced block is measured on small tiles along and inside its outline, in units of its own cells,
+so that the size of the picture does not matter. Where nothing was traced only the picture as a whole can be judged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry.rings import Contour, Ring
+from contour.walls.lightness import wall_light
+
+Picture = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+# So many pixels tell enough, and cost about a millisecond.
+_SAMPLED_PX = 60_000
+_MOST_TILES = 48
+_LEAST_TILE_PX = 16
+_TILE_PITCHES = 1.6
+_USUAL_PITCH_PX = 24.0
+# Walls and cells cover more than this of any tile; dust and glints less.
+_TAIL = 0.04
+# Spread between these tails of nothing but normal noise, in standard deviations.
+_TAILS_OF_NOISE = 3.5
+# What a fifth of normal deviates stay below in size, times what a second difference both ways adds up: 6 deviations.
+_SECOND_OF_NOISE = 0.2533 * 6.0
+# Steepest rise of a blurred step, and of a blurred line, over their height: 0.40 and 0.61 of 1/sigma.
+_STEEPEST = 0.5
+_FULL = 254
+
+# Of a picture in which nothing was traced.
+_LOOKED_AT_PX = 300_000
+_SPECKS = 0.002
+_DARK_LEVEL = 24.0
+_MOST_CLIPPED = 0.5
+_SOFTEST_EDGE_PX = 3.5
+_EDGE_REACH_PX = 12
+_LEAST_EDGE = 12.0
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How the walls of a block are seen.
+
+    level: grey level of what is brightest in it (96th percentile). contrast: from cells to walls, grey levels. noise:
+    standard deviation of a pixel. blur_px: standard deviation of the blur, in the direction in which it is worst.
+    pitch_px: of the cells. clipped_share: of the pixels at and inside the outline, those at full scale.
+    """
+
+    level: float
+    contrast: float
+    noise: float
+    blur_px: float
+    pitch_px: float
+    clipped_share: float
+
+
+@dataclass(frozen=True)
+class QualityLimits:
+    """Beyond these a contour is not trusted. Blur may reach the larger of a share of the pitch and a number of pixels:
+    cells of a few pixels cannot look sharper than the pixels are.
+    """
+
+    max_blur_pitches: float = 0.13
+    max_blur_px: float = 1.9
+    max_clipped_share: float = 0.25
+    min_level: float = 16.0
+    min_contrast: float = 8.0
+    min_contrast_to_noise: float = 4.0
+
+
+def block_quality(picture: Picture, contour: Contour, pitch_px: float | None) -> Quality:
+    """The quality of the walls within `contour` (pixels) in a picture, grey (H, W) or BGR (H, W, 3), uint8.
+
+    `pitch_px` None takes the place of an unknown pitch by a usual one.
+    """
+    pitch = pitch_px or _USUAL_PITCH_PX
+    tiles = _tiles(picture, contour.exterior, pitch)
+    light = wall_light(np.ascontiguousarray(tiles.reshape(-1, *tiles.shape[2:])))
+    light = light.reshape(tiles.shape[:3])
+    clipped = float(np.mean(tiles.reshape(*tiles.shape[:3], -1).max(axis=3) >= _FULL))
+    low, high = _tails(light)
+    noise = _noise(light)
+    contrast = np.maximum(high - low - _TAILS_OF_NOISE * noise, 0.0)
+    blur = _blur_px(light, contrast, noise)
+    return Quality(
+        level=float(np.median(high)),
+        contrast=float(np.median(contrast)),
+        noise=noise,
+        blur_px=blur,
+        pitch_px=pitch,
+        clipped_share=clipped,
+    )
+
+
+def quality_faults(quality: Quality, limits: QualityLimits) -> tuple[str, ...]:
+    """What is too bad, each as a sentence with the measured value, the limit and what to do; empty = good enough."""
+    faults = []
+    if quality.level < limits.min_level:
+        faults.append(
+            f"the block's brightest parts reach {quality.level:.0f} of 255 grey levels, at least {limits.min_level:g} "
+            "are needed. Give more light or a longer exposure"
+        )
+    if quality.clipped_share > limits.max_clipped_share:
+        faults.append(
+            f"{100 * quality.clipped_share:.0f} % of the block is overexposed (at full scale), at most "
+            f"{100 * limits.max_clipped_share:g} % is allowed. Give less light or a shorter exposure"
+        )
+    if quality.contrast < limits.min_contrast:
+        faults.append(
+            f"walls stand out of their cells by {quality.contrast:.1f} grey levels, at least {limits.min_contrast:g} "
+            "are needed. Check the light, the exposure and the lens"
+        )
+    most = max(limits.max_blur_pitches * quality.pitch_px, limits.max_blur_px)
+    if quality.blur_px > most:
+        faults.append(
+            f"walls are blurred by {quality.blur_px:.1f} px where cells are {quality.pitch_px:.0f} px apart, at most "
+            f"{most:.1f} px is allowed. Check the focus, clean the lens, keep block and camera still"
+        )
+    return tuple(faults)
+
+
+def lost_in_noise(quality: Quality, limits: QualityLimits) -> str | None:
+    """What says that there are no walls at all, as a sentence; None where they stand out of the noise."""
+    least = limits.min_contrast_to_noise * quality.noise
+    if quality.contrast >= least:
+        return None
+    return (
+        f"what looks like cells stands out by {quality.contrast:.1f} grey levels of a noise of {quality.noise:.1f}, at "
+        f"least {least:.1f} are needed. Check that a block lies in view, and the light"
+    )
+
+
+def _tiles(picture: Picture, exterior: Ring, pitch: float) -> Picture:
+    """Tiles along and inside the outline, shape (N, S, S) or (N, S, S, 3)."""
+    height, width = picture.shape[:2]
+    side = int(min(max(_LEAST_TILE_PX, round(_TILE_PITCHES * pitch)), height, width))
+    count = int(np.clip(_SAMPLED_PX // side**2, 6, _MOST_TILES))
+    low, high = np.floor(exterior.min(axis=0)), np.ceil(exterior.max(axis=0))
+    # A raster of the outline with some 40 samples along its longer side finds places inside it.
+    step = max(1.0, float((high - low).max()) / 40.0)
+    size = np.maximum(np.ceil((high - low) / step), 1).astype(int) + 1
+    inside = np.zeros((size[1], size[0]), np.uint8)
+    cv2.fillPoly(inside, [np.rint((exterior - low) / step).astype(np.int32)], 1)
+    rows, columns = np.nonzero(inside)
+    chosen = np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(int)
+    centres = low + step * np.column_stack([columns[chosen], rows[chosen]])
+    left = np.clip(np.rint(centres[:, 0] - side / 2), 0, width - side).astype(int)
+    top = np.clip(np.rint(centres[:, 1] - side / 2), 0, height - side).astype(int)
+    return np.stack([picture[y : y + side, x : x + side] for x, y in zip(left, top, strict=True)])
+
+
+def _tails(light: Picture) -> tuple[Floats, Floats]:
+    """Grey levels that _TAIL of each tile lies below and above, shape (N,) each."""
+    flat = light.reshape(len(light), -1)
+    cut = max(1, round(_TAIL * flat.shape[1]))
+    ordered = np.partition(flat, (cut, flat.shape[1] - 1 - cut), axis=1)
+    return ordered[:, cut].astype(np.float32), ordered[:, -1 - cut].astype(np.float32)
+
+
+def _noise(light: Picture) -> float:
+    """Standard deviation of a pixel's noise: what second differences both ways see where they see least else."""
+    part = light.astype(np.int16)
+    bent = part[:, :, :-2] - 2 * part[:, :, 1:-1] + part[:, :, 2:]
+    second = np.abs(bent[:, :-2] - 2 * bent[:, 1:-1] + bent[:, 2:])
+    # Differences are whole numbers: a fifth of them at 0 says no more than "below one".
+    fifth = np.partition(second.ravel(), second.size // 5)[second.size // 5]
+    return float((fifth + 0.5) / _SECOND_OF_NOISE)
+
+
+def _blur_px(light: Picture, contrast: Floats, noise: float) -> float:
+    """Blur in the direction in which it is worst: contrast over the steepest rise, median over the tiles.
+
+    A honeycomb has walls in three directions: none leaves a direction without rises, unless the block moved along it.
+    """
+    smooth = np.stack([cv2.GaussianBlur(tile, (3, 3), 0) for tile in light.astype(np.float32)])
+    dx = 0.5 * (smooth[:, 1:-1, 2:] - smooth[:, 1:-1, :-2])
+    dy = 0.5 * (smooth[:, 2:, 1:-1] - smooth[:, :-2, 1:-1])
+    worst = 0.0
+    for rise in (dx, dy, (dx + dy) * np.float32(0.7071), (dx - dy) * np.float32(0.7071)):
+        flat = np.abs(rise).reshape(len(rise), -1)
+        place = flat.shape[1] - 1 - max(1, flat.shape[1] // 100)
+        steepest = np.partition(flat, place, axis=1)[:, place]
+        # Of noise alone the steepest hundredth is 2.6 of its deviations, a quarter of a pixel's after the smoothing.
+        clean = np.sqrt(np.maximum(steepest**2 - (0.65 * noise) ** 2, 1e-6))
+        worst = max(worst, float(np.median(_STEEPEST * contrast / clean)))
+    # The smoothing's own blur comes off.
+    return float(np.sqrt(max(worst**2 - 0.5, 0.0)))
+
+
+def picture_faults(picture: Picture) -> tuple[str, ...]:
+    """What is wrong with a picture as a whole, in which nothing was traced: too dark, overexposed, nothing sharp.
+
+    Only what no table and no thing on it can look like: black all over, white over most of it, or things that stand out
+    but have no sharp edge anywhere.
+    """
+    hop = max(1, round(np.sqrt(picture.shape[0] * picture.shape[1] / _LOOKED_AT_PX)))
+    light = picture if picture.ndim == 2 else picture.max(axis=2)
+    brightest = float(np.quantile(light[::hop, ::hop], 1 - _SPECKS))
+    clipped = float(np.mean(light[::hop, ::hop] >= _FULL))
+    if brightest < _DARK_LEVEL:
+        return (
+            f"its brightest parts reach {brightest:.0f} of 255 grey levels, at least {_DARK_LEVEL:g} are needed. "
+            "Check the lamp, the exposure, and that the lens is not covered",
+        )
+    if clipped > _MOST_CLIPPED:
+        return (
+            f"{100 * clipped:.0f} % of it is overexposed (at full scale), at most {100 * _MOST_CLIPPED:g} % is "
+            "allowed. Give less light or a shorter exposure",
+        )
+    width = _edge_width_px(light)
+    if width is not None and width > _SOFTEST_EDGE_PX:
+        return (
+            f"its sharpest edges are blurred by {width:.1f} px, at most {_SOFTEST_EDGE_PX:g} px is allowed where no "
+            "cells can be seen. Check the focus, clean the lens, keep block and camera still",
+        )
+    return ()
+
+
+def _edge_width_px(light: Picture) -> float | None:
+    """Blur of the sharpest edges in a picture, pixels; None where nothing stands out of the noise.
+
+    The sharpest are those with the steepest rise for their height within a few pixels; a step blurred by sigma rises by
+    its height over 2.5 sigma.
+    """
+    smooth = cv2.GaussianBlur(light, (0, 0), 1.0).astype(np.float32)
+    dx, dy = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, scale=0.125), cv2.Sobel(smooth, cv2.CV_32F, 0, 1, scale=0.125)
+    steep = cv2.magnitude(dx, dy)
+    size = (2 * _EDGE_REACH_PX + 1,) * 2
+    around = np.ones(size, np.uint8)
+    height = cv2.dilate(smooth, around) - cv2.erode(smooth, around)
+    edges = height >= max(_LEAST_EDGE, 0.5 * float(np.quantile(height, 0.999)))
+    steepest = np.quantile(steep[edges] / height[edges], 0.99) if edges.any() else 0.0
+    if not edges.any() or steepest <= 0:
+        return None
+    # The smoothing's own blur comes off.
+    return float(np.sqrt(max((1 / (2.507 * steepest)) ** 2 - 1.2, 0.0)))

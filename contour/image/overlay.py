@@ -1,0 +1,158 @@
+"""A picture with its contour drawn on it, for people to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry.rings import Contour, Ring
+from contour.image import opencv as _cv
+from contour.tracing.tracing import check_picture
+
+Picture = NDArray[np.uint8]
+Colour = tuple[int, int, int]
+
+ACCEPTED: Colour = (80, 220, 60)
+REFUSED: Colour = (60, 60, 240)
+HOLE: Colour = (230, 170, 40)
+VERTEX: Colour = (40, 220, 250)
+"""Blue, green, red. Readable on both dark and bright, and apart for people who tell red from green poorly."""
+
+_TEXT: Colour = (235, 235, 235)
+
+_FRACTION_BITS = 4
+"""OpenCV draws at sixteenths of a pixel with these."""
+
+_UNIT_PX = 800
+"""Line widths and letters are made for a picture this wide and grow with it."""
+
+_VEIL = 0.35
+"""Share of the veil's colour over what the contour may be off by."""
+
+_MOST_MARKS = 400
+"""More vertices than this are a line of dots: they are left out."""
+
+
+def draw_overlay(
+    picture: Picture,
+    contour_px: Contour | None,
+    *,
+    caption: Sequence[str] = (),
+    refused: bool = False,
+    marks: bool = True,
+    uncertainty_px: float | None = None,
+    others_px: Sequence[Ring] = (),
+) -> Picture:
+    """The picture as BGR, shape (H, W, 3), with the contour, its vertices and lines of text; the input stays as it is.
+
+    Where `refused`, the text stands on rows of its own above the picture: what speaks against it may lie anywhere.
+
+    Exterior green, or red where `refused`, holes blue, vertices yellow (without `marks` none). The first caption line
+    is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `others_px`,
+    outlines of what lies besides, are drawn like the exterior, without vertices. Raises PictureError.
+    """
+    check_picture(picture)
+    canvas = _cv.bgr(picture)
+    unit = max(max(canvas.shape[:2]) / _UNIT_PX, 1.0)
+    text = _Caption.fitted(caption, canvas.shape[1], unit)
+    if not refused:
+        text.darken(canvas)
+    for other in others_px:
+        _draw_ring(canvas, other, REFUSED if refused else ACCEPTED, unit)
+    if contour_px is not None:
+        if uncertainty_px is not None:
+            _draw_band(canvas, contour_px, uncertainty_px, unit)
+        for hole in contour_px.holes:
+            _draw_ring(canvas, hole, HOLE, unit)
+        _draw_ring(canvas, contour_px.exterior, REFUSED if refused else ACCEPTED, unit)
+        if marks and contour_px.point_count <= _MOST_MARKS:
+            for ring in contour_px.rings:
+                _mark_vertices(canvas, ring, unit)
+    if refused:
+        canvas = text.above(canvas)
+    text.write(canvas, REFUSED if refused else ACCEPTED, unit)
+    return canvas
+
+
+def _fixed_point(points: NDArray[np.float64]) -> NDArray[np.int32]:
+    limit = 2**30
+    return np.asarray(np.clip(np.round(points * (1 << _FRACTION_BITS)), -limit, limit), np.int32)
+
+
+def _draw_ring(canvas: Picture, ring: Ring, colour: Colour, unit: float) -> None:
+    points = _fixed_point(ring).reshape(-1, 1, 2)
+    width = _line_width(unit)
+    # A dark line below keeps the colour visible on bright walls.
+    for tone, thickness in (((0, 0, 0), width + 2), (colour, width)):
+        cv2.polylines(canvas, [points], True, tone, thickness, cv2.LINE_AA, _FRACTION_BITS)
+
+
+def _draw_band(canvas: Picture, contour_px: Contour, half_px: float, unit: float) -> None:
+    width = round(2.0 * half_px)
+    if width <= _line_width(unit) + 2:
+        return
+    band = np.zeros(canvas.shape[:2], np.uint8)
+    for ring in contour_px.rings:
+        cv2.polylines(
+            band, [_fixed_point(ring).reshape(-1, 1, 2)], True, 255, min(width, 255), cv2.LINE_8, _FRACTION_BITS
+        )
+    inside = band > 0
+    canvas[inside] = (canvas[inside] * (1.0 - _VEIL) + np.array(VERTEX) * _VEIL).astype(np.uint8)
+
+
+def _line_width(unit: float) -> int:
+    return max(round(1.5 * unit), 1)
+
+
+def _mark_vertices(canvas: Picture, ring: Ring, unit: float) -> None:
+    radius = round(2.5 * unit) << _FRACTION_BITS
+    for x, y in _fixed_point(ring).tolist():
+        cv2.circle(canvas, (x, y), radius, VERTEX, -1, cv2.LINE_AA, _FRACTION_BITS)
+
+
+@dataclass(frozen=True)
+class _Caption:
+    """Lines of text with their place, shrunk so that the longest fits the picture's width."""
+
+    lines: Sequence[str]
+    sizes: Sequence[float]
+    margin: int
+    line_height: int
+
+    @classmethod
+    def fitted(cls, lines: Sequence[str], width: int, unit: float) -> _Caption:
+        margin = round(8 * unit)
+        sizes = [0.62 * unit] + [0.5 * unit] * (len(lines) - 1)
+        longest = max((_text_width(line, size) for line, size in zip(lines, sizes, strict=False)), default=0)
+        shrink = min(1.0, max(width - 2 * margin, 1) / max(longest, 1))
+        return cls(lines, [size * shrink for size in sizes], margin, max(round(24 * unit * shrink), 1))
+
+    @property
+    def height(self) -> int:
+        """Rows that the text takes."""
+        return self.margin + self.line_height * len(self.lines) if self.lines else 0
+
+    def darken(self, canvas: Picture) -> None:
+        """Darken the band that the text will stand on."""
+        band = canvas[: self.height]
+        band[:] = band // 3
+
+    def above(self, canvas: Picture) -> Picture:
+        """The canvas with black rows above it that the text will stand on."""
+        return np.vstack([np.zeros((self.height, *canvas.shape[1:]), np.uint8), canvas])
+
+    def write(self, canvas: Picture, colour: Colour, unit: float) -> None:
+        stroke = max(round(1.2 * unit), 1)
+        for k, (line, size) in enumerate(zip(self.lines, self.sizes, strict=False)):
+            place = (self.margin, self.margin + self.line_height * (k + 1) - round(0.35 * self.line_height))
+            tone = colour if k == 0 else _TEXT
+            cv2.putText(canvas, line, place, cv2.FONT_HERSHEY_SIMPLEX, size, tone, stroke, cv2.LINE_AA)
+
+
+def _text_width(line: str, size: float) -> int:
+    # A stroke of 2 and more takes the bold, wider letters.
+    return int(cv2.getTextSize(line, cv2.FONT_HERSHEY_SIMPLEX, size, 2)[0][0])

@@ -1,0 +1,108 @@
+"""Segments that flow into one another without a corner: one free curve, where that explains their witnesses better."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.outline.corners import Flags, Joints
+from contour.outline.free_curves import Curve, smooth_curve
+from contour.outline.labelling import PRICE_ARC, PRICE_LINE
+from contour.outline.lines_and_arcs import Complex, Index, Real, feet
+from contour.outline.runs import Segments
+from contour.outline.witnesses import Witnesses, cost
+
+# A straight edge longer than this is an edge, not a part of a free curve.
+_LONGEST_LINE_PITCHES = 8.0
+_PRICE_OF_FREEDOM = 4.0
+_SHARPEST = 0.7
+_MOST_TRIES = 10
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Segments (their indices, in order) that one curve replaces, and the witnesses it runs through."""
+
+    segments: tuple[int, ...]
+    curve: Curve
+    witnesses: np.ndarray[tuple[int], np.dtype[np.intp]]
+
+
+def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed: Real) -> list[Chain]:
+    """Chains whose spline is the shorter description: its misfit and parameters cost less than those of its lines and
+    arcs.
+
+    A run that is not is cut at its sharpest joint, and its parts are tried.
+    """
+    chains: list[Chain] = []
+    linked = _links(witnesses, segments, found)
+    waiting = _runs(segments, linked)
+    tries = 0
+    while waiting and tries < _MOST_TRIES:
+        members, closed = waiting.pop(0)
+        tries += 1
+        chain = _as_curve(witnesses, segments, members, closed, signed)
+        if chain is not None:
+            chains.append(chain)
+            continue
+        inner = members if closed else members[:-1]
+        sharpest = max(inner, key=lambda k: float(found.kink[k]))
+        at = members.index(sharpest) + 1
+        parts = [members[at:] + members[:at]] if closed else [members[:at], members[at:]]
+        waiting += [(part, False) for part in parts if len(part) > 1 and bool(segments.bend[part].any())]
+    return chains
+
+
+def _as_curve(witnesses: Witnesses, segments: Segments, members: list[int], closed: bool, signed: Real) -> Chain | None:
+    """The members as one curve, or None where lines and arcs are the shorter description."""
+    index = np.concatenate([(segments.first[k] + np.arange(segments.length[k])) % len(witnesses) for k in members])
+    if len(index) < 8:
+        return None
+    guide, place, length = _guide(witnesses, segments, members, index, closed)
+    sound = np.abs(signed[index]) < 4.0 * witnesses.outer[index]
+    curve = smooth_curve(witnesses, index, guide, place, length=length, sound=sound, closed=closed)
+    price = sum(PRICE_ARC if segments.bend[k] else PRICE_LINE for k in members)
+    present = float(cost(witnesses, signed[index], index).sum()) + price
+    if curve.nats + _PRICE_OF_FREEDOM * curve.freedom < present:
+        return Chain(tuple(members), curve, index)
+    return None
+
+
+def _links(witnesses: Witnesses, segments: Segments, found: Joints) -> Flags:
+    """True where a segment may flow into the next: no sharp turn, an arc on either side, no long straight edge."""
+    length = np.abs(found.end - np.roll(found.begin, 1))
+    supple = segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch)
+    links: Flags = (
+        (found.kink < _SHARPEST) & supple & np.roll(supple, -1) & (segments.bend | np.roll(segments.bend, -1))
+    )
+    return links
+
+
+def _runs(segments: Segments, linked: Flags) -> list[tuple[list[int], bool]]:
+    """Longest runs of linked segments, at least two, and whether the run is the whole ring."""
+    total = len(segments)
+    if total > 1 and linked.all():
+        return [(list(range(total)), True)]
+    found: list[tuple[list[int], bool]] = []
+    for begin in np.flatnonzero(~np.roll(linked, 1)):
+        members = [int(begin)]
+        while linked[members[-1]]:
+            members.append((members[-1] + 1) % total)
+        if len(members) > 1:
+            found.append((members, False))
+    return found
+
+
+def _guide(
+    witnesses: Witnesses, segments: Segments, members: list[int], index: Index, closed: bool
+) -> tuple[Complex, Real, float]:
+    """Feet of the witnesses at `index` on their own members, their arc length along them (rising), and the whole
+    length."""
+    owner = np.repeat(members, segments.length[members])
+    foot, tangent = feet(segments.models.take(owner), witnesses.points[index])
+    way = np.roll(foot, -1) - foot
+    middle = tangent + np.roll(tangent, -1)
+    forward = np.maximum((way * middle.conj()).real / np.maximum(np.abs(middle), 1e-9), 0.0)
+    place = np.concatenate([[0.0], np.cumsum(forward[:-1])])
+    return foot, place, float(place[-1] + (forward[-1] if closed else 0.0))

@@ -1,0 +1,36 @@
+"""The last word of wall-tips: an outline against the wall ends it was laid through."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contour.errors import NoBlockFound
+from contour.geometry.rings import Ring
+from contour.geometry.signed_distance import depth_inside
+from contour.tracing.tracing import Rectifier
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
+
+_FAR_OFF_PITCHES = 0.5
+
+
+def check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float, rectifier: Rectifier | None) -> None:
+    """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side.
+
+    A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
+    picture a lens bends a long edge by more than a small cell.
+    """
+    ends = evidence.kind != WitnessKind.OUTERMOST
+    places = evidence.points
+    if rectifier is not None:
+        ring, places = rectifier.rectify(ring), rectifier.rectify(places)
+    depth = depth_inside(ring, places)
+    # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
+    inside, outside = depth > _FAR_OFF_PITCHES * pitch, (depth < -_FAR_OFF_PITCHES * pitch)[ends]
+    for off, points in ((inside, evidence.points), (outside, evidence.points[ends])):
+        in_a_row = off & np.roll(off, 1) & np.roll(off, 2) & np.roll(off, 3)
+        if in_a_row.any():
+            x, y = points[np.argmax(in_a_row)]
+            raise NoBlockFound(
+                f"no block found: the outline that fits most wall ends passes those near ({x:.0f}, {y:.0f}) px by more "
+                "than half a cell. Check that nothing lies against the block, and that its edge is in focus"
+            )

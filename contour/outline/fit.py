@@ -1,0 +1,228 @@
+"""Witnesses of a ring become its outline: straight edges, arcs and free curves, met in corners; few vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.errors import NoBlockFound
+from contour.geometry.rings import Ring
+from contour.outline.bevels import bevelled
+from contour.outline.chains import Chain, free_curves
+from contour.outline.corners import Flags, Joints, arc_points, thinned, without_reversed
+from contour.outline.free_curves import curve_points, within
+from contour.outline.labelling import label
+from contour.outline.lines_and_arcs import Complex, Real, distance
+from contour.outline.missed_walls import overlooked, with_bounds
+from contour.outline.proposals import FEW, gather, propose
+from contour.outline.runs import Segments, around, fitted, runs
+from contour.outline.spread import unseen_share, vertex_sigma
+from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
+from contour.tracing.tracing import Rectifier
+from contour.walls.wall_evidence import RingEvidence
+
+_FEWEST = 6
+_ROUNDS = 4
+_LOOKS = 2
+# Residuals understate the noise where a segment has hardly more witnesses than parameters.
+_LEAST_NOISE = 0.7
+_CHORD_PX = 0.3
+_FLAT_PX = 0.08
+
+
+@dataclass(frozen=True)
+class FittedRing:
+    """An outline ring and how well its witnesses support it.
+
+    ring: vertices, shape (M, 2), raw pixels, in the coarse ring's direction. With a rectifier the outline is straight
+    between them in the rectified plane, not in the picture. inlier: witnesses that lie on the outline, shape (N,).
+    residual: signed distance of each witness from its own segment, shape (N,), pixels of the fitting plane, positive
+    outside. spread_px: robust standard deviation of the inliers. unseen_share: share of the outline farther than a
+    pitch from every inlier, 0 to 1. vertex_sigma_px: standard deviation of each vertex (across a segment, or of a
+    corner's place), shape (M,); it knows random errors only, so add a floor. segments: number of lines, arcs and
+    curves.
+    """
+
+    ring: Ring
+    inlier: NDArray[np.bool_]
+    residual: NDArray[np.float64]
+    spread_px: float
+    unseen_share: float
+    vertex_sigma_px: NDArray[np.float64]
+    segments: int
+
+
+def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None) -> FittedRing:
+    """The outline through a ring's witnesses, fitted in the rectified plane where `rectifier` is given.
+
+    Raises NoBlockFound where there are fewer than six witnesses, or no few of them lie on any line or arc.
+    """
+    if len(evidence.points) < _FEWEST:
+        raise NoBlockFound(
+            f"no outline: {len(evidence.points)} wall ends along a ring, {_FEWEST} or more are needed; "
+            "check focus and light, or that the ring is no single missing cell"
+        )
+    fitted = _fitted(evidence, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
+    bounds, left_out = overlooked(evidence, fitted.ring, pitch_px, rectifier)
+    for _ in range(_LOOKS):
+        if not len(bounds):
+            break
+        more, own = with_bounds(evidence, bounds)
+        try:
+            again = _fitted(more, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
+        except NoBlockFound:  # so many walls are left out that no line goes past all of them: nothing gets better
+            break
+        others, still = overlooked(evidence, again.ring, pitch_px, rectifier)
+        if still < left_out:
+            fitted, left_out = replace(again, inlier=again.inlier[own], residual=again.residual[own]), still
+        bounds = np.union1d(bounds, others) if len(others) else others
+    return fitted
+
+
+def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None) -> FittedRing:
+    """The outline through witnesses as they are."""
+    witnesses = prepare(evidence, pitch_px, rectifier)
+    witnesses = scaled(witnesses, max(noise_from_neighbours(witnesses), 0.7))
+    witnesses, segments = segmented(witnesses)
+    inlier = _inlying(witnesses, residuals(witnesses, segments))
+    segments, found = without_reversed(witnesses, segments, inlier)
+    residual = residuals(witnesses, segments)
+    chains = free_curves(witnesses, segments, found, residual)
+    for chain in chains:
+        residual[chain.witnesses] = chain.curve.signed
+    inlier = _inlying(witnesses, residual)
+    found = bevelled(witnesses, segments, found, inlier, _material(evidence, rectifier))
+    ring, owners = polygon(witnesses, segments, found, chains)
+    spread = _spread(residual[inlier], wall_px)
+    free = np.isin(np.arange(len(segments)), [k for chain in chains for k in chain.segments])
+    sigma = vertex_sigma(witnesses, segments, inlier, ring=ring, owners=owners, free=free, spread=spread)
+    vertices = np.column_stack([ring.real, ring.imag])
+    if rectifier is not None:
+        vertices = rectifier.unrectify(vertices)
+    pieces = len(segments) - sum(len(chain.segments) - 1 for chain in chains)
+    return FittedRing(vertices, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces)
+
+
+def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complex:
+    """Points of walls, and of what else may be material, in the fitting plane, shape (K,)."""
+    points = np.concatenate([evidence.walls.points, evidence.beside])
+    if rectifier is not None:
+        points = rectifier.rectify(points)
+    places: Complex = points[:, 0] + 1j * points[:, 1]
+    return places
+
+
+def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
+    """The ring as lines and arcs: label, refit, propose anew around what was found, until nothing changes.
+
+    The noise is measured again twice on the way; the witnesses come back with it. Raises NoBlockFound where nothing is
+    proposed.
+    """
+    proposals = propose(witnesses)
+    if not len(proposals):
+        raise NoBlockFound(
+            f"no outline: the {len(witnesses)} wall ends along a ring lie on no line and no arc; "
+            "check that the block is in view, and that nothing else with an edge is"
+        )
+    segments = runs(label(witnesses, proposals), proposals)
+    least = _LEAST_NOISE
+    for round_ in range(_ROUNDS):
+        segments = _refitted(witnesses, segments)
+        if round_ < 2:
+            noise = max(noise_from_residuals(witnesses, residuals(witnesses, segments)), least)
+            witnesses, least = scaled(witnesses, noise), least / noise
+        proposals = around(witnesses, segments)
+        if round_ == 1:
+            # With the noise known, and free of what the first labelling took for granted.
+            fresh = propose(witnesses)
+        if round_ == 1 or (round_ > 1 and len(witnesses) <= FEW):
+            proposals = gather([proposals, fresh])
+        found = runs(label(witnesses, proposals), proposals)
+        settled = round_ >= 1 and len(found) == len(segments) and bool((found.first == segments.first).all())
+        segments = found
+        if settled:
+            break
+    return witnesses, _refitted(witnesses, segments)
+
+
+def _refitted(witnesses: Witnesses, segments: Segments) -> Segments:
+    models, _ = fitted(witnesses, segments.models, segments.bend, segments.first, segments.length)
+    return replace(segments, models=models)
+
+
+def residuals(witnesses: Witnesses, segments: Segments) -> Real:
+    """Signed distance of each witness from its segment's model, shape (N,)."""
+    return distance(segments.models.take(segments.owner(len(witnesses))), witnesses.points)
+
+
+def _inlying(witnesses: Witnesses, residual: Real) -> Flags:
+    sigma = np.where(residual > 0.0, witnesses.outer, witnesses.inner)
+    inlying: Flags = (np.abs(residual) < 3.0 * sigma) & ~witnesses.bound
+    return inlying
+
+
+def _spread(residual: Real, wall_px: float) -> float:
+    """Robust standard deviation of the inliers; a wall's width where there are too few to tell."""
+    return float(1.4826 * np.median(np.abs(residual))) if len(residual) >= _FEWEST else max(wall_px, 1.0)
+
+
+def polygon(
+    witnesses: Witnesses, segments: Segments, found: Joints, chains: list[Chain]
+) -> tuple[Complex, NDArray[np.intp]]:
+    """Vertices of the ring, complex, and the two segments that meet in each, shape (M, 2).
+
+    Joints, and between them the chords of arcs and curves.
+    """
+    if len(segments) == 1:
+        return _alone(witnesses, segments)
+    total = len(segments)
+    curve_of = {chain.segments[0]: chain for chain in chains}
+    inside = {k for chain in chains for k in chain.segments[1:]}
+    begin = np.roll(found.begin, 1)
+    parts: list[Complex] = []
+    owners: list[tuple[int, int]] = []
+    for k in range(total):
+        if k in inside:
+            continue
+        chain = curve_of.get(k)
+        last = k if chain is None else chain.segments[-1]
+        if chain is not None:
+            start, stop = within(chain.curve, complex(begin[k]), complex(found.end[last]))
+            inner = curve_points(chain.curve, _CHORD_PX, start, stop)
+            if chain.curve.closed:
+                return inner, _members(chain, len(inner))
+        elif segments.bend[k]:
+            stops = complex(begin[k]), complex(found.end[k])
+            inner = arc_points(
+                segments.models.take((k,)), *stops, run=_run(witnesses, segments, k), tolerance=_CHORD_PX
+            )
+        else:
+            inner = np.zeros(0, dtype=np.complex128)
+        parts += [begin[k : k + 1], inner, found.end[last : last + 1]]
+        owners += [((k - 1) % total, k)]
+        owners += [(k, k)] * len(inner) if chain is None else [(int(a), int(b)) for a, b in _members(chain, len(inner))]
+        owners += [(last, (last + 1) % total)]
+    ring = np.concatenate(parts)
+    keep = thinned(ring, _FLAT_PX)
+    return ring[keep], np.array(owners, dtype=np.intp)[keep]
+
+
+def _members(chain: Chain, count: int) -> NDArray[np.intp]:
+    """The chain's segment at each of `count` vertices along it, twice, shape (count, 2); by share of its length."""
+    share = np.arange(count) * len(chain.segments) // max(count, 1)
+    return np.array(chain.segments, dtype=np.intp)[np.stack([share, share], axis=1)]
+
+
+def _run(witnesses: Witnesses, segments: Segments, k: int) -> float:
+    """Length of segment k along the coarse ring."""
+    inner = (segments.first[k] + np.arange(segments.length[k])) % len(witnesses)
+    return float(witnesses.gap[inner].sum())
+
+
+def _alone(witnesses: Witnesses, segments: Segments) -> tuple[Complex, NDArray[np.intp]]:
+    """The ring of a single circle."""
+    start = complex(witnesses.points[0])
+    ring = arc_points(segments.models.take((0,)), start, start, run=0.0, tolerance=_CHORD_PX, whole=True)
+    return ring, np.zeros((len(ring), 2), dtype=np.intp)

@@ -1,0 +1,215 @@
+"""Which line or arc each witness belongs to: the cheapest cyclic labelling under description-length prices
+(Viterbi)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.outline.lines_and_arcs import Complex, Index, Real, distance, feet
+from contour.outline.proposals import FEW, Proposals
+from contour.outline.reach import Reach, reach, supports
+from contour.outline.witnesses import Witnesses, cost
+
+# Nats for one more line or arc: its parameters at the precision the witnesses give, and where it begins.
+PRICE_LINE = 10.0
+PRICE_ARC = 15.0
+_CORNER = 1.0
+# A missing cell only ever makes a dent: a reflex corner has to be earned (around a hole, where all sides of a rectangle
+# meet in reflex corners, a convex one).
+_REFLEX = 5.0
+_REFLEX_PER_RADIAN = 6.0
+_JUMP = 16.0
+# Where a corner lies farther from its evidence than a witness's own distance, its cell must be missing: not unlikely,
+# but what hides more of a right angle than this many pitches, both edges together, is no single cell.
+_MISSING_CELL = 0.5
+_UNSEEN_CORNER = 4.4
+_UNSEEN_PER_PITCH = 4.0
+# A wall or a cell broken out of an edge hides so much of it; in longer gaps each outlier counts more.
+_UNSEEN_EDGE = 3.0
+_DEARER_PER_PITCH = 0.25
+_DEAREST = 2.0
+_REACH = 1.6
+_STATES = 8
+_STATES_OF_FEW, _PLACES_OF_FEW = 48, 1500
+_NEARBY = 3
+# Gains above this mark models of the present labelling, which must stay available.
+_PRESENT = 5e3
+# Of what calling it an outlier costs, saved by a witness that lies on a model.
+_LIES = 0.5
+_FAR = 1e6
+
+
+@dataclass(frozen=True)
+class Labelling:
+    """label: proposal of each witness, shape (N,). energy: nats of the whole ring."""
+
+    label: Index
+    energy: float
+
+
+def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
+    """The cheapest labelling of the ring's witnesses by `proposals`, each within its own stretch."""
+    here, last, following = _states(witnesses, proposals)
+    count = len(witnesses)
+    models = proposals.models.take(np.maximum(here, 0))
+    points = witnesses.points[:, None]
+    signed = distance(models, points)
+    unary = cost(witnesses, signed, np.arange(count)[:, None])
+    foot, tangent = feet(models, points)
+    reached = reach(witnesses, models, foot, last=last, following=following)
+    hidden = (reached.back + reached.ahead) / witnesses.pitch
+    unary = unary * np.clip(1.0 + _DEARER_PER_PITCH * (hidden - _UNSEEN_EDGE), 1.0, _DEAREST)
+    unary = np.where(here >= 0, unary, _FAR)
+    unary = unary + _REFLEX_PER_RADIAN * np.maximum(witnesses.rare * models.curvature, 0.0) * witnesses.gap[:, None]
+    facing = (tangent * witnesses.normal.conj()[:, None]).imag
+    unary = np.where(facing > -0.2, unary, unary + 20.0)
+    step = _steps(witnesses, proposals, here, foot, tangent, reached)
+    step = step + np.roll(unary, -1, axis=0)[:, None, :]
+    path, energy = _cheapest_cycle(step, unary)
+    return Labelling(here[np.arange(count), path], energy)
+
+
+def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Index, Index, Index]:
+    """The proposals that explain each witness's neighbourhood best, shape (N, A), -1 where fewer reach it; and the
+    nearest witness back and ahead that lies on the proposal, -1 where none does."""
+    count = len(witnesses)
+    margin = np.maximum(proposals.length // 2, 4)
+    reach = np.minimum(proposals.length + 2 * margin, count)
+    which = np.repeat(np.arange(len(proposals)), reach)
+    begin = np.cumsum(reach) - reach
+    place = ((proposals.first - margin)[which] + np.arange(len(which)) - begin[which]) % count
+    saved = witnesses.cap_inside[place] - cost(
+        witnesses, distance(proposals.models.take(which), witnesses.points[place]), place
+    )
+    lies = (saved > _LIES * witnesses.cap_inside[place]) & ~witnesses.bound[place]
+    last, following = supports(lies, place, begin[which], (begin + reach)[which])
+    running = np.concatenate([[0.0], np.cumsum(saved)])
+    here = np.arange(len(which))
+    low = np.maximum(here - _NEARBY, begin[which])
+    high = np.minimum(here + _NEARBY + 1, (begin + reach)[which])
+    score = running[high] - running[low] + 0.1 * np.clip(proposals.gain[which], 0.0, 200.0)
+    score = np.where(proposals.gain[which] > _PRESENT, 1e3 + score, score)
+    order = np.lexsort((-score, place))
+    ordered = place[order]
+    rank = np.arange(len(place)) - np.searchsorted(ordered, ordered)
+    most = _STATES if count > FEW else min(_STATES_OF_FEW, _PLACES_OF_FEW // count)
+    fits = rank < most
+    order, at, rank = order[fits], ordered[fits], rank[fits]
+    wide = int(rank.max()) + 1
+    states = np.full((3, count, wide), -1, dtype=np.intp)
+    states[:, at, rank] = which[order], last[order], following[order]
+    return states[0], states[1], states[2]
+
+
+def _steps(
+    witnesses: Witnesses, proposals: Proposals, here: Index, foot: Complex, tangent: Complex, reached: Reach
+) -> Real:
+    """Price of going from state a at witness i to state b at witness i + 1, shape (N, A, A)."""
+
+    def after(of_next: NDArray[Any]) -> NDArray[Any]:
+        return np.roll(of_next, -1, axis=0)[:, None, :]
+
+    following = np.roll(here, -1, axis=0)
+    joint = joint_cost(
+        foot[:, :, None],
+        tangent[:, :, None],
+        after(foot),
+        after(tangent),
+        gap=witnesses.gap[:, None, None],
+        unseen=reached.back[:, :, None] + after(reached.ahead),
+        sigma=np.maximum(witnesses.outer, np.roll(witnesses.outer, -1))[:, None, None],
+        pitch=witnesses.pitch,
+        rare=witnesses.rare,
+    )
+    price = np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
+    same = here[:, :, None] == following[:, None, :]
+    return np.where(same, 0.0, price + joint)
+
+
+def joint_cost(
+    foot: Complex,
+    tangent: Complex,
+    next_foot: Complex,
+    next_tangent: Complex,
+    *,
+    gap: Real,
+    unseen: Real,
+    sigma: Real,
+    pitch: float,
+    rare: float,
+) -> Real:
+    """Nats of a joint between two models, given their feet and tangents at the last and the next witness (shapes
+    broadcast).
+
+    unseen: pixels from the last witness that lies on the one model to `foot`, and from `next_foot` to the first that
+    lies on the other, together. rare: sign of the turns that have to be earned.
+
+    A corner: the tangents meet ahead of the one and behind the other, within reach of the evidence. A smooth join:
+    small turn, small step aside. Else a jump at a fixed price.
+    """
+    way = next_foot - foot
+    turn = tangent.conj() * next_tangent
+    sine = turn.imag
+    reflex = _REFLEX_PER_RADIAN * np.maximum(rare * np.angle(turn), 0.0)
+    safe = np.where(np.abs(sine) > 0.05, sine, 1.0)
+    ahead = (way.conj() * next_tangent).imag / safe
+    behind = (tangent.conj() * way).imag / safe
+    slack, most = 0.3 * pitch, _REACH * pitch + gap
+    excess = (
+        np.maximum(np.maximum(-ahead - slack, ahead - most), 0.0) ** 2
+        + np.maximum(np.maximum(-behind - slack, behind - most), 0.0) ** 2
+    )
+    corner = _CORNER + reflex + _REFLEX * (rare * sine > 0.0) + 8.0 * excess / pitch**2
+    # A cell in a corner touches its edges at a distance that goes with the cotangent of half the angle between them.
+    hidden = (unseen + ahead + behind) / pitch + 1.0 - np.abs(sine) / np.maximum(1.0 + turn.real, 0.2)
+    corner = corner + _MISSING_CELL * np.clip(hidden - _UNSEEN_CORNER + 2.0, 0.0, 1.0)
+    corner = corner + _UNSEEN_PER_PITCH * np.maximum(hidden - _UNSEEN_CORNER, 0.0)
+    corner = np.where(np.abs(sine) > 0.05, corner, np.inf)
+    middle = tangent + next_tangent
+    aside = (middle.conj() * way).imag / np.maximum(np.abs(middle), 1e-6)
+    smooth = 0.25 * (aside / sigma) ** 2 + 12.0 * np.where(turn.real > 0.0, sine**2, 1.0)
+    return np.minimum(np.minimum(corner, smooth), _JUMP + reflex)
+
+
+def _cheapest_cycle(step: Real, first: Real) -> tuple[Index, float]:
+    """Cheapest closed path: step[i] holds prices from i to i + 1 (cyclic), with the price of being there; and its
+    price.
+
+    An open pass finds the path's longest run; a second pass starts and ends in the middle of it, in its state.
+    """
+    count = len(step)
+    start = int((first < _FAR).sum(axis=1).argmin())
+    path, _ = _cheapest_path(np.roll(step, -start, axis=0), first[start], None)
+    change = np.flatnonzero(np.diff(path, prepend=-1, append=-1))
+    longest = int(np.diff(change).argmax())
+    anchor = int(change[longest] + change[longest + 1]) // 2
+    state = int(path[anchor])
+    anchor = (anchor + start) % count
+    initial = np.full(step.shape[1], _FAR)
+    initial[state] = 0.0
+    path, energy = _cheapest_path(np.roll(step, -anchor, axis=0), initial, state)
+    return np.roll(path, anchor), energy
+
+
+def _cheapest_path(step: Real, initial: Real, closing: int | None) -> tuple[Index, float]:
+    """Cheapest path from the initial prices, open or (where `closing` is a state) back to that state, and its price."""
+    count, width = step.shape[0], step.shape[1]
+    back = np.empty((count, width), dtype=np.intp)
+    room = np.empty((width, width))
+    total = initial
+    for i in range(count - 1):
+        np.add(total[:, None], step[i], out=room)
+        room.argmin(axis=0, out=back[i])
+        total = room.min(axis=0)
+    if closing is not None:
+        total = total + step[count - 1, :, closing]
+    end = int(total.argmin())
+    path = np.empty(count, dtype=np.intp)
+    path[count - 1] = end
+    for i in range(count - 2, -1, -1):
+        path[i] = back[i, path[i + 1]]
+    return path, float(total[end])

@@ -1,0 +1,246 @@
+"""Proposed lines and arcs: robust fits to windows of neighbouring witnesses, from four of them up to the whole ring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.outline.lines_and_arcs import (
+    Complex,
+    Index,
+    Models,
+    distance,
+    join,
+    refine,
+    through_pairs,
+    through_triples,
+)
+from contour.outline.witnesses import Witnesses, cost, weights, window_cost
+
+# Pairs and triples of sample places (shares of the window) that a fit starts from; far ones fix direction best.
+_PAIRS = np.array(
+    [
+        (0.0, 1.0),
+        (0.13, 0.87),
+        (0.27, 1.0),
+        (0.0, 0.6),
+        (0.4, 1.0),
+        (0.07, 0.8),
+        (0.2, 0.67),
+        (0.33, 0.93),
+        (0.0, 0.47),
+        (0.53, 1.0),
+    ]
+)
+_TRIPLES = np.array(
+    [
+        (0.0, 0.47, 1.0),
+        (0.13, 0.6, 1.0),
+        (0.0, 0.4, 0.87),
+        (0.13, 0.53, 0.87),
+        (0.27, 0.67, 1.0),
+        (0.0, 0.33, 0.73),
+        (0.07, 0.53, 0.93),
+        (0.2, 0.6, 0.93),
+        (0.07, 0.4, 0.8),
+        (0.2, 0.47, 0.8),
+    ]
+)
+# Sharper bends than these (radius in pitches) show in no more than two or three witnesses: corners, dents and debris.
+_LEAST_RADIUS_CONVEX = 1.25
+_LEAST_RADIUS_CONCAVE = 1.05
+_REDUNDANT = 2.0
+# Rings of so few witnesses, holes mostly, are looked at from every place.
+FEW = 64
+_SAME = 0.1
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """Models with the stretch of witnesses they may explain: first index and length (cyclic), and their gain in
+    nats."""
+
+    models: Models
+    bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    first: Index
+    length: Index
+    gain: np.ndarray[tuple[int], np.dtype[np.float64]]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def take(self, keep: Index | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Proposals:
+        """The proposals at `keep`."""
+        return Proposals(self.models.take(keep), self.bend[keep], self.first[keep], self.length[keep], self.gain[keep])
+
+
+def gather(parts: list[Proposals]) -> Proposals:
+    """All proposals of `parts`."""
+    return Proposals(
+        join([part.models for part in parts]),
+        np.concatenate([part.bend for part in parts]),
+        np.concatenate([part.first for part in parts]),
+        np.concatenate([part.length for part in parts]),
+        np.concatenate([part.gain for part in parts]),
+    )
+
+
+def samples(count: int, first: Index, length: Index, places: int) -> Index:
+    """`places` witness indices spread over each stretch, shape (K, places), cyclic; short stretches repeat some."""
+    share = np.linspace(0.0, 1.0, places)
+    offset = np.rint(share[None, :] * np.maximum(length[:, None] - 1, 0)).astype(np.intp)
+    return (first[:, None] + offset) % count
+
+
+def propose(witnesses: Witnesses) -> Proposals:
+    """Lines and arcs on windows of 4, 8, 16, ... witnesses and on the whole ring, without those a longer window
+    explains."""
+    count = len(witnesses)
+    if count <= FEW:
+        return _propose_everywhere(witnesses)
+    sizes = [size for size in (4, 6, *(8 * 2**k for k in range(11))) if size < count] + [count]
+    levels = [
+        level
+        for group in ([z for z in sizes if z <= 8], [z for z in sizes if z > 8])
+        for level in _levels(witnesses, group)
+    ]
+    kept: list[Proposals] = []
+    longer: list[Proposals] = []
+    for level in reversed(levels):
+        for fits in level:
+            worth = fits.gain > 0.0
+            for other in longer:
+                worth &= ~_explained(witnesses, fits, other)
+            kept.append(fits.take(worth))
+        longer = level
+    return gather(kept)
+
+
+def _propose_everywhere(witnesses: Witnesses) -> Proposals:
+    """Lines and arcs on windows of 2, 3, 4, 6, ... witnesses from every one on, each different one once.
+
+    A ring of few witnesses has edges of two or three of them.
+    """
+    count = len(witnesses)
+    sizes = [size for size in (2, 3, 4, 6, 8, 12, 16, 24, 32) if size < count] + [count]
+    parts = []
+    for group in ([z for z in sizes if z <= 8], [z for z in sizes if z > 8]):
+        parts += [fits for level in _levels(witnesses, group) for fits in level]
+    fits = gather(parts)
+    fits = fits.take(fits.gain > 0.0)
+    return fits.take(_different(witnesses, fits))
+
+
+def _different(witnesses: Witnesses, fits: Proposals) -> Index:
+    """Indices of proposals, best first, without those that save about the same as a better one at every witness."""
+    order = np.argsort(-fits.gain, kind="stable")
+    signed = distance(fits.models.take((order, None)), witnesses.points[None, :])
+    saved = np.maximum(witnesses.cap_inside - cost(witnesses, signed), 0.0)
+    total = saved.sum(axis=1)
+    kept: list[int] = []
+    while len(order):
+        kept.append(int(order[0]))
+        other = np.abs(saved - saved[0]).sum(axis=1) > _SAME * total
+        other[0] = False
+        order, saved, total = order[other], saved[other], total[other]
+    return np.array(kept, dtype=np.intp)
+
+
+def _levels(witnesses: Witnesses, sizes: list[int]) -> list[list[Proposals]]:
+    """Window fits of each size, lines and (from six witnesses on, five of few) arcs, all fitted in one batch."""
+    if not sizes:
+        return []
+    count = len(witnesses)
+    least_bend = 5 if count <= FEW else 6
+    plan = [
+        (np.arange(0, count, _stride(size, count), dtype=np.intp), size, bend)
+        for size in sizes
+        for bend in ((False, True) if size >= least_bend else (False,))
+    ]
+    first = np.concatenate([begins for begins, _, _ in plan])
+    length = np.concatenate([np.full(len(begins), size) for begins, size, _ in plan])
+    bends = np.concatenate([np.full(len(begins), bend) for begins, _, bend in plan])
+    fits = window_fits(witnesses, first, length, bends, 8 if sizes[-1] <= 8 else 16)
+    levels: dict[int, list[Proposals]] = {}
+    begin = 0
+    for begins, size, _ in plan:
+        levels.setdefault(size, []).append(fits.take(np.arange(begin, begin + len(begins))))
+        begin += len(begins)
+    return list(levels.values())
+
+
+def _stride(size: int, count: int) -> int:
+    if count <= FEW:
+        return 1 if size < count else count
+    return max(1, size // 4 if size != 6 else 2) if size < count else count
+
+
+def window_fits(
+    witnesses: Witnesses, first: Index, length: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]], places: int
+) -> Proposals:
+    """A robust line or arc for each window that begins at `first`: the best of a few through its points, refined
+    twice."""
+    index = samples(len(witnesses), first, length, places)
+    points = witnesses.points[index]
+    starts = _best_starts(witnesses, points, index, bend)
+    for _ in range(2):
+        starts = refine(
+            starts, points, weights(witnesses, distance(starts.take((slice(None), None)), points), index), bend
+        )
+    signed = distance(starts.take((slice(None), None)), points)
+    saved = witnesses.cap_inside[index] - cost(witnesses, signed, index)
+    along = (starts.tangent[:, None] * witnesses.normal[index].conj()).imag.mean(axis=1)
+    sound = (along > np.where(bend, 0.2, 0.5)) & gentle(witnesses, starts)
+    return Proposals(starts, bend, first, length, np.where(sound, saved.sum(axis=1) * (length / places) - 8.0, -1.0))
+
+
+def gentle(witnesses: Witnesses, models: Models) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """True where a model bends no more sharply than witnesses a pitch apart can show."""
+    turn = models.curvature * witnesses.pitch
+    mild: np.ndarray[tuple[int], np.dtype[np.bool_]] = (turn < 1.0 / _LEAST_RADIUS_CONVEX) & (
+        turn > -1.0 / _LEAST_RADIUS_CONCAVE
+    )
+    return mild
+
+
+def _best_starts(
+    witnesses: Witnesses, points: Complex, index: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
+) -> Models:
+    """Of the lines through pairs (circles through triples where `bend`) of each row's points, the cheapest."""
+    found = []
+    rows = [np.flatnonzero(~bend), np.flatnonzero(bend)]
+    for row, shares in zip(rows, (_PAIRS, _TRIPLES), strict=True):
+        own = points[row]
+        spots = np.rint(shares * (points.shape[1] - 1)).astype(np.intp)
+        picked = own[:, spots]
+        starts = (
+            through_triples(*np.moveaxis(picked, 2, 0))
+            if shares is _TRIPLES
+            else through_pairs(*np.moveaxis(picked, 2, 0))
+        )
+        signed = distance(starts.take((..., None)), own[:, None, :])
+        best = cost(witnesses, signed, index[row][:, None, :]).sum(axis=2).argmin(axis=1)
+        found.append(starts.take((np.arange(len(row)), best)))
+    order = np.argsort(np.concatenate(rows), kind="stable")
+    return join(found).take(order)
+
+
+def _explained(witnesses: Witnesses, fits: Proposals, longer: Proposals) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """True where one of the longer windows about the same place explains a window's own witnesses as well."""
+    if not len(fits) or not len(longer):
+        return np.zeros(len(fits), dtype=bool)
+    count = len(witnesses)
+    index = samples(count, fits.first, fits.length, min(int(fits.length[0]), 8))
+    points = witnesses.points[index]
+    scale = float(fits.length[0]) / index.shape[1]
+    own = window_cost(witnesses, fits.models, index).sum(axis=1)
+    stride = int(longer.first[1] - longer.first[0]) if len(longer) > 1 else count
+    middle = fits.first + fits.length // 2 - longer.length[0] // 2
+    near = np.rint(middle / stride).astype(np.intp)[:, None] + np.array([-1, 0, 1])
+    near = near % len(longer)
+    signed = distance(longer.models.take(near).take((..., None)), points[:, None, :])
+    theirs = cost(witnesses, signed, index[:, None, :]).sum(axis=2)
+    theirs = np.where(longer.gain[near] > 0.0, theirs, np.inf).min(axis=1)
+    explained: np.ndarray[tuple[int], np.dtype[np.bool_]] = (theirs - own) * scale < _REDUNDANT
+    return explained

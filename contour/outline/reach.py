@@ -1,0 +1,44 @@
+"""How far each model of a ring goes on without a witness: what an outline of broken cells leaves unseen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.outline.lines_and_arcs import Complex, Index, Models, Real, feet
+from contour.outline.witnesses import Witnesses
+
+Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """From each state's foot along its model to the nearest witness that lies on it, back and ahead: shape (N, A),
+    pixels, 0 where none does."""
+
+    back: Real
+    ahead: Real
+
+
+def reach(witnesses: Witnesses, models: Models, foot: Complex, *, last: Index, following: Index) -> Reach:
+    """The reach of each state: its model, foot and supporting witnesses (see `supports`), shape (N, A) each."""
+    return Reach(_away(witnesses, models, foot, last), _away(witnesses, models, foot, following))
+
+
+def supports(lies: Flags, place: Index, begin: Index, end: Index) -> tuple[Index, Index]:
+    """The witness at or before each entry, and at or after it, that `lies` on the same model; -1 where none does.
+
+    Entries of one model run from `begin` to `end`, one for each witness (at `place`) that it may explain.
+    """
+    here = np.arange(len(place))
+    last = np.maximum.accumulate(np.where(lies, here, -1))
+    following = np.minimum.accumulate(np.where(lies, here, len(place))[::-1])[::-1]
+    back = np.where(last >= begin, place[np.maximum(last, 0)], -1)
+    ahead = np.where(following < end, place[np.minimum(following, len(place) - 1)], -1)
+    return back, ahead
+
+
+def _away(witnesses: Witnesses, models: Models, foot: Complex, support: Index) -> Real:
+    there, _ = feet(models, witnesses.points[support])
+    return np.where(support >= 0, np.abs(there - foot), 0.0)

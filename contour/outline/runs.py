@@ -1,0 +1,169 @@
+"""Runs of a labelling as segments, refitted, and the next round's proposals made from them and their neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.outline.labelling import PRICE_ARC, PRICE_LINE, Labelling
+from contour.outline.lines_and_arcs import (
+    Index,
+    Models,
+    Real,
+    distance,
+    feet,
+    join,
+    refine,
+    through_pairs,
+    through_triples,
+)
+from contour.outline.proposals import Proposals, gather, gentle, window_fits
+from contour.outline.witnesses import Witnesses, cost, weights
+
+_MOST_PLACES = 160
+# Witnesses by which a stretch inside of the outline is shifted, to share the rest with what lies beside it.
+_SHARED = (2, 4)
+_STEPS = 4
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Pieces of the outline in travel order, one model each: first witness and number of witnesses (cyclic), shape
+    (S,)."""
+
+    models: Models
+    bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    first: Index
+    length: Index
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+    def owner(self, count: int) -> Index:
+        """Segment of each of the `count` witnesses, shape (N,)."""
+        owner = np.repeat(np.arange(len(self)), self.length)
+        return np.roll(owner, int(self.first[0]))[:count]
+
+
+def runs(labelling: Labelling, proposals: Proposals) -> Segments:
+    """The labelling's runs as segments."""
+    label = labelling.label
+    first = np.flatnonzero(label != np.roll(label, 1))
+    if not len(first):
+        first = np.zeros(1, dtype=np.intp)
+    length = np.diff(first, append=first[0] + len(label))
+    chosen = label[first]
+    return Segments(proposals.models.take(chosen), proposals.bend[chosen], first, length)
+
+
+def stretch(count: int, first: Index, length: Index) -> tuple[Index, Real]:
+    """Witness indices of each stretch, shape (K, m), and how many witnesses each entry stands for (0: padding)."""
+    places = min(int(length.max()), _MOST_PLACES)
+    rank = np.arange(places)[None, :]
+    step = np.maximum(length[:, None] / places, 1.0)
+    offset = np.floor((rank + 0.5) * step).astype(np.intp)
+    multiplicity = np.where(offset < length[:, None], step, 0.0)
+    return (first[:, None] + np.minimum(offset, length[:, None] - 1)) % count, multiplicity
+
+
+def fitted(
+    witnesses: Witnesses, models: Models, bend: np.ndarray[tuple[int], np.dtype[np.bool_]], first: Index, length: Index
+) -> tuple[Models, Real]:
+    """Models refitted robustly to their own stretches, and the nats each saves there over calling all outliers."""
+    index, multiplicity = stretch(len(witnesses), first, length)
+    points = witnesses.points[index]
+    for _ in range(_STEPS):
+        signed = distance(models.take((slice(None), None)), points)
+        models = refine(models, points, weights(witnesses, signed, index) * multiplicity, bend)
+    signed = distance(models.take((slice(None), None)), points)
+    saved = (witnesses.cap_inside[index] - cost(witnesses, signed, index)) * multiplicity
+    return models, saved.sum(axis=1)
+
+
+def around(witnesses: Witnesses, segments: Segments) -> Proposals:
+    """Proposals near the present segments: each alone, with its next, with its next two; each as a line and as an
+    arc."""
+    count, total = len(witnesses), len(segments)
+    starts: list[Models] = []
+    lengths: list[Index] = []
+    begin = np.arange(total)
+    spans = range(1, min(3, total) + 1)
+    for span in spans:
+        last = (begin + span - 1) % total
+        length = (segments.first[last] - segments.first) % count + segments.length[last]
+        lengths += 2 * [np.minimum(np.where(span == 1, segments.length, length), count)]
+        starts += [_starts(witnesses, segments, begin, last, bend) for bend in (False, True)]
+    first = np.tile(segments.first, len(lengths))
+    free = np.tile(np.repeat([False, True], total), len(spans))
+    models, saved = fitted(witnesses, join(starts), free, first, np.concatenate(lengths))
+    gain = np.where(gentle(witnesses, models), saved - np.where(free, PRICE_ARC, PRICE_LINE), -1.0)
+    present = (np.arange(len(free)) < 2 * total) & (free == np.tile(segments.bend, len(lengths)))
+    gain = np.where(present, np.maximum(gain, 0.0) + 1e4, gain)
+    parts = [Proposals(models, free, first, np.concatenate(lengths), gain)]
+    if total > 1 and count > 9:
+        # What hides between two segments: a short edge or a rounding that no window of the first round fell upon.
+        size = np.repeat([5, 9, 5, 9], total)
+        begins = (np.tile(segments.first, 4) - size // 2) % count
+        parts.append(window_fits(witnesses, begins, size, np.repeat([False, True], 2 * total), 9))
+    begins, size = _unexplained(witnesses, segments)
+    if len(begins):
+        twice = np.repeat([False, True], len(begins))
+        parts.append(window_fits(witnesses, np.tile(begins, 2), np.tile(size, 2), twice, 16))
+    merged = gather(parts)
+    return merged.take(merged.gain > 0.0)
+
+
+def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Index, Index]:
+    """Stretches of four and more witnesses in a row, single ones apart, that lie off their segments: first and length.
+
+    Each comes as it is, and longer by one at either end. Those inside come shifted, too: what an arc cuts off of an
+    edge lies half on that arc. Those outside may be dust.
+    """
+    count = len(witnesses)
+    signed = distance(segments.models.take(segments.owner(count)), witnesses.points)
+    off = np.abs(signed) > 3.0 * np.where(signed > 0.0, witnesses.outer, witnesses.inner)
+    off |= np.roll(off, 1) & np.roll(off, -1)
+    first = np.flatnonzero(off & ~np.roll(off, 1))
+    length = (np.flatnonzero(off & ~np.roll(off, -1)) - first) % count + 1 if len(first) else first
+    if len(first) and off[0] and off[-1]:
+        last = np.flatnonzero(off & ~np.roll(off, -1))
+        length = (np.roll(last, -1) - first) % count + 1
+    long = (length >= 4) & (length + 2 < count)
+    first, length = first[long], length[long]
+    begins, sizes = [first, first - 1], [length, length + 2]
+    inside = signed[(first + length // 2) % count] < 0.0
+    for shift in _SHARED:
+        begins += [(first + shift)[inside], (first - 2 * shift)[inside]]
+        sizes += 2 * [(length + shift)[inside]]
+    return np.concatenate(begins) % count, np.minimum(np.concatenate(sizes), count)
+
+
+def _starts(witnesses: Witnesses, segments: Segments, begin: Index, last: Index, bend: bool) -> Models:
+    """First guesses of a union's model through feet on its first and last segments."""
+    count = len(witnesses)
+    alone = begin == last
+
+    def foot(which: Index, share: float) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
+        place = segments.first[which] + np.floor(share * segments.length[which]).astype(np.intp)
+        place = np.minimum(place, segments.first[which] + segments.length[which] - 1) % count
+        return feet(segments.models.take(which), witnesses.points[place])[0]
+
+    if not bend:
+        pair = through_pairs(foot(begin, 0.1), foot(last, 0.9))
+        return _choose(alone & ~segments.bend[begin], segments.models.take(begin), pair)
+    inner = np.where(
+        alone,
+        foot(begin, 0.5),
+        np.where((last - begin) % len(segments) == 1, foot(begin, 0.95), foot((begin + 1) % len(segments), 0.5)),
+    )
+    triple = through_triples(foot(begin, 0.08), inner, foot(last, 0.92))
+    return _choose(alone & segments.bend[begin], segments.models.take(begin), triple)
+
+
+def _choose(mask: np.ndarray[tuple[int], np.dtype[np.bool_]], yes: Models, no: Models) -> Models:
+    return Models(
+        np.where(mask, yes.origin, no.origin),
+        np.where(mask, yes.tangent, no.tangent),
+        np.where(mask, yes.curvature, no.curvature),
+    )

@@ -1,0 +1,159 @@
+"""How sure an outline is: a 95 % bound in pixels on its distance from the truth, from the picture itself.
+
+Between each two witnesses that lie on the outline there is a stretch of it. Its error is taken as normal, with a
+variance that is a sum of squares:
+
+- blur: a blurred edge shifts as one where light, side walls and table differ; no number of witnesses averages that out;
+- dark: once more where walls are dark, whose ends fade into the shadow beside them;
+- leverage: witnesses scatter as they show; a fit divides that by the root of their number, less so beyond the last of
+  them and at the corners of short edges;
+- gap: where no witness lies for more than a pitch, the outline is a guess that grows with the gap, if slowly: most gaps
+  lie in straight edges;
+- misfit: neighbours in a row that lie off on one side say that the outline has left the cut;
+- outside: a wall end beyond the outline is material that the outline leaves out, even if it is a single one.
+
+The bound is the length within which these normal laws together put 95 % of the outline. All terms are lengths in the
+picture: twice the pixels, twice the bound. The coefficients come from `python -m benchmarks.uncertainty --calibrate`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.outline.fit import FittedRing
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
+
+Vector = NDArray[np.float64]
+
+SHARE = 0.95
+LEAST_PX = 0.15
+"""No bound below this: pixels, and the lens model, are not known better."""
+
+_CAP_PITCHES = 0.5
+"""A witness farther off than half a cell is debris or an inner wall; it says that much and no more."""
+
+_HALVINGS = 24
+_REACH = np.linspace(0.0, 6.0, 601)
+_WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Standard deviation that one pixel of each cause stands for.
+
+    Fitted by `python -m benchmarks.uncertainty --calibrate`, but for two things: the fit all but leaves `gap` out,
+    which is kept, for a longer gap must state more; and all are 5 % larger, for of one fresh set 89.5 % had held.
+    """
+
+    blur: float = 0.267
+    dark: float = 0.417
+    leverage: float = 1.048
+    gap: float = 0.0042
+    misfit: float = 0.351
+    outside: float = 1.187
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Stretches of outline between neighbouring witnesses on it, shape (S,) each, pixels.
+
+    length: along the coarse ring. The others are the causes of `Coefficients`, by the same names.
+    """
+
+    length: Vector
+    blur: Vector
+    dark: Vector
+    leverage: Vector
+    gap: Vector
+    misfit: Vector
+    outside: Vector
+
+    def sigma(self, coefficients: Coefficients) -> Vector:
+        """Standard deviation of the outline's place in each stretch."""
+        terms = [getattr(coefficients, one.name) * getattr(self, one.name) for one in fields(coefficients)]
+        return np.asarray(np.sqrt(np.sum(np.square(terms), axis=0)), np.float64)
+
+
+def uncertainty(
+    rings: Sequence[tuple[RingEvidence, FittedRing]],
+    *,
+    pitch_px: float,
+    blur_px: float,
+    dark: bool = False,
+    coefficients: Coefficients | None = None,
+) -> float:
+    """95 % bound on the distance between outline and truth, pixels, of all rings together.
+
+    dark: whether walls are darker than the table.
+    """
+    stretches = [ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, dark=dark) for ring in rings]
+    sigma = np.concatenate([one.sigma(coefficients or Coefficients()) for one in stretches])
+    return max(bound(sigma, np.concatenate([one.length for one in stretches])), LEAST_PX)
+
+
+def bound(sigma: Vector, length: Vector) -> float:
+    """The distance within which normal errors of standard deviation `sigma` keep 95 % of the stretches' length."""
+    share = length / max(float(length.sum()), 1e-12)
+    sigma = np.maximum(sigma, 1e-6)
+    low, high = 0.0, float(_REACH[-1] * sigma.max())
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if float(share @ np.interp(middle / sigma, _REACH, _WITHIN)) < SHARE:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def ring_stretches(
+    evidence: RingEvidence, fitted: FittedRing, *, pitch_px: float, blur_px: float, dark: bool = False
+) -> Stretches:
+    """The stretches of one ring and the causes of error in each."""
+    on_line = np.flatnonzero(fitted.inlier)
+    if len(on_line) < 2:
+        on_line = np.arange(len(evidence.points))
+    position = evidence.position[on_line]
+    coarse = evidence.coarse
+    around = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
+    length = np.maximum(np.diff(position, append=position[0] + around), 0.0)
+    leverage = _leverage(evidence, fitted, np.mod(position + 0.5 * length, around), around)
+    residual = np.clip(fitted.residual, -_CAP_PITCHES * pitch_px, _CAP_PITCHES * pitch_px)
+    left_out = ~fitted.inlier & (evidence.kind != WitnessKind.OUTERMOST)
+    return Stretches(
+        length=length,
+        blur=np.full(len(length), blur_px),
+        dark=np.full(len(length), blur_px if dark else 0.0),
+        leverage=leverage * fitted.spread_px,
+        gap=np.maximum(length - pitch_px, 0.0),
+        misfit=_largest_between(np.abs(_middle_of_five(residual)), on_line),
+        outside=_largest_between(np.where(left_out, np.maximum(residual, 0.0), 0.0), on_line),
+    )
+
+
+def _leverage(evidence: RingEvidence, fitted: FittedRing, place: Vector, around: float) -> Vector:
+    """Standard deviation of the fit over that of one witness, at places along the coarse ring, between its vertices."""
+    ring, points = fitted.ring, evidence.points
+    nearest = np.concatenate(
+        [((part[:, None, :] - points[None, :, :]) ** 2).sum(axis=2).argmin(axis=1) for part in np.array_split(ring, 8)]
+    )
+    at = evidence.position[nearest]
+    order = np.argsort(at, kind="stable")
+    ratio = fitted.vertex_sigma_px / max(fitted.spread_px, 1e-6)
+    return np.asarray(np.interp(place, at[order], ratio[order], period=around), np.float64)
+
+
+def _middle_of_five(residual: Vector) -> Vector:
+    """Median of each residual and its two neighbours on either side, around the ring."""
+    return np.asarray(np.median([np.roll(residual, shift) for shift in range(-2, 3)], axis=0), np.float64)
+
+
+def _largest_between(values: Vector, on_line: NDArray[np.intp]) -> Vector:
+    """Largest of the values from each witness on the outline up to and with the next one on it, around the ring."""
+    turned = np.roll(values, -int(on_line[0]))
+    largest = np.maximum.reduceat(turned, on_line - on_line[0])
+    return np.asarray(np.maximum(largest, np.roll(values[on_line], -1)), np.float64)

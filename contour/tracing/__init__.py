@@ -1,0 +1,2 @@
+"""A picture and settings in, a `Trace` out: one method each, without a verdict. Used by `acceptance` and the service.
+"""

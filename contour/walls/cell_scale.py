@@ -1,0 +1,217 @@
+"""The scale of a block read from the picture itself: cell pitch, wall width, and whether walls are bright or dark."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.errors import NoBlockFound
+from contour.walls.comb_likeness import Comb, surely_comb
+from contour.walls.lattice_order import lattice_order, solidity
+from contour.walls.wall_mask import wall_mask
+
+Gray = NDArray[np.uint8]
+
+_TILE_PX = 512
+_TILES = 4
+# First guesses of the pitch; the mask's windows forgive a factor of two either way.
+_GUESSES = (24.0, 70.0, 8.0)
+_GOOD_SCORE = 0.2
+_LEAST_SCORE = 0.14
+_LEAST_CELLS = 6
+# Two readings of one pitch differ by less than this share of it.
+_SAME_PITCH = 0.1
+# A sheet with holes far apart is a table, not a plate of cells.
+_WIDEST_WALL = 0.65
+# Walls wider than 0.45 pitch count for less and less.
+_WIDE_WALL = 0.2
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
+    the part of the tile they fill, the wall contrast in grey levels, the share of the
+    walls that hang together, the grey levels of walls and of cells' floors, the share of the cells with neighbours all
+    around, and the share of its convex hull that a cell fills."""
+
+    pitch: float
+    wall: float
+    bright: bool
+    count: int
+    regularity: float
+    filled: float
+    contrast: float
+    connected: float
+    level: float
+    floor: float
+    order: float
+    solid: float
+
+    @property
+    def score(self) -> float:
+        """Larger for a better comb: many cells, of one size, over most of the tile, with walls no wider than they."""
+        # The light gaps of a comb of dark cells look like cells too, but leave less room between them.
+        thin = min(1.0, (_WIDEST_WALL - self.wall / self.pitch) / _WIDE_WALL)
+        return self.regularity * self.filled * self.connected * thin * min(1.0, self.count / 12)
+
+    @property
+    def comb(self) -> Comb:
+        """What tells a comb from other things that have patches side by side."""
+        regular = self.regularity * self.filled
+        return Comb(
+            self.pitch, self.wall, self.bright, self.count, self.score, regular, order=self.order, solid=self.solid
+        )
+
+
+def probe(light: Gray, polarity: str) -> Cells:
+    """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound.
+
+    The busiest tile at full size is asked first, then the whole picture at a quarter of its size, where large cells are
+    many, then further tiles. The first good answer is taken, else the best.
+    """
+    senses = [bright for bright in (True, False) if polarity != ("dark" if bright else "bright")]
+    best: Cells | None = None
+    for part, shrink in _parts(light):
+        found = _part_cells(part, senses, _GUESSES if shrink == 1 else _GUESSES[:2])
+        if found is None:
+            continue
+        found = replace(found, pitch=found.pitch * shrink, wall=found.wall * shrink)
+        if best is None or found.score > best.score:
+            best = found
+        if best.score > _GOOD_SCORE:
+            break
+    # Several small blocks in view fill little of a tile, and do not hang together.
+    if best is None or (best.score < _LEAST_SCORE and not surely_comb(best.comb)):
+        seen = "no enclosed cells" if best is None else f"{best.count} enclosed cells, of mixed size or far apart"
+        raise NoBlockFound(
+            f"no block found: the most textured part of the picture shows {seen}, "
+            "expected a dozen or more of one size. Check that a block lies in view, the light, and the polarity"
+        )
+    return best
+
+
+def _parts(light: Gray) -> Iterator[tuple[Gray, int]]:
+    tiles = _busiest_tiles(light)
+    yield from ((tile, 1) for tile in tiles[:1])
+    if min(light.shape) >= 4 * 64:
+        quarter = cv2.resize(light, (light.shape[1] // 4, light.shape[0] // 4), interpolation=cv2.INTER_AREA)
+        yield np.asarray(quarter, np.uint8), 4
+    yield from ((tile, 1) for tile in tiles[1:])
+
+
+def _busiest_tiles(light: Gray) -> list[Gray]:
+    """Tiles of up to 512 px with the most local contrast, busiest first, apart from each other."""
+    block = 32
+    sample = light[::4, ::4].astype(np.float32)
+    shape = (max(1, light.shape[1] // block), max(1, light.shape[0] // block))
+    mean = cv2.resize(sample, shape, interpolation=cv2.INTER_AREA)
+    square = cv2.resize(sample * sample, shape, interpolation=cv2.INTER_AREA)
+    # The root of the deviation, or one glaring object outweighs a whole dim block.
+    activity = np.sqrt(np.sqrt(np.maximum(square - mean * mean, 0.0)))
+    half = _TILE_PX // block // 2
+    smooth = cv2.blur(activity, (2 * half + 1, 2 * half + 1), borderType=cv2.BORDER_CONSTANT)
+    tiles = []
+    for _ in range(_TILES):
+        row, column = np.unravel_index(int(np.argmax(smooth)), smooth.shape)
+        if smooth[row, column] <= 0:
+            break
+        top = int(np.clip(int(row) * block - _TILE_PX // 2, 0, max(0, light.shape[0] - _TILE_PX)))
+        left = int(np.clip(int(column) * block - _TILE_PX // 2, 0, max(0, light.shape[1] - _TILE_PX)))
+        tiles.append(light[top : top + _TILE_PX, left : left + _TILE_PX])
+        smooth[max(0, row - half) : row + half + 1, max(0, column - half) : column + half + 1] = 0
+    return tiles
+
+
+def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> Cells | None:
+    """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own
+    pitch.
+    """
+    best: Cells | None = None
+    for guess in guesses:
+        for bright in senses:
+            cells = cells_of(part, guess, bright=bright)
+            if cells is not None and (best is None or cells.score > best.score):
+                best = cells
+        # Good enough in one sense and guess, while the other sense was heard too.
+        if best is not None and best.score > _GOOD_SCORE:
+            break
+    if best is None:
+        return None
+    again = cells_of(part, best.pitch, bright=best.bright)
+    # Faint fine cells are seen better through a wide window.
+    same = again is None or abs(again.pitch - best.pitch) < _SAME_PITCH * best.pitch
+    return best if again is None or (same and again.score < best.score) else again
+
+
+def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
+    """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are."""
+    seen = wall_mask(light, pitch, bright=bright)
+    mask = seen.mask
+    floor = cv2.bitwise_not(mask)
+    _, labels, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
+    areas, places, numbers = _enclosed(
+        np.asarray(stats[1:], np.int32), np.asarray(centroids[1:], np.float64), mask.shape
+    )
+    if len(areas) < _LEAST_CELLS:
+        return None
+    # Half of the enclosed *area* lies in cells smaller than this, so that specks do not count; then merged cells are
+    # told from single ones by a plain median.
+    ascending = np.sort(areas)
+    by_area = ascending[np.searchsorted(np.cumsum(ascending), 0.5 * ascending.sum())]
+    typical = float(np.median(areas[areas > by_area / 3]))
+    regular = (areas > typical / 2) & (areas < 2 * typical)
+    usual = areas[regular]
+    if len(usual) < _LEAST_CELLS:
+        return None
+    inner = float(np.sqrt(2 / np.sqrt(3) * np.median(usual)))
+    # A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
+    side = max(3, round(0.7 * inner))
+    sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
+    walls = walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
+    wall = wall_width(walls)
+    size = inner + wall
+    if wall > _WIDEST_WALL * size:
+        return None
+    # Area a regular comb of this pitch would fill with as many cells.
+    # Cells of a comb lie side by side, specks of a table all over it: the part of their place that they fill.
+    spread = np.diff(np.quantile(places[regular], [0.05, 0.95], axis=0), axis=0)[0] / 0.9 + size
+    filled = len(usual) * size * size * np.sqrt(3) / 2 / float(np.prod(spread))
+    _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
+    connected = float(pieces[1:, cv2.CC_STAT_AREA].max() / max(1, pieces[1:, cv2.CC_STAT_AREA].sum()))
+    return Cells(
+        size,
+        wall,
+        bright,
+        len(usual),
+        float(usual.sum() / areas.sum()),
+        float(min(1.0, filled)),
+        seen.contrast,
+        connected,
+        float(np.median(light[walls > 0][::7])),
+        # The darker part of what is free, for a lighter table may lie in it too (of the lighter part for dark walls).
+        float(np.quantile(light[mask == 0][::7], 0.3 if bright else 0.7)),
+        lattice_order(places[regular], size),
+        solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
+    )
+
+
+def _enclosed(
+    stats: NDArray[np.int32], centroids: NDArray[np.float64], shape: tuple[int, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+    """Areas (N,), centroids (N, 2) and labels (N,) of the pieces that lie within the part and are no slivers."""
+    left, top, wide, high, area = (stats[:, column] for column in range(5))
+    within = (left > 0) & (top > 0) & (left + wide < shape[1]) & (top + high < shape[0])
+    compact = (area > 0.3 * wide * high) & (np.maximum(wide, high) < 4 * np.minimum(wide, high)) & (area >= 9)
+    chosen = np.flatnonzero(within & compact)
+    return area[chosen].astype(np.float64), centroids[chosen], chosen + 1
+
+
+def wall_width(mask: Gray) -> float:
+    """Mean wall width of a mask, pixels: area over half its boundary length (Cauchy-Crofton: π/4 of its crossings)."""
+    crossings = np.count_nonzero(mask[1:] != mask[:-1]) + np.count_nonzero(mask[:, 1:] != mask[:, :-1])
+    return float(2 * np.count_nonzero(mask) / max(1.0, np.pi / 4 * crossings))

@@ -1,0 +1,109 @@
+"""Other pieces of comb in the picture than the one that was traced. Debris is none: a piece has cells of its own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry.rings import Ring
+from contour.walls.coarse_block import CoarseBlock
+
+Gray = NDArray[np.uint8]
+
+_SAMPLES_PER_PITCH = 6.5
+_WALL_COVERAGE = 0.12
+# What lies within this of the traced outline is the block itself: its side seen at a slant, its broken walls.
+_MARGIN_PITCHES = 0.6
+_LEAST_SIZE_PITCHES = 3.0
+# Enclosed areas that are cells, in areas of one: broken walls join several, letters and chips enclose less.
+_CELL_AREAS = (0.25, 6.0)
+_FEWEST_CELLS = 7
+# Bridges an open cell at the border.
+_CLOSING_PITCHES = 0.72
+_FRAME_PX = 2
+_HEXAGON = 2 / np.sqrt(3)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece of comb: its area, cells filled, px², its box (left, top, right, bottom), and its outline to look at.
+
+    The outline, shape (N, 2), is as coarse as the samples that the piece was found in; empty = not known.
+    """
+
+    area_px2: float
+    box_px: tuple[int, int, int, int]
+    outline_px: Ring = field(default_factory=lambda: np.empty((0, 2)), compare=False)
+
+    def moved(self, x: int, y: int) -> Piece:
+        """The piece in a picture whose first pixel lies (x, y) before this one's."""
+        left, top, right, bottom = self.box_px
+        return Piece(self.area_px2, (left + x, top + y, right + x, bottom + y), self.outline_px + np.array([x, y]))
+
+
+def pieces_beside(mask: Gray, exterior: Ring, pitch_px: float, scale: int = 1) -> tuple[Piece, ...]:
+    """Pieces of comb outside `exterior`, largest first, in a wall mask (H, W), uint8, 255 on walls.
+
+    `exterior` and `pitch_px` are in the mask's pixels, the result in those of a picture `scale` times as large. A piece
+    hangs together, is wider than three pitches, and encloses seven cells or more.
+    """
+    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
+    samples = pitch_px / step
+    size = (max(1, mask.shape[1] // step), max(1, mask.shape[0] // step))
+    small = cv2.resize(mask[: size[1] * step, : size[0] * step], size, interpolation=cv2.INTER_AREA)
+    walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
+    outline = np.rint((exterior + 0.5) / step - 0.5).astype(np.int32)
+    cv2.fillPoly(walls, [outline], 0)
+    cv2.polylines(walls, [outline], True, 0, max(1, round(2 * _MARGIN_PITCHES * samples)))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    wide = np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _LEAST_SIZE_PITCHES * samples
+    wide[0] = False
+    found = []
+    for number in np.flatnonzero(wide):
+        x, y, w, h = (int(value) for value in stats[number, :4])
+        filled = _filled(labels[y : y + h, x : x + w] == number, samples)
+        if filled is not None:
+            whole = step * scale
+            box = (x * whole, y * whole, (x + w) * whole, (y + h) * whole)
+            ring = (_outline(filled) + (x, y) + 0.5) * whole - 0.5
+            found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring))
+    return tuple(sorted(found, key=lambda piece: -piece.area_px2))
+
+
+def reaches_frame(mask: Gray, block: CoarseBlock) -> bool:
+    """Whether a wall of the block lies in the last two pixels of its wall mask (H, W), uint8."""
+    walls, step = block.unpadded(block.walls), block.step
+    sides = (
+        (mask[:_FRAME_PX].max(axis=0), walls[0]),
+        (mask[-_FRAME_PX:].max(axis=0), walls[-1]),
+        (mask[:, :_FRAME_PX].max(axis=1), walls[:, 0]),
+        (mask[:, -_FRAME_PX:].max(axis=1), walls[:, -1]),
+    )
+    return any(bool((line[samples.repeat(step)[: len(line)] > 0] > 0).any()) for line, samples in sides)
+
+
+def _outline(filled: NDArray[np.bool_]) -> Ring:
+    """The outermost samples of the largest part, shape (N, 2)."""
+    rings, _ = cv2.findContours(filled.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    return np.asarray(max(rings, key=cv2.contourArea), dtype=np.float64).reshape(-1, 2)
+
+
+def _filled(walls: NDArray[np.bool_], samples: float) -> NDArray[np.bool_] | None:
+    """A piece with walls `walls` (h, w), its cells filled; None where it has too few cells of its own."""
+    cell = samples**2 / _HEXAGON
+    pad = round(_CLOSING_PITCHES * samples) + 2
+    free = cv2.copyMakeBorder((~walls).astype(np.uint8), pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=1)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(free, connectivity=4)
+    area = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
+    # Walls of about a sample and a half are free pixels lost all around a cell.
+    whole = (np.sqrt(area) + 1.5) ** 2
+    cells = (whole > _CELL_AREAS[0] * cell) & (whole < _CELL_AREAS[1] * cell)
+    cells[[0, labels[0, 0]]] = False
+    if np.count_nonzero(cells) < _FEWEST_CELLS:
+        return None
+    grown = (cv2.distanceTransform(free, cv2.DIST_L2, 5) <= _CLOSING_PITCHES * samples).astype(np.uint8)
+    filled = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > _CLOSING_PITCHES * samples) | (free == 0)
+    return np.asarray(filled[pad:-pad, pad:-pad])

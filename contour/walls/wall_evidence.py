@@ -1,0 +1,87 @@
+"""What a picture says about a block's outline: witnesses along each coarse ring, the border between seeing and
+fitting.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry.rings import Ring
+from contour.walls.comb_likeness import Comb
+from contour.walls.pieces import Piece
+
+
+class WitnessKind(IntEnum):
+    """How well a witness was seen, best first."""
+
+    CLEAN = 0  # the end of a wall that sticks out: a cut wall seen whole
+    BLUNT = 1  # an end that is wide, short or merged with a neighbour: less sure along its axis
+    OUTERMOST = 2  # no wall end within a pitch: the outermost wall point there (a wall that lies along the cut)
+    BOUND = 3  # no witness of the edge: a wall that the outline must not leave outside, however deep it lies inside
+
+
+@dataclass(frozen=True)
+class WallPoints:
+    """Boundary of the block's own walls along a ring, some eight points a pitch, each chain's in order: points and
+    outward normals at their feet on the coarse ring (K, 2), arc lengths of the feet (K,), pixels.
+    """
+
+    points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    position: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    normal: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+
+    def take(self, index: NDArray[np.bool_] | NDArray[np.intp]) -> WallPoints:
+        """The points at `index`."""
+        return WallPoints(self.points[index], self.position[index], self.normal[index])
+
+
+@dataclass(frozen=True)
+class RingEvidence:
+    """Witnesses of one ring of the outline, in order along the coarse ring, which runs with the material on its left
+    in the y-down picture coordinates' own shoelace sense given by `is_hole` (exterior: positive shoelace in pixels;
+    hole: negative).
+
+    coarse: coarse ring, shape (M, 2), pixels. points: where the material ends, shape (N, 2), float64, pixels,
+    sub-pixel. position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal:
+    outward unit normal of the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected
+    standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind. walls: all
+    that was seen of walls near the edge, whether it witnesses the outline or not. beside: what may be
+    material as well, strands of wall that hang on nothing and the edge of dark material, shape (M, 2), pixels, some
+    four points a pitch.
+    """
+
+    coarse: Ring
+    is_hole: bool
+    points: NDArray[np.float64]
+    position: NDArray[np.float64]
+    normal: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    kind: NDArray[np.int8]
+    walls: WallPoints = field(default_factory=WallPoints)
+    beside: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+
+
+@dataclass(frozen=True)
+class BlockEvidence:
+    """All that was seen of one block: its rings (exterior first), cell pitch and wall width in pixels, polarity.
+
+    leaves_picture: whether the block runs out of the picture, so that its rings follow the picture's border there.
+    others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
+    pixels. comb: what its cells look like.
+    """
+
+    rings: tuple[RingEvidence, ...]
+    pitch_px: float
+    wall_px: float
+    polarity: str
+    blur_px: float
+    noise: float
+    contrast: float
+    leaves_picture: bool = False
+    others: tuple[Piece, ...] = ()
+    reaches_frame: bool = False
+    comb: Comb | None = None

@@ -1,0 +1,1 @@
+"""Commands that run the daemon, or speak with one that runs."""

@@ -1,0 +1,1 @@
+"""Commands on cameras and pictures: `cameras`, `grab`, `focus`, `trace`, `teach-table`."""

@@ -1,0 +1,38 @@
+"""Whether metrics and the operator's page could listen where they are configured to."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+
+from service.commissioning.checkup.finding import Finding, fault, ok
+from service.config.config import Config
+from service.daemon.listening_socket import bound
+
+
+def check_listening(config: Config, running: int | None) -> Iterator[Finding]:
+    """Metrics' package, and the ports of metrics and page. running: the process that listens there by rights."""
+    if config.metrics is not None:
+        if importlib.util.find_spec("prometheus_client") is None:
+            yield fault(
+                "metrics", "prometheus_client is not installed", "Install combtrace[metrics], or remove metrics"
+            )
+        elif (why := _why_not(config.metrics.host, config.metrics.port, running)) is not None:
+            yield fault("metrics", why, "Set another metrics.host or metrics.port")
+        else:
+            yield ok("metrics", f"{config.metrics.host}:{config.metrics.port}")
+    if config.page is not None:
+        why = _why_not(config.page.host, config.page.port, running)
+        if why is not None:
+            yield fault("page", why, "Set another page.host or page.port")
+
+
+def _why_not(host: str, port: int, running: int | None) -> str | None:
+    """Why nobody could listen there; None where one could, or does."""
+    if running is not None:
+        return None
+    try:
+        bound(host, port).close()
+    except (OSError, UnicodeError) as error:
+        return f"{host}:{port} cannot be listened on: {getattr(error, 'strerror', None) or error}"
+    return None

@@ -1,0 +1,43 @@
+"""Whether the operator's page can be served as it is configured, and safely."""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Iterator
+
+from service.commissioning.checkup.finding import Finding, fault, ok, warning
+from service.config.config import Page
+
+
+def check_page(settings: Page) -> Iterator[Finding]:
+    """What it is made of, its tokens, its certificate, and who could listen on the line."""
+    try:
+        from service.web.server import PageError, check_certificate
+        from service.web.tokens import TokenFile, TokenFileError
+    except ModuleNotFoundError as error:
+        yield fault("page", f"{error.name} is not installed", "Install combtrace[page], or remove page")
+        return
+    who = "it can only be looked at"
+    try:
+        if settings.token_file is not None:
+            holders = [name for name, _ in TokenFile(settings.token_file).read()]
+            who = f"orders by {', '.join(holders)}"
+        check_certificate(settings)
+    except (TokenFileError, PageError) as error:
+        yield fault("page", str(error))
+        return
+    if settings.certificate is None and not is_loopback(settings.host):
+        yield warning(
+            "page",
+            f"{settings.host}:{settings.port} is open to the network without TLS: tokens can be read on the line",
+            "Give page.certificate and page.key, or host 127.0.0.1: docs/security.md",
+        )
+    yield ok("page", f"{settings.host}:{settings.port}, {who}")
+
+
+def is_loopback(host: str) -> bool:
+    """True for an address that only this computer reaches."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

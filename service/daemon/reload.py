@@ -1,0 +1,120 @@
+"""A new configuration at a job boundary: all of it or nothing, and the old one stays where the new one is bad."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from service.config.config import Config
+from service.config.config_file import ConfigError, load_config
+from service.jobs.cycle import Plan
+from service.jobs.health import Health
+from service.logs import event
+
+log = logging.getLogger("combtrace.reload")
+
+RELOADED = ("calibration", "default_recipe", "recipes", "work_area_mm", "table")
+"""What the next job is measured by. All else names devices, addresses and files that are open, and needs a restart."""
+
+PART = "configuration"
+
+
+class BadPlan(Exception):
+    """The configuration is well formed, but nothing can be measured by it: a file it names is missing or unfit."""
+
+
+class Reloader:
+    """Reads the configuration again when asked. The running job keeps what it began with."""
+
+    def __init__(
+        self,
+        path: Path,
+        config: Config,
+        health: Health,
+        make_plan: Callable[[Config], Plan],
+        use: Callable[[Plan], None],
+    ) -> None:
+        """make_plan raises BadPlan; it is called in a thread, `use` in the loop."""
+        self._path = path
+        self._config = config
+        self._health = health
+        self._make_plan = make_plan
+        self._use = use
+        self._asked = asyncio.Event()
+
+    @property
+    def config(self) -> Config:
+        """The one in force."""
+        return self._config
+
+    def ask(self) -> None:
+        """Read it again soon."""
+        self._asked.set()
+
+    async def run(self) -> None:
+        """Reload whenever asked, for ever."""
+        while True:
+            await self._asked.wait()
+            self._asked.clear()
+            await self._reload()
+
+    async def _reload(self) -> None:
+        try:
+            fresh = await asyncio.to_thread(load_config, self._path)
+            fixed = [key for key in differences(self._config, fresh) if key.split(".")[0].split(" ")[0] not in RELOADED]
+            if fixed:
+                what = ", ".join(fixed)
+                raise BadPlan(f"{self._path}: {what} changed, which needs a restart. Restart the service, or undo it")
+            plan = await asyncio.to_thread(self._make_plan, fresh)
+        except (ConfigError, BadPlan) as error:
+            lines = str(error).splitlines()
+            for line in lines:  # an event each, or some of many would be held back
+                log.error("not reloaded: %s", line, extra=event("reload", mistake=line))
+            told = event("reload", reloaded=False)
+            log.warning("the configuration of before stays in force, all of it", extra=told)
+            more = f" (and {len(lines) - 1} more)" if lines[1:] else ""
+            self._health.warn(PART, f"not reloaded: {lines[0]}{more}")
+            return
+        changed = ", ".join(differences(self._config, fresh)) or "the files it names are read again"
+        self._use(plan)
+        self._config = fresh
+        self._health.report("calibration", None)
+        self._health.warn(PART, None)
+        job = self._health.job
+        since = "from the next job on" if job is None else f"from the job after {job} on"
+        told = event("reload", reloaded=True, changed=changed)
+        log.info("configuration reloaded, %s: %s", since, changed, extra=told)
+
+
+def differences(old: BaseModel, new: BaseModel, path: str = "") -> Iterator[str]:
+    """The keys that differ, as paths: `controller.port`; recipes by their numbers, other lists as a whole."""
+    if type(old) is not type(new):
+        yield f"{path}kind"
+        return
+    for name in type(old).model_fields:
+        before, after = getattr(old, name), getattr(new, name)
+        if before == after:
+            continue
+        if isinstance(before, BaseModel) and isinstance(after, BaseModel):
+            yield from differences(before, after, f"{path}{name}.")
+        elif name == "recipes":
+            yield f"recipes ({_numbers(before, after)})"
+        else:
+            yield f"{path}{name}"
+
+
+def _numbers(before: Any, after: Any) -> str:
+    """Which recipes differ, by number: `2 new, 3 gone, 4`."""
+    old, new = ({recipe.number: recipe for recipe in recipes} for recipes in (before, after))
+    words = []
+    for number in sorted(old.keys() | new.keys()):
+        if old.get(number) != new.get(number):
+            words.append(
+                f"{number} new" if number not in old else f"{number} gone" if number not in new else f"{number}"
+            )
+    return ", ".join(words) or "their order"

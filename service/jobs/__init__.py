@@ -1,0 +1,1 @@
+"""Triggers in, settled jobs out, one at a time. Used by `daemon` and `web`."""

@@ -1,0 +1,323 @@
+"""A picture becomes the polygon that would be sent, with what speaks against sending it. No device is touched."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.acceptance.acceptance import Finding, Limits, judge, judge_table, judge_without_block, other_blocks
+from contour.acceptance.error_budget import ErrorBudget, error_budget
+from contour.acceptance.quality import Quality
+from contour.calibration.calibration import Calibration
+from contour.errors import CalibrationError, NoBlockFound, ParameterError
+from contour.geometry.rings import Contour, Ring, densified
+from contour.image.region import Region
+from contour.image.taught_table import TableLimits, look_at
+from contour.polygon.polygon import Finish, Polygon, cutting_polygon
+from contour.tracing.sliding_matrix import coarse_step, default_core_px
+from contour.tracing.tracing import Trace, TraceSettings, check_picture, trace
+from service.config.config import Recipe
+from service.measuring.calibration_guard import CalibrationGuard
+from service.measuring.table_file import TableRecord
+from service.reasons import Reason
+
+log = logging.getLogger("combtrace.measure")
+
+_ROI_STEPS = 12
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What was seen in one picture: the contour, where there is one, and the findings against it, lowest code first.
+
+    pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
+    has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
+    was refused (116).
+    """
+
+    method: str
+    polarity: str | None = None
+    pitch_px: float | None = None
+    pixels: Contour | None = None
+    other_blocks_px: tuple[Ring, ...] = ()
+    millimetres: Contour | None = None
+    area_px2: float | None = None
+    area_mm2: float | None = None
+    uncertainty_px: float | None = None
+    uncertainty: ErrorBudget | None = None
+    thickness_mm: float | None = None
+    aligned: bool = False
+    quality: Quality | None = None
+    findings: tuple[tuple[Reason, str], ...] = ()
+    timings_ms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """Why it is refused, lowest code first; empty where it is not."""
+        return tuple(reason for reason, _ in self.findings)
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The findings as sentences, each with the measured value and the limit."""
+        return tuple(text for _, text in self.findings)
+
+    @property
+    def uncertainty_mm(self) -> float | None:
+        """95 % bound on the position of the polygon that is sent, all causes together; None where it is not known."""
+        return None if self.uncertainty is None else self.uncertainty.total_mm
+
+    @property
+    def size_mm(self) -> tuple[float, float] | None:
+        """Width and height of the contour's box in the machine frame."""
+        if self.millimetres is None:
+            return None
+        width, height = np.ptp(self.millimetres.exterior, axis=0).tolist()
+        return width, height
+
+    def summary(self) -> dict[str, Any]:
+        """What the journal keeps of it."""
+        contour = self.pixels or self.millimetres
+        return {
+            "method": self.method,
+            "polarity": self.polarity,
+            "pitch_px": _rounded(self.pitch_px),
+            "vertices": 0 if contour is None else contour.point_count,
+            "area_mm2": _rounded(self.area_mm2),
+            "uncertainty_mm": _rounded(self.uncertainty_mm),
+            "thickness_mm": self.thickness_mm,
+            "quality": None if self.quality is None else {k: _rounded(v) for k, v in asdict(self.quality).items()},
+            "timings_ms": {name: _rounded(value) for name, value in self.timings_ms.items()},
+        }
+
+
+class _Stopwatch:
+    """Times of stages, as they end one after another."""
+
+    def __init__(self, clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._last = clock()
+        self.milliseconds: dict[str, float] = {}
+
+    def lap(self, stage: str) -> None:
+        """The stage that ran since the last lap has ended."""
+        now = self._clock()
+        self.milliseconds[stage] = self.milliseconds.get(stage, 0.0) + (now - self._last) * 1000
+        self._last = now
+
+
+class Measurer:
+    """Traces pictures with recipes. Without a calibration it works in pixels; limits in mm do not apply."""
+
+    def __init__(
+        self,
+        calibration: Calibration | None,
+        *,
+        guard: CalibrationGuard | None = None,
+        work_area_mm: Ring | None = None,
+        table: TableRecord | None = None,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._calibration = calibration
+        self._guard = guard
+        self._work_area_mm = work_area_mm
+        self._table = table
+        self._clock = clock
+        self._doubted: set[int] = set()
+
+    @property
+    def guard(self) -> CalibrationGuard | None:
+        """The calibration with its limits."""
+        return self._guard
+
+    @property
+    def work_area_mm(self) -> Ring | None:
+        """The machine's work area."""
+        return self._work_area_mm
+
+    @property
+    def table(self) -> TableRecord | None:
+        """The taught table."""
+        return self._table
+
+    @property
+    def calibration_digest(self) -> str | None:
+        """The hash of the calibration file's content; None without one."""
+        return None if self._guard is None else self._guard.record.digest
+
+    @property
+    def calibrated(self) -> bool:
+        """True where pixels become millimetres."""
+        return self._calibration is not None
+
+    def measure(self, picture: NDArray[np.uint8], recipe: Recipe, thickness_mm: float, camera: str = "") -> Measurement:
+        """The measurement of one picture of a camera ("" = not told).
+
+        Raises PictureError or ParameterError where the picture or the recipe is unusable.
+        """
+        watch = _Stopwatch(self._clock)
+        result = Measurement(
+            method=recipe.method,
+            thickness_mm=None if self._calibration is None else thickness_mm,
+            aligned=self._calibration is not None and self._calibration.aligned,
+        )
+        try:
+            result = self._traced(picture, recipe, thickness_mm, result, watch, camera)
+        except NoBlockFound as error:
+            watch.lap("trace")
+            result = replace(result, findings=told(judge_without_block(picture, str(error))))
+        except CalibrationError as error:
+            result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))
+        if self._guard is not None:
+            findings = (*result.findings, *self._guard.findings(picture, camera))
+            result = replace(result, findings=tuple(sorted(findings, key=lambda finding: finding[0])))
+            watch.lap("guard")
+        doubt = step_doubt(recipe, result.pitch_px)
+        if doubt and recipe.number not in self._doubted:
+            self._doubted.add(recipe.number)
+            log.warning("recipe %d: %s", recipe.number, doubt)
+        total = sum(watch.milliseconds.values())
+        return replace(result, timings_ms={**watch.milliseconds, "total": total})
+
+    def _traced(
+        self,
+        picture: NDArray[np.uint8],
+        recipe: Recipe,
+        thickness_mm: float,
+        result: Measurement,
+        watch: _Stopwatch,
+        camera: str,
+    ) -> Measurement:
+        check_picture(picture)
+        height, width = picture.shape[:2]
+        calibration = self._calibration
+        if calibration is not None:
+            calibration.check_fits(width, height)
+        if self._table is not None:
+            if camera and self._table.camera not in ("", camera):
+                raise CalibrationError(
+                    f"The table was taught with camera {self._table.camera}, the picture is of {camera}. Use that "
+                    "camera, or teach the table again."
+                )
+            look = look_at(picture, self._table.table)
+            watch.lap("table")
+            changes = judge_table(look, TableLimits())
+            if changes:
+                return replace(result, findings=told(changes))
+            picture = look.picture
+        rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
+        region = self._region(recipe, thickness_mm)
+        traced: Trace = trace(picture, trace_settings(recipe), region=region, rectifier=rectifier, on_stage=watch.lap)
+        result = replace(
+            result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour, quality=traced.quality
+        )
+        polygon = cutting_polygon(
+            traced.contour,
+            calibration,
+            height_mm=thickness_mm,
+            tolerance_mm=recipe.tolerance_mm,
+            finish=Finish(recipe.margin_mm, recipe.max_vertices, recipe.budget_mm, recipe.first_vertex),
+            on_stage=watch.lap,
+        )
+        # What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither.
+        # What the vertex budget gave up is of one sign, and adds in full.
+        sure_px = traced.uncertainty_px
+        if sure_px is not None:
+            sure_px = float(np.hypot(sure_px, polygon.shift_px)) + polygon.given_up_px
+        budget = self._budget(polygon, recipe, thickness_mm, sure_px)
+        limits = self._limits(recipe)
+        findings = judge(
+            polygon,
+            (width, height),
+            limits,
+            traced=traced,
+            region=region,
+            budget=budget,
+            picture=picture,
+        )
+        watch.lap("judge")
+        return replace(
+            result,
+            pixels=polygon.pixels,
+            other_blocks_px=tuple(piece.outline_px for piece in other_blocks(traced, limits)),
+            millimetres=polygon.millimetres,
+            area_px2=polygon.area_px2,
+            area_mm2=polygon.area_mm2,
+            uncertainty_px=sure_px,
+            uncertainty=budget,
+            findings=told(findings),
+        )
+
+    def _region(self, recipe: Recipe, thickness_mm: float) -> Region | None:
+        if recipe.roi_px:
+            return Region.of_box(*recipe.roi_px)
+        if not recipe.roi_mm:
+            return None
+        if self._calibration is None:
+            raise ParameterError("roi_mm needs a calibration. Name one, or give roi_px")
+        left, bottom, right, top = recipe.roi_mm
+        corners = np.array([[left, bottom], [right, bottom], [right, top], [left, top]])
+        # Straight in millimetres is bent by the lens.
+        ring = densified(corners, max(right - left, top - bottom) / _ROI_STEPS)
+        return Region(self._calibration.to_pixels(ring, thickness_mm))
+
+    def _budget(
+        self, polygon: Polygon, recipe: Recipe, thickness_mm: float, uncertainty_px: float | None
+    ) -> ErrorBudget | None:
+        if self._calibration is None or polygon.mm_per_px is None:
+            return None
+        return error_budget(
+            polygon.pixels,
+            self._calibration,
+            height_mm=thickness_mm,
+            thickness_tolerance_mm=recipe.thickness_tolerance_mm,
+            uncertainty_px=uncertainty_px,
+            mm_per_px=polygon.mm_per_px,
+        )
+
+    def _limits(self, recipe: Recipe) -> Limits:
+        return Limits(
+            min_area_mm2=recipe.min_area_mm2,
+            max_area_mm2=recipe.max_area_mm2,
+            max_vertices=recipe.max_vertices,
+            work_area_mm=self._work_area_mm,
+            sure=None if self._calibration is None else self._calibration.uncertainty,
+            pieces=recipe.pieces,
+            max_uncertainty_mm=recipe.max_uncertainty_mm or None,
+            max_disagreement_pitches=recipe.max_disagreement_pitches or None,
+        )
+
+
+def told(findings: tuple[Finding, ...]) -> tuple[tuple[Reason, str], ...]:
+    """The findings by the names that journal and registers carry."""
+    return tuple((Reason(int(finding.refusal)), finding.text) for finding in findings)
+
+
+def trace_settings(recipe: Recipe) -> TraceSettings:
+    """The recipe's part that tracing needs."""
+    sizes = {name: int(value) for name, value in recipe.parameters.items() if name.endswith("_px")}
+    return TraceSettings(
+        method=recipe.method,
+        polarity=recipe.polarity,
+        binarize=recipe.binarize,
+        edge=recipe.edge,
+        threshold=recipe.parameters.get("threshold"),
+        **sizes,
+    )
+
+
+def step_doubt(recipe: Recipe, pitch_px: float | None = None) -> str | None:
+    """What speaks against the recipe's step; None where nothing does, or where the core follows from a pitch."""
+    step, core = recipe.parameters.get("step_px"), recipe.parameters.get("core_px")
+    if core is None and pitch_px is not None:
+        core = default_core_px(pitch_px)
+    return None if step is None or core is None else coarse_step(int(core), int(step))
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(float(value), 3)

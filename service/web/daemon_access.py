@@ -1,0 +1,167 @@
+"""What the page sees of the daemon and may ask of it. The page has a thread and a loop of its own: calls cross here.
+
+Looking reads what the daemon keeps anyway; asking runs in the daemon's loop, in its turn. Nothing in the daemon waits
+for the page.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from service.daemon.operations import Operations
+from service.daemon.storage_watch import StorageWatch
+from service.jobs.executor import Executor
+from service.jobs.health import Health
+from service.jobs.trigger_queue import Queued
+from service.link.link import Link
+from service.measuring.calibration_guard import CalibrationGuard
+from service.records.archive_writer import ArchiveWriter
+from service.records.journal import Job, Journal, TriggerStamp
+from service.state import State
+
+T = TypeVar("T")
+
+ANSWER_BOUND_S = 10.0
+TRIGGER_KIND = "page"
+
+
+class DaemonSilent(Exception):
+    """The daemon's loop does not answer, or has ended."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """The daemon's parts; None where it has no such part."""
+
+    health: Health
+    executor: Executor
+    journal: Journal
+    journal_path: Path
+    archive_path: Path
+    archive_max_bytes: int
+    recipes: Callable[[], tuple[tuple[int, str], ...]]  # number and name of each, as they are now
+    guard: Callable[[], CalibrationGuard | None]
+    camera: str
+    controller: str
+    link: Link | None = None
+    archive: ArchiveWriter | None = None
+    storage: StorageWatch | None = None
+
+
+class Window:
+    """The daemon as the page sees it; `open` is called in the daemon's loop, before anything else."""
+
+    def __init__(self, sources: Sources) -> None:
+        self.sources = sources
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._operations: Operations | None = None
+        self._outcomes: Counter[tuple[str, str]] = Counter()
+        self.on_change: Callable[[], None] = lambda: None  # told of every change in the daemon's loop; must not block
+
+    def open(self, operations: Operations) -> None:
+        """Begin to look; in the daemon's loop."""
+        if self._loop is None:
+            self.sources.health.listen(self._changed)
+            self.sources.executor.on_settled.append(self._settled)
+        self._loop = asyncio.get_running_loop()
+        self._operations = operations
+
+    def _changed(self, _state: State, _reason: str | None) -> None:
+        self.on_change()
+
+    def _settled(self, job: Job) -> None:
+        self._outcomes[str(job.outcome), "" if job.reason is None else job.reason.label] += 1
+        self.on_change()
+
+    # --- looking ------------------------------------------------------------------------------------------------
+
+    async def state(self) -> dict[str, Any]:
+        """All that is known now: what `combtrace status` tells, and what belongs beside it; raise DaemonSilent."""
+        return await self._asked(self._state())
+
+    async def _state(self) -> dict[str, Any]:
+        """In the daemon's loop, so that all of it is of one moment."""
+        assert self._operations is not None
+        told = await self._operations.status({}, "page")
+        outcomes = sorted(self._outcomes.items())
+        return {
+            **told,
+            "outcomes": [
+                {"outcome": outcome, "reason": reason or None, "count": count} for (outcome, reason), count in outcomes
+            ],
+            "recipes": [{"number": number, "name": name} for number, name in self.sources.recipes()],
+            "camera": {"what": self.sources.camera, "up": "camera" not in told["faults"]},
+            "link": self._link(),
+            "calibration": self._calibration(),
+            "disk": self._disk(),
+        }
+
+    def _link(self) -> dict[str, Any] | None:
+        link = self.sources.link
+        if link is None:
+            return None
+        return {
+            "what": self.sources.controller,
+            "up": link.fault() is None,
+            "not_ready": link.controller_not_ready(),
+            "round_trip_ms": None if link.round_trip_s is None else round(link.round_trip_s * 1000, 1),
+            "connections": link.connections,
+        }
+
+    def _calibration(self) -> dict[str, Any] | None:
+        guard = self.sources.guard()
+        if guard is None:
+            return None
+        age_days = guard.age_days
+        return {
+            "digest": guard.record.digest,
+            "age_days": None if age_days is None else round(age_days, 2),
+            "max_age_days": guard.limits.max_age_days,
+        }
+
+    def _disk(self) -> dict[str, Any]:
+        storage, archive = self.sources.storage, self.sources.archive
+        figures = None if archive is None else archive.figures
+        return {
+            "journal_free_bytes": None if storage is None else storage.free_bytes,
+            "archive_bytes": 0 if figures is None else figures.bytes,
+            "archive_max_bytes": self.sources.archive_max_bytes,
+            "archive_jobs": 0 if figures is None else figures.jobs,
+        }
+
+    # --- asking -------------------------------------------------------------------------------------------------
+
+    async def trigger(self, recipe: int, thickness_um: int) -> int | None:
+        """The job that was taken, None where it waits for its turn; raise TriggerRefused, DaemonSilent."""
+        return await self._asked(self._trigger(TriggerStamp(TRIGGER_KIND, recipe, thickness_um)))
+
+    async def _trigger(self, stamp: TriggerStamp) -> int | None:
+        taken = await self.sources.executor.ask(stamp)
+        return None if isinstance(taken, Queued) else taken.job.job_id
+
+    async def halt(self, who: str, reason: str) -> str:
+        """The state after a halt; raise CommandRefused, DaemonSilent."""
+        assert self._operations is not None
+        return str((await self._asked(self._operations.halt({"reason": reason}, who)))["state"])
+
+    async def resume(self, who: str) -> str:
+        """The state after a halt's end; raise CommandRefused, DaemonSilent."""
+        assert self._operations is not None
+        return str((await self._asked(self._operations.resume({}, who)))["state"])
+
+    async def _asked(self, work: Coroutine[Any, Any, T]) -> T:
+        """What `work` gives in the daemon's loop. Once begun it comes to its end there, whoever goes away here."""
+        if self._loop is None or self._loop.is_closed():
+            work.close()
+            raise DaemonSilent("the service has ended")
+        answer = asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, self._loop))
+        try:
+            async with asyncio.timeout(ANSWER_BOUND_S):
+                return await asyncio.shield(answer)
+        except TimeoutError as error:
+            raise DaemonSilent(f"the service has not answered for {ANSWER_BOUND_S:g} s. See its log") from error

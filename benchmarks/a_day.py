@@ -23,9 +23,9 @@ from textwrap import fill
 import cv2
 import numpy as np
 
-from tests.system.cell import SAMPLES, Cell
-from tests.system.processes import combtrace, until
-from tests.system.small_disk import mounted
+from tests.support.processes.cell import SAMPLES, Cell
+from tests.support.processes.processes import combtrace, until
+from tests.support.processes.small_disk import mounted
 
 PAGE = Path(__file__).parents[1] / "docs" / "a-day.md"
 WIDTH = 120

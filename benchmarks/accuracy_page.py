@@ -20,9 +20,9 @@ This page is written by `make accuracy`; do not edit it by hand. This one came f
 `python -m benchmarks.bench {arguments}`.
 
 Every scene is rendered by `contour.synthetic` from an outline in millimetres through a camera with a lens, so the truth
-is known exactly: material ends at the outline to 0.02 px before the lens blurs it. Scenes are defined in
-`benchmarks/scenes.py`; those called `tuned-…` are for building methods, the others for measuring. Random scenes come
-from `benchmarks/random_scenes.py`, one a seed.
+is known exactly: material ends at the outline to 0.02 px before the lens blurs it. Scenes are
+defined in `tests/support/scenes/bench_scenes.py`; those called `tuned-…` are for building methods, the others for
+measuring. Random scenes come from `tests/support/scenes/random_scenes.py`, one a seed.
 
 Not all definitions are older than the first results. After wall-tips had run once, `foam` went from `edge: cells` to
 `cut` (it is a cut block, and did badly as `cells`), `lattice-closed-dark` got another outline, shop and random scenes

@@ -16,14 +16,14 @@ import cv2
 from benchmarks import report
 from benchmarks.accuracy_page import write_page
 from benchmarks.goals import goals
-from benchmarks.photographs import PhotographTrial, cell_pitch_px, photographs, run_photograph
 from benchmarks.pictures import Gallery
-from benchmarks.random_scenes import random_scene
-from benchmarks.rivals import RIVALS
-from benchmarks.scenes import BenchScene, measured_scenes, tuned_scenes
 from benchmarks.speed import SpeedRow, speed_rows
-from benchmarks.trials import Trial, available_methods, run_trial
 from contour.synthetic import render
+from tests.support.scenes.bench_scenes import BenchScene, measured_scenes, tuned_scenes
+from tests.support.scenes.photographs import PhotographTrial, cell_pitch_px, photographs, run_photograph
+from tests.support.scenes.random_scenes import random_scene
+from tests.support.scenes.rivals import RIVALS
+from tests.support.scenes.trials import Trial, available_methods, run_trial
 
 SPEED_SCENE = "12mp"
 

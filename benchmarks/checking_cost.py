@@ -10,14 +10,14 @@ from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
-from benchmarks.scenes import measured_scenes
-from benchmarks.trials import calibration_for
 from contour.synthetic import render
 from contour.tracing import tracing, wall_tips
 from contour.walls import see_block as wall_witnesses
 from service.config.config import Recipe
 from service.measuring import measure
 from service.measuring.measure import Measurer
+from tests.support.scenes.bench_scenes import measured_scenes
+from tests.support.scenes.trials import calibration_for
 
 ALLOWED = 0.15
 SCENE = "12mp"

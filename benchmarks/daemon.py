@@ -22,8 +22,8 @@ from textwrap import fill
 from benchmarks.daemon_job import JobTimes, job_times
 from benchmarks.page_section import put_section
 from benchmarks.rest import SETTLES_S, medians_percent, share_percent
-from tests.system.cell import Cell
-from tests.system.processes import until
+from tests.support.processes.cell import Cell
+from tests.support.processes.processes import until
 
 PAGE = Path(__file__).parents[1] / "docs" / "operating.md"
 PAGE_WIDTH = 120

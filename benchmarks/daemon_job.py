@@ -25,8 +25,8 @@ from service.reasons import Outcome
 from service.records.archive import document_of
 from service.records.journal import Job, TriggerStamp
 from service.state import State
-from tests.system.cell import SAMPLES
-from tests.system.processes import Process, free_port
+from tests.support.processes.cell import SAMPLES
+from tests.support.processes.processes import Process, free_port
 
 WIDTH, HEIGHT = 4000, 3000
 JOBS = 15

@@ -15,9 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.page_section import put_section
-from benchmarks.random_scenes import random_scene
 from benchmarks.report import table
-from benchmarks.trials import calibration_for
 from contour.acceptance.acceptance import Limits, Refusal, judge
 from contour.acceptance.disagreement import disagreement
 from contour.errors import ContourError
@@ -27,6 +25,8 @@ from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import render
 from contour.tracing.tracing import TraceSettings, trace
 from service.config.config import Recipe
+from tests.support.scenes.random_scenes import random_scene
+from tests.support.scenes.trials import calibration_for
 
 SCENES = (996_500, 100)
 _LONG_PITCHES = 4.0

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.photographs import PhotographTrial
-from benchmarks.scenes import BenchScene
 from benchmarks.speed import SpeedRow
-from benchmarks.trials import Trial
+from tests.support.scenes.bench_scenes import BenchScene
+from tests.support.scenes.photographs import PhotographTrial
+from tests.support.scenes.trials import Trial
 
 _RANDOM_SCENES = 300
 RECTANGLES = ("rectangle-easy", "rectangle-shop", "wide-angle-rectangle", "tilted")

@@ -40,7 +40,7 @@ from drivers.controller.modbus.client import ModbusRtuController, SerialLine
 from drivers.controller.modbus.requests import LONGEST_WRITE
 from service.link.link import Link, LinkSettings
 from tests.interop.programs import libmodbus_rtu
-from tests.system.cell import Cell
+from tests.support.processes.cell import Cell
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "link-speed.md"

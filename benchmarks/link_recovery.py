@@ -23,7 +23,7 @@ from statistics import median
 
 from drivers.controller.modbus.client import ModbusController, ModbusRtuOverTcpController, ModbusTcpController
 from service.link.link import Link, LinkSettings
-from tests.system.processes import COMBTRACE, free_port
+from tests.support.processes.processes import COMBTRACE, free_port
 
 REPEATS = 20
 AWAY_S = (0.5, 2.5)  # an attempt and its pause take 1.5 s

@@ -8,8 +8,8 @@ from pathlib import Path
 import cv2
 import yaml
 
-from benchmarks.sample_scenes import CAMERA, JPEG_QUALITY, sample_scenes
 from contour.synthetic import CameraModel, render
+from tests.support.scenes.sample_scenes import CAMERA, JPEG_QUALITY, sample_scenes
 
 FOLDER = Path(__file__).resolve().parent.parent / "service" / "samples"
 
@@ -23,7 +23,7 @@ def main(folder: Path = FOLDER) -> None:
             raise RuntimeError(f"{scene.name}: the JPEG encoder gave nothing; check the OpenCV build")
         (folder / f"{scene.name}.jpg").write_bytes(data.tobytes())
         print(f"{folder / scene.name}.jpg: {len(data) / 1000:.0f} kB")
-    header = "# The camera that the sample frames were rendered with (benchmarks/sample_scenes.py).\n"
+    header = "# The camera that the sample frames were rendered with (tests/support/scenes/sample_scenes.py).\n"
     (folder / "calibration.yaml").write_text(
         header + yaml.safe_dump(calibration_of(CAMERA), sort_keys=False, default_flow_style=None), encoding="utf-8"
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache
 
-from benchmarks.metrics import agreement
 from contour.geometry.rings import Contour, area
 from contour.synthetic import (
     CellGeometry,
@@ -26,6 +25,7 @@ from contour.synthetic import (
 from contour.tracing.binarize import WallMask, binarize
 from contour.tracing.paper_cells import Cells
 from contour.tracing.tracing import TraceSettings, trace
+from tests.support.scenes.metrics import agreement
 
 WIDTH, HEIGHT, MM_PER_PX = 500, 430, 0.6
 MIDDLE = (WIDTH * MM_PER_PX / 2, HEIGHT * MM_PER_PX / 2 - 11.0)

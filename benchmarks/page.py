@@ -30,10 +30,10 @@ from playwright.sync_api import Response, sync_playwright
 from benchmarks.daemon import Figure
 from benchmarks.rest import processor_s
 from service.records.journal_reader import JobFilter, reading
-from tests.real_parts import need_program
-from tests.system.cell import Cell
-from tests.system.page_client import Client
-from tests.system.processes import free_port, until
+from tests.support.processes.cell import Cell
+from tests.support.processes.page_client import Client
+from tests.support.processes.processes import free_port, until
+from tests.support.real_parts import need_program
 
 PAINT_MS, WEIGHT_KB, COST_PERCENT = 300.0, 150.0, 2.0
 LOADS = 9

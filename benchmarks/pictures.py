@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.scenes import BenchScene
-from benchmarks.trials import Trial
 from contour.geometry.rings import Contour
 from contour.synthetic import Rendered
+from tests.support.scenes.bench_scenes import BenchScene
+from tests.support.scenes.trials import Trial
 
 Picture = NDArray[np.uint8]
 

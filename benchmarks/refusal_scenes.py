@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import drawn_tables
-from benchmarks.scenes import MIDDLE, SHAPES, shop
 from contour.synthetic import (
     Clutter,
     Light,
@@ -30,6 +29,7 @@ from contour.synthetic import (
     render,
     truth_px,
 )
+from tests.support.scenes.bench_scenes import MIDDLE, SHAPES, shop
 
 Picture = NDArray[np.uint8]
 Family = Callable[[np.random.Generator], Picture]

@@ -14,17 +14,17 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 
 from benchmarks.checking_cost import ALLOWED, checking_cost
-from benchmarks.metrics import agreement
 from benchmarks.page_section import PAGE, put_section
-from benchmarks.random_scenes import random_scene
 from benchmarks.refusal_scenes import refusal_scenes
 from benchmarks.report import table
-from benchmarks.scenes import BenchScene, measured_scenes, tuned_scenes
 from benchmarks.table_scenes import table_scenes
-from benchmarks.trials import calibration_for
 from contour.synthetic import render
 from service.config.config import Recipe
 from service.measuring.measure import Measurement, Measurer
+from tests.support.scenes.bench_scenes import BenchScene, measured_scenes, tuned_scenes
+from tests.support.scenes.metrics import agreement
+from tests.support.scenes.random_scenes import random_scene
+from tests.support.scenes.trials import calibration_for
 
 TITLE = "What is refused, and by what name"
 # Another block lies beside these: they are what `pieces: largest` is for.

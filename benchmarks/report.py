@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from benchmarks.goals import Goal
-from benchmarks.metrics import Agreement
-from benchmarks.photographs import PhotographTrial
-from benchmarks.scenes import BenchScene
 from benchmarks.speed import SpeedRow
-from benchmarks.trials import Trial, stages
+from tests.support.scenes.bench_scenes import BenchScene
+from tests.support.scenes.metrics import Agreement
+from tests.support.scenes.photographs import PhotographTrial
+from tests.support.scenes.trials import Trial, stages
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.scenes import BenchScene
-from benchmarks.trials import run_trial
 from contour.synthetic import Rendered
 from contour.tracing.binarize import binarize
 from contour.tracing.direct_scan import scan_rows
 from contour.tracing.find_contours import largest_contour
 from contour.tracing.sliding_matrix import fill_windows
+from tests.support.scenes.bench_scenes import BenchScene
+from tests.support.scenes.trials import run_trial
 
 ROUNDS = 7
 

@@ -1,4 +1,4 @@
-"""Blocks on coloured, dark, bright and structured tables: all traceable, in the sense of `benchmarks.scenes`.
+"""Blocks on coloured, dark, bright and structured tables: all traceable, as `bench_scenes` means it.
 
 Walls differ from the table by a quarter of full scale or more, in lightness or in a colour channel, and a structure of
 the table is no comb: its holes lie two diameters apart or more. `tuned-…` were looked at while thresholds were chosen.
@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.scenes import SHAPES, BenchScene, seed_of, shop
 from contour.synthetic import Light, Material, Scene, Table
+from tests.support.scenes.bench_scenes import SHAPES, BenchScene, seed_of, shop
 
 _SHAPES = ("rectangle", "convex", "l", "u", "blob", "holes", "crescent")
 _TINTS = {

@@ -17,12 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.metrics import distances, rectified_edges, samples
 from benchmarks.page_section import put_section
-from benchmarks.random_scenes import random_scene
 from benchmarks.report import table
-from benchmarks.scenes import BenchScene, measured_scenes
-from benchmarks.trials import calibration_for
 from benchmarks.uncertainty_plot import PLOT, write_plot
 from contour.errors import ContourError
 from contour.outline.fit import FittedRing, fit_ring
@@ -31,6 +27,10 @@ from contour.synthetic import Rendered, render
 from contour.tracing.tracing import TraceSettings, trace
 from contour.walls.see_block import see_block
 from contour.walls.wall_evidence import BlockEvidence
+from tests.support.scenes.bench_scenes import BenchScene, measured_scenes
+from tests.support.scenes.metrics import distances, rectified_edges, samples
+from tests.support.scenes.random_scenes import random_scene
+from tests.support.scenes.trials import calibration_for
 
 CALIBRATED_ON = (985000, 300)
 MEASURED_ON = (999000, 150)

@@ -1,2 +1,1 @@
-"""A picture and settings in, a `Trace` out: one method each, without a verdict. Used by `acceptance` and the service.
-"""
+"""A picture and settings in, a `Trace` out: one method each, without a verdict. Used by `acceptance`, the service."""

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from service.commissioning.install_files import packaged
-from tests.real_parts import need_program
+from tests.support.real_parts import need_program
 
 ROOT = Path(__file__).parents[2]
 SOURCES, PROGRAM = Path("/opt/src"), Path("/opt/combtrace/bin/combtrace")

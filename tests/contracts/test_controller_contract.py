@@ -22,7 +22,7 @@ from drivers.controller import (
 from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, encode_pages, micrometres
 from drivers.controller.modbus.client import ModbusTcpController
 from drivers.controller.simulated.controller import SimulatedController
-from tests.contracts.controller_cells import PATIENT_S, SERVERS, WAYS, Cell, cell
+from tests.support.controller.controller_cells import PATIENT_S, SERVERS, WAYS, Cell, cell
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")
 

@@ -24,7 +24,7 @@ from drivers.controller import (
 from drivers.controller.modbus.client import ModbusTcpController, RequestLimits
 from drivers.controller.modbus.library_log import LIBRARY_LOGGER
 from drivers.controller.modbus.request_queue import Connection
-from tests.drivers.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
+from tests.support.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")
 

@@ -20,10 +20,10 @@ from drivers.controller.modbus.client import (
     SerialLine,
 )
 from drivers.controller.simulated.controller import ServerLimits, SimulatedController
-from tests.contracts.controller_cells import PATIENT_S, WAYS
 from tests.interop.programs import libmodbus_tcp
-from tests.pty_line import PtyLine
-from tests.serial_server import SerialServer
+from tests.support.controller.controller_cells import PATIENT_S, WAYS
+from tests.support.controller.pty_line import PtyLine
+from tests.support.controller.serial_server import SerialServer
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")
 

@@ -13,7 +13,7 @@ from drivers.controller import ControllerError, ControllerUnavailable, LinkBlock
 from drivers.controller.mailbox.mailbox import ContourMessage, encode_pages
 from drivers.controller.modbus.client import ModbusTcpController
 from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
-from tests.drivers.controller.fault_proxy import Fate, FaultProxy
+from tests.support.controller.fault_proxy import Fate, FaultProxy
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")
 

@@ -27,11 +27,11 @@ from drivers.controller.mailbox.page_spans import PAYLOAD_OFFSET, page_starts, s
 from drivers.controller.modbus.client import ModbusRtuController, ModbusRtuOverTcpController, Rs485, SerialLine
 from drivers.controller.modbus.late_replies import BARRIER_COUNTS, SILENCE_S
 from drivers.controller.modbus.requests import LONGEST_READ
-from tests.contracts.controller_cells import PATIENT_S
-from tests.drivers.controller.line_server import LineServer
-from tests.drivers.controller.rtu_frames import frame
-from tests.pty_line import PtyLine
-from tests.serial_server import SerialServer
+from tests.support.controller.controller_cells import PATIENT_S
+from tests.support.controller.line_server import LineServer
+from tests.support.controller.pty_line import PtyLine
+from tests.support.controller.rtu_frames import frame
+from tests.support.controller.serial_server import SerialServer
 
 IMPATIENT_S = 0.3  # waited out; long enough for a busy machine to answer in
 

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.scanned_server import scanned_server
-from tests.structured_text import Program, StructuredTextError, compiled
-from tests.system.processes import combtrace
+from tests.support.controller.scanned_server import scanned_server
+from tests.support.processes.processes import combtrace
+from tests.support.structured_text import Program, StructuredTextError, compiled
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "controllers" / "iec61131"

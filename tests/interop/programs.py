@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.real_parts import missing, need_program
+from tests.support.real_parts import missing, need_program
 
 HERE = Path(__file__).parent
 LIBMODBUS_INSTALL = "apt-get install gcc libc6-dev pkg-config libmodbus-dev"

@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 
 from drivers.controller.modbus.client import ModbusTcpController
 from drivers.controller.modbus.requests import read_registers, registers_of, stream_of, write_registers
-from tests.protocol_decoder import u32_from, words_of
+from tests.support.controller.protocol_decoder import u32_from, words_of
 
 LINK, SERVICE = 0, 16
 SCAN_S = 0.01

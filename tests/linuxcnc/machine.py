@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.system.processes import free_port
+from tests.support.processes.processes import free_port
 
 HERE = Path(__file__).parent
 BRIDGE = HERE.parents[1] / "controllers" / "linuxcnc"

@@ -16,12 +16,12 @@ import pytest
 import shapely
 import yaml
 
-from benchmarks.sample_scenes import sample_scenes
 from contour.geometry.rings import Contour
 from tests.linuxcnc.machine import bridge_on, linuxcnc_session
 from tests.linuxcnc.way_picture import draw_way
-from tests.real_parts import need_program
-from tests.system.processes import Process, combtrace, jobs, until
+from tests.support.processes.processes import Process, combtrace, jobs, until
+from tests.support.real_parts import need_program
+from tests.support.scenes.sample_scenes import sample_scenes
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = Path(__file__).parents[2] / "service" / "samples"

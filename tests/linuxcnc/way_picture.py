@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.sample_scenes import CAMERA, THICKNESS_MM
+from tests.support.scenes.sample_scenes import CAMERA, THICKNESS_MM
 
 SAMPLE = Path(__file__).parents[2] / "service" / "samples" / "4-with-holes.jpg"
 GREEN, BLUE, ORANGE, WHITE = (80, 220, 80), (255, 160, 40), (0, 140, 255), (255, 255, 255)

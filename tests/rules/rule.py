@@ -18,13 +18,18 @@ JOURNAL, OWNERSHIP, CLOCK = (
     "service/link/ownership.py",
     "service/link/controller_clock.py",
 )
-IN_CLOCK, IN_DOUBT = "tests/service/test_controller_clock.py", "tests/service/test_transfer_in_doubt.py"
-TRIGGERS, IN_ANSWERS = "service/jobs/triggers.py", "tests/service/test_serial_answers.py"
+IN_CLOCK, IN_DOUBT = "tests/service/link/test_controller_clock.py", "tests/service/link/test_transfer_in_doubt.py"
+TRIGGERS, IN_ANSWERS = "service/jobs/triggers.py", "tests/service/jobs/test_serial_answers.py"
 IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_RESUMING, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (
-    f"tests/service/test_{name}.py"
-    for name in (
-        *("transfer", "transfer_pages", "link", "executor", "cycle", "cycle_after_restart"),
-        *("ownership", "journal", "journal_recovery"),
+    f"tests/service/{room}/test_{name}.py"
+    for room, name in (
+        *(("link", "transfer"), ("link", "transfer_pages"), ("link", "link"), ("jobs", "executor"), ("jobs", "cycle")),
+        *(
+            ("jobs", "cycle_after_restart"),
+            ("link", "ownership"),
+            ("records", "journal"),
+            ("records", "journal_recovery"),
+        ),
     )
 )
 

@@ -25,8 +25,8 @@ import numpy as np
 
 from benchmarks.daemon import resident_megabytes
 from service.cli.daemon.run import FILE_THREADS
-from tests.system.cell import SAMPLES, Cell
-from tests.system.processes import until
+from tests.support.processes.cell import SAMPLES, Cell
+from tests.support.processes.processes import until
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reliability.md"

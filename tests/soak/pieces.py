@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from tests.soak.disk_cell import DiskCell
-from tests.soak.faulted_cell import FaultedCell, Outcome, Terms, Transport
-from tests.soak.killed_cell import KilledCell, Killing, Toll
-from tests.soak.other_services import ForeignCell, TwinCell
-from tests.soak.restored_cell import RestoredCell
-from tests.soak.stopped_cell import StoppedCell
-from tests.soak.swapped_cell import SettingsCell, SpareCell
-from tests.soak.told_cell import ToldCell
-from tests.soak.torn_cell import TornCell
+from tests.soak.cells.disk_cell import DiskCell
+from tests.soak.cells.faulted_cell import FaultedCell, Outcome, Terms, Transport
+from tests.soak.cells.killed_cell import KilledCell, Killing, Toll
+from tests.soak.cells.other_services import ForeignCell, TwinCell
+from tests.soak.cells.restored_cell import RestoredCell
+from tests.soak.cells.stopped_cell import StoppedCell
+from tests.soak.cells.swapped_cell import SettingsCell, SpareCell
+from tests.soak.cells.told_cell import ToldCell
+from tests.soak.cells.torn_cell import TornCell
 
 LINE: tuple[Transport, ...] = ("tcp", "rtu", "rtu-over-tcp")
 # What is done to both sides in one process.
@@ -125,7 +125,7 @@ def run_piece(name: str, folder: Path | None = None) -> Result:
     """Run one piece in this process. folder: where journals and logs are kept; a temporary one where None."""
     campaign, number, count = name.split(":")
     if campaign == "fuzz":
-        from tests.drivers.controller.wire_fuzz import fuzz  # hypothesis is slow to import
+        from tests.support.controller.wire_fuzz import fuzz  # hypothesis is slow to import
 
         started = time.monotonic()
         cases = fuzz(int(count), int(number))

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from tests.real_parts import missing
-from tests.soak.disk_cell import DiskCell
-from tests.soak.faulted_cell import FaultedCell, Terms
-from tests.soak.killed_cell import KilledCell, Killing
-from tests.soak.other_services import ForeignCell, TwinCell
-from tests.soak.restored_cell import RestoredCell
-from tests.soak.stopped_cell import StoppedCell
-from tests.soak.swapped_cell import SettingsCell, SpareCell
-from tests.soak.told_cell import ToldCell
-from tests.soak.torn_cell import TearingController, TornCell
-from tests.system.small_disk import CannotMount
+from tests.soak.cells.disk_cell import DiskCell
+from tests.soak.cells.faulted_cell import FaultedCell, Terms
+from tests.soak.cells.killed_cell import KilledCell, Killing
+from tests.soak.cells.other_services import ForeignCell, TwinCell
+from tests.soak.cells.restored_cell import RestoredCell
+from tests.soak.cells.stopped_cell import StoppedCell
+from tests.soak.cells.swapped_cell import SettingsCell, SpareCell
+from tests.soak.cells.told_cell import ToldCell
+from tests.soak.cells.torn_cell import TearingController, TornCell
+from tests.support.processes.small_disk import CannotMount
+from tests.support.real_parts import missing
 
 # What must have happened in each, by the names that the report gives it.
 SLICES: list[tuple[type[FaultedCell], Terms, set[str]]] = [

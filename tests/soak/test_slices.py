@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from tests.soak.faulted_cell import FaultedCell, Terms
-from tests.soak.killed_cell import KilledCell, Killing
+from tests.soak.cells.faulted_cell import FaultedCell, Terms
+from tests.soak.cells.killed_cell import KilledCell, Killing
 from tests.soak.pieces import INCIDENTS, Amounts, all_pieces, faulted_terms, incident_terms, killing_terms
 from tests.soak.promises import PROMISES, Evidence, Findings, Side, Taken, judge, judge_twins
 from tests.soak.report import NAMES, write_report

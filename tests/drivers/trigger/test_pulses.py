@@ -10,7 +10,7 @@ import pytest
 
 from drivers.trigger import TriggerUnavailable, pulses
 from drivers.trigger.pulses import SerialBytes, SerialSignal
-from tests.serial_over_network import SerialServer
+from tests.support.controller.serial_over_network import SerialServer
 
 # pyserial's client for RFC 2217 names its thread the old way.
 pytestmark = pytest.mark.filterwarnings("ignore:set(Daemon|Name)\\(:DeprecationWarning")

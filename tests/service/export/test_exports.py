@@ -21,7 +21,7 @@ from service.export.dxf import to_dxf
 from service.export.files import write_export
 from service.export.geojson import to_geojson
 from service.export.svg import LINE_MM, MARGIN_MM, to_svg
-from tests.real_parts import need_program
+from tests.support.real_parts import need_program
 
 EXTERIOR = np.array([[-10.0, 5.0], [90.1234, 5.0], [90.0, 65.0], [40.0, 50.5], [-10.0, 60.0]])
 HOLES = (

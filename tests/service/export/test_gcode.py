@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from contour.geometry.rings import Contour, signed_area
 from service.export.document import ExportDocument, ExportError
 from service.export.gcode import GcodeSettings, to_gcode
-from tests.real_parts import need_program
+from tests.support.real_parts import need_program
 
 SQUARE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 60.0], [0.0, 60.0]])
 HOLE = np.array([[40.0, 20.0], [40.0, 40.0], [60.0, 40.0], [60.0, 20.0]])

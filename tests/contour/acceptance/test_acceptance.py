@@ -1,0 +1,260 @@
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from contour.acceptance.acceptance import Finding, Limits, Refusal, judge, judge_without_block
+from contour.acceptance.error_budget import ErrorBudget
+from contour.acceptance.quality import Quality
+from contour.geometry.rings import Contour
+from contour.image.region import Region
+from contour.polygon.polygon import Polygon
+from contour.tracing.tracing import Trace
+from contour.walls.comb_likeness import Comb
+from contour.walls.pieces import Piece
+from tests.support.pictures.rings import SQUARE
+
+FRAME = (640, 480)
+LIMITS = Limits(min_area_mm2=1000, max_area_mm2=20_000, max_vertices=10)
+
+
+def polygon(ring_px: np.ndarray, holes: tuple[np.ndarray, ...] = (), mm_per_px: float | None = 1.0) -> Polygon:
+    pixels = Contour(ring_px, holes)
+    if mm_per_px is None:
+        return Polygon(pixels, None, 10_000.0, None, None)
+    scaled = Contour(ring_px * [1, -1] * mm_per_px, tuple(hole * [1, -1] * mm_per_px for hole in holes))
+    return Polygon(pixels, scaled, 10_000.0, 10_000.0 * mm_per_px**2, mm_per_px)
+
+
+GOOD = polygon(SQUARE * 10 + 100)
+
+
+def test_a_good_polygon_is_accepted() -> None:
+    assert judge(GOOD, FRAME, LIMITS) == ()
+
+
+def test_codes_and_names_are_the_protocols() -> None:
+    table = {
+        102: "image_quality",
+        103: "scene_moved",
+        110: "no_block_found",
+        111: "touches_border",
+        112: "area_out_of_limits",
+        113: "methods_disagree",
+        114: "uncertainty_too_large",
+        115: "outside_work_area",
+        116: "several_blocks",
+        130: "too_many_points",
+        131: "self_intersecting",
+    }
+    assert {int(refusal): refusal.reason for refusal in Refusal} == table
+
+
+@pytest.mark.parametrize(
+    ("shift", "side"),
+    [((-99, 0), "left"), ((0, -99), "top"), ((640 - 1 - 201, 0), "right"), ((0, 480 - 1 - 201), "bottom")],
+)
+def test_a_contour_within_two_pixels_of_the_frame_touches_it(shift: tuple[int, int], side: str) -> None:
+    # One pixel of margin on pixel centres is 1.5 px from the frame's edge.
+    near = polygon(SQUARE * 10 + 100 + np.array(shift))
+    (finding,) = judge(near, FRAME, LIMITS)
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+    assert "1.5 px" in finding.text
+    assert side in finding.text
+    inwards = -np.sign(shift)
+    assert judge(polygon(SQUARE * 10 + 100 + np.array(shift) + inwards), FRAME, LIMITS) == ()
+
+
+def test_a_contour_beyond_the_frame_touches_it() -> None:
+    (finding,) = judge(polygon(SQUARE * 10 - 50), FRAME, LIMITS)
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+
+
+@pytest.mark.parametrize(("mm_per_px", "area"), [(0.3, "900 mm²"), (1.5, "22500 mm²")])
+def test_an_area_beyond_the_recipes_limits_names_all_three_numbers(mm_per_px: float, area: str) -> None:
+    (finding,) = judge(polygon(SQUARE * 10 + 100, mm_per_px=mm_per_px), FRAME, LIMITS)
+    assert finding.refusal == Refusal.AREA_OUT_OF_LIMITS
+    assert area in finding.text
+    assert "1000 to 20000 mm²" in finding.text
+
+
+def test_limits_in_millimetres_do_not_apply_without_a_calibration() -> None:
+    far_away = SQUARE + 1e6
+    limits = replace(LIMITS, max_area_mm2=2.0, min_area_mm2=1.0, work_area_mm=far_away)
+    assert judge(polygon(SQUARE * 10 + 100, mm_per_px=None), FRAME, limits) == ()
+
+
+def test_too_many_vertices_of_all_rings_together_are_refused_without_a_calibration_too() -> None:
+    hole = SQUARE[::-1] * 2 + 110
+    many = polygon(SQUARE * 10 + 100, (hole, hole + 40), mm_per_px=None)
+    (finding,) = judge(many, FRAME, LIMITS)
+    assert finding.refusal == Refusal.TOO_MANY_POINTS
+    assert "12 vertices" in finding.text
+    assert "allows 10" in finding.text
+
+
+def test_a_ring_that_meets_itself_is_refused() -> None:
+    crossed = SQUARE[[0, 2, 1, 3]] * 10 + 100
+    for mm_per_px in (None, 1.0):
+        (finding,) = judge(polygon(crossed, mm_per_px=mm_per_px), FRAME, LIMITS)
+        assert finding.refusal == Refusal.SELF_INTERSECTING
+        assert "exterior meets itself" in finding.text
+
+
+def test_a_hole_that_leaves_the_exterior_is_refused() -> None:
+    (finding,) = judge(polygon(SQUARE * 10 + 100, (SQUARE[::-1] + 300,)), FRAME, LIMITS)
+    assert finding.refusal == Refusal.SELF_INTERSECTING
+    assert "hole 1 lies outside" in finding.text
+
+
+WORK_AREA = np.array([[0.0, -400.0], [400.0, -400.0], [400.0, 0.0], [0.0, 0.0]])
+NOTCHED = np.array(
+    [[0.0, -400.0], [149.0, -400.0], [150.0, -150.0], [151.0, -400.0], [400.0, -400.0], [400, 0], [0, 0]]
+)
+
+
+@pytest.mark.parametrize(
+    ("work_area", "words"),
+    [
+        (WORK_AREA, None),
+        (WORK_AREA[::-1], None),
+        (WORK_AREA + np.array([150, 0]), r"lie outside"),
+        (NOTCHED, "crosses or touches"),
+        (WORK_AREA + 5000, "lie outside"),
+    ],
+)
+def test_the_whole_contour_must_lie_in_the_work_area(work_area: np.ndarray, words: str | None) -> None:
+    findings = judge(GOOD, FRAME, replace(LIMITS, work_area_mm=work_area))
+    if words is None:
+        assert findings == ()
+    else:
+        assert [finding.refusal for finding in findings] == [Refusal.OUTSIDE_WORK_AREA]
+        assert words in findings[0].text
+
+
+def test_an_uncertainty_is_judged_where_it_is_limited_and_told_with_its_parts() -> None:
+    limits = replace(LIMITS, max_uncertainty_mm=0.5)
+    assert judge(GOOD, FRAME, limits, budget=ErrorBudget(0.3, 0.4, 0.0)) == ()
+    assert judge(GOOD, FRAME, LIMITS, budget=ErrorBudget(99.0, 0.0, None)) == ()
+    (finding,) = judge(GOOD, FRAME, limits, budget=ErrorBudget(0.3, 0.41, None))
+    assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
+    assert "0.51 mm only (picture 0.30, thickness 0.41, calibration not stated), 0.5 mm are allowed" in finding.text
+
+
+def test_an_uncertainty_that_nobody_knows_is_not_within_a_limit() -> None:
+    limits = replace(LIMITS, max_uncertainty_mm=0.5)
+    assert [finding.refusal for finding in judge(GOOD, FRAME, limits)] == [Refusal.UNCERTAINTY_TOO_LARGE]
+    assert judge(polygon(SQUARE * 10 + 100, mm_per_px=None), FRAME, limits) == ()
+
+
+def traced(**changes: object) -> Trace:
+    """A good trace of the good polygon."""
+    return replace(Trace("wall-tips", "bright", 24.0, GOOD.pixels), **changes)
+
+
+def test_a_contour_that_is_not_sure_within_two_cells_is_refused_whatever_the_recipe_allows() -> None:
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=48.0)) == ()
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=51.0))
+    assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
+    assert "sure within 51.0 px only, 2.1 cells, 2 are allowed" in finding.text
+
+
+def test_the_ring_that_the_polygon_was_made_of_must_keep_off_the_frame_too() -> None:
+    bulge = np.insert(GOOD.pixels.exterior, 1, [0.0, 150.0], axis=0)
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(contour=Contour(bulge)))
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+    assert judge(GOOD, FRAME, LIMITS, traced=traced()) == ()
+
+
+def test_a_contour_at_the_regions_edge_is_told_as_such() -> None:
+    (finding,) = judge(GOOD, FRAME, LIMITS, region=Region.of_box(50, 50, 201, 400))
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+    assert "1.5 px" in finding.text
+    assert "region of interest" in finding.text
+    assert judge(GOOD, FRAME, LIMITS, region=Region.of_box(50, 50, 202, 400)) == ()
+
+
+def test_a_bad_picture_is_told_before_what_was_traced_in_it() -> None:
+    quality = Quality(180.0, 120.0, 1.5, 4.0, 24.0, 0.01)
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(quality=quality))
+    assert finding.refusal == Refusal.IMAGE_QUALITY
+    assert finding.text.startswith("The picture is not good enough: walls are blurred by 4.0 px")
+
+
+def test_all_that_is_wrong_with_a_picture_is_told_in_one_finding() -> None:
+    quality = Quality(12.0, 120.0, 1.5, 4.0, 24.0, 0.01)
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(quality=quality))
+    assert "12 of 255" in finding.text
+    assert ". Besides, walls are blurred by 4.0 px" in finding.text
+
+
+def test_another_block_is_refused_where_the_recipe_wants_one() -> None:
+    other = Piece(3000.0, (400, 50, 460, 120))
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(others=(other,)))
+    assert finding.refusal == Refusal.SEVERAL_BLOCKS
+    assert "10000 px²" in finding.text
+    assert "3000 px² (x 400 to 460, y 50 to 120 px)" in finding.text
+    assert judge(GOOD, FRAME, replace(LIMITS, pieces="largest"), traced=traced(others=(other,))) == ()
+
+
+def test_an_offcut_is_no_block() -> None:
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(others=(Piece(390.0, (400, 50, 460, 120)),))) == ()
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(others=(Piece(410.0, (400, 50, 460, 120)),))) != ()
+
+
+def test_of_two_nearly_equal_blocks_none_is_the_largest() -> None:
+    twins = (Piece(8100.0, (400, 50, 500, 150)), Piece(100.0, (0, 0, 9, 9)))
+    (finding,) = judge(GOOD, FRAME, replace(LIMITS, pieces="largest"), traced=traced(others=twins))
+    assert finding.refusal == Refusal.SEVERAL_BLOCKS
+    assert "80 %" in finding.text
+
+
+def test_where_cells_are_none_the_picture_is_judged_as_a_whole() -> None:
+    # By a pitch read wrong, 67 px, a blur of 7 px would pass.
+    blurred = np.zeros((300, 400), np.uint8)
+    blurred[:, 200:] = 120
+    blurred = np.asarray(cv2.GaussianBlur(blurred, (0, 0), 7.0), np.uint8)
+    scattered = traced(comb=Comb(67.0, 18.0, True, 9, 0.15, 0.2))
+    reasons = [finding.refusal for finding in judge(GOOD, FRAME, LIMITS, traced=scattered, picture=blurred)]
+    assert reasons == [Refusal.IMAGE_QUALITY, Refusal.NO_BLOCK_FOUND]
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(), picture=blurred) == ()
+
+
+def test_what_is_no_comb_is_no_block() -> None:
+    seen = traced(comb=Comb(86.0, 35.6, False, 42, 1.0, 1.0))
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=seen)
+    assert finding.refusal == Refusal.NO_BLOCK_FOUND
+    assert "40 % as wide" in finding.text
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(comb=Comb(24.0, 3.0, True, 300, 0.6, 0.6))) == ()
+
+
+def test_walls_that_go_on_to_the_last_pixels_touch_the_border() -> None:
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(reaches_frame=True))
+    assert finding.refusal == Refusal.TOUCHES_BORDER
+
+
+def test_walls_lost_in_noise_are_no_block() -> None:
+    quality = Quality(180.0, 9.0, 3.0, 1.4, 24.0, 0.0)
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(quality=quality))
+    assert finding.refusal == Refusal.NO_BLOCK_FOUND
+
+
+def test_each_reason_is_told_once() -> None:
+    findings = judge(polygon(SQUARE * 10 - 50), FRAME, LIMITS, traced=traced(reaches_frame=True))
+    assert [int(finding.refusal) for finding in findings] == [111]
+
+
+def test_without_a_contour_a_useless_picture_is_told_first() -> None:
+    black = np.zeros((480, 640), np.uint8)
+    assert [int(finding.refusal) for finding in judge_without_block(black, "nothing there.")] == [102, 110]
+    grey = np.full((480, 640), 90, np.uint8)
+    (finding,) = judge_without_block(grey, "nothing there.")
+    assert finding == Finding(Refusal.NO_BLOCK_FOUND, "nothing there.")
+
+
+def test_all_findings_are_told_lowest_code_first() -> None:
+    crossed = polygon(SQUARE[[0, 2, 1, 3]] * 60, mm_per_px=3.0)
+    limits = Limits(max_area_mm2=5, max_vertices=3, work_area_mm=WORK_AREA)
+    codes = [int(finding.refusal) for finding in judge(crossed, FRAME, limits)]
+    assert codes == [111, 112, 115, 130, 131]

@@ -1,0 +1,112 @@
+import cv2
+import numpy as np
+import pytest
+
+from contour.errors import PictureError
+from contour.geometry.rings import Contour
+from contour.image.overlay import ACCEPTED, HOLE, REFUSED, VERTEX, draw_overlay
+from tests.support.pictures.rings import SQUARE
+
+OUTLINE = Contour(SQUARE * [50, 30] + [150.0, 150.0], (SQUARE[::-1] * 8 + [300.0, 250.0],))
+
+
+def near(picture: np.ndarray, x: int, y: int, colour: tuple[int, int, int], reach: int = 2) -> bool:
+    """True where the colour is on some pixel around (x, y), nearly."""
+    around = picture[y - reach : y + reach + 1, x - reach : x + reach + 1].reshape(-1, 3).astype(int)
+    return bool((np.abs(around - colour).max(axis=1) < 40).any())
+
+
+@pytest.mark.parametrize("level", [0, 128, 255])
+def test_exterior_holes_and_vertices_stand_out_on_any_grey(level: int) -> None:
+    drawn = draw_overlay(np.full((600, 800), level, np.uint8), OUTLINE)
+    assert drawn.shape == (600, 800, 3)
+    assert near(drawn, 400, 150, ACCEPTED)
+    assert near(drawn, 300, 290, HOLE)
+    assert near(drawn, 150, 150, VERTEX)
+    assert not near(drawn, 400, 350, ACCEPTED)
+
+
+def test_a_refused_contour_is_red() -> None:
+    drawn = draw_overlay(np.zeros((600, 800, 3), np.uint8), OUTLINE, refused=True)
+    assert near(drawn, 400, 150, REFUSED)
+    assert not near(drawn, 400, 150, ACCEPTED)
+
+
+def test_lines_are_drawn_at_fractions_of_a_pixel() -> None:
+    picture = np.zeros((100, 100), np.uint8)
+    first = draw_overlay(picture, Contour(SQUARE * 5 + 20.0))
+    second = draw_overlay(picture, Contour(SQUARE * 5 + 20.4))
+    assert (first != second).any()
+
+
+def test_lines_and_letters_grow_with_the_picture() -> None:
+    small = draw_overlay(np.zeros((600, 800), np.uint8), OUTLINE, caption=["accepted"])
+    scaled = Contour(OUTLINE.exterior * 5, tuple(hole * 5 for hole in OUTLINE.holes))
+    large = draw_overlay(np.zeros((3000, 4000), np.uint8), scaled, caption=["accepted"])
+    shares = [np.mean(drawn.max(axis=2) > 60) for drawn in (small, large)]
+    assert shares[1] == pytest.approx(shares[0], rel=0.4)
+
+
+def test_the_caption_stays_inside_the_picture_however_long() -> None:
+    blank = np.zeros((400, 600), np.uint8)
+    drawn = draw_overlay(blank, None, caption=["refused: area_out_of_limits", "a long reason, " * 20])
+    written = np.flatnonzero(drawn.max(axis=(0, 2)) > 100)
+    assert len(written)
+    assert written.max() < 598
+
+
+def test_a_picture_without_a_contour_and_without_text_is_the_picture() -> None:
+    picture = np.random.default_rng(0).integers(0, 256, (50, 60)).astype(np.uint8)
+    np.testing.assert_array_equal(draw_overlay(picture, None), cv2.merge([picture] * 3))
+
+
+def test_the_input_is_left_alone() -> None:
+    for shape in ((200, 300), (200, 300, 3)):
+        picture = np.full(shape, 90, np.uint8)
+        draw_overlay(picture, Contour(SQUARE * 10 + 50), caption=["text"])
+        assert (picture == 90).all()
+
+
+def test_a_contour_far_outside_and_a_tiny_picture_are_no_special_case() -> None:
+    draw_overlay(np.zeros((3, 3), np.uint8), Contour(SQUARE * 1e9 - 1e9), caption=["accepted", "text"])
+    draw_overlay(np.zeros((1, 1, 3), np.uint8), OUTLINE, caption=["accepted"])
+
+
+def test_thousands_of_vertices_are_drawn_as_a_line_without_marks() -> None:
+    angle = np.linspace(0, 2 * np.pi, 5000, endpoint=False)
+    circle = Contour(np.column_stack([np.cos(angle), np.sin(angle)]) * 200 + 300)
+    drawn = draw_overlay(np.zeros((600, 600), np.uint8), circle)
+    assert near(drawn, 500, 300, ACCEPTED)
+    assert not (np.abs(drawn.astype(int) - VERTEX).max(axis=2) < 20).any()
+
+
+def test_an_array_that_is_no_picture_is_refused() -> None:
+    with pytest.raises(PictureError):
+        draw_overlay(np.zeros((5, 5), np.uint16), None)
+
+
+def test_a_veil_covers_what_the_contour_may_be_off_by_where_it_is_wider_than_the_line() -> None:
+    grey = np.full((600, 800), 100, np.uint8)
+    plain, narrow, wide = (draw_overlay(grey, OUTLINE, marks=False, uncertainty_px=px) for px in (None, 0.5, 12.0))
+    np.testing.assert_array_equal(narrow, plain)
+    assert near(plain, 400, 160, (100, 100, 100), reach=0)
+    assert near(wide, 400, 160, tuple(round(0.65 * 100 + 0.35 * part) for part in VERTEX), reach=0)
+    assert near(wide, 400, 175, (100, 100, 100), reach=0)
+
+
+def test_a_refusals_caption_stands_beside_the_picture_and_hides_nothing_of_it() -> None:
+    picture = np.random.default_rng(0).integers(100, 256, (600, 800)).astype(np.uint8)
+    drawn = draw_overlay(picture, None, caption=["refused: 111 touches_border", "wall-tips"], refused=True)
+    rows = len(drawn) - 600
+    assert 20 < rows < 100
+    np.testing.assert_array_equal(drawn[rows:], cv2.merge([picture] * 3))
+    assert near(drawn, 12, rows // 3, REFUSED, reach=10)
+    assert draw_overlay(picture, None, refused=True).shape == (600, 800, 3)
+
+
+def test_what_lies_beside_is_outlined_too_without_vertices() -> None:
+    beside = SQUARE * [5, 30] + [700.0, 150.0]
+    drawn = draw_overlay(np.zeros((600, 800), np.uint8), OUTLINE, refused=True, others_px=[beside])
+    assert near(drawn, 400, 150, REFUSED)
+    assert near(drawn, 725, 150, REFUSED)
+    assert not near(drawn, 700, 150, VERTEX, reach=4)

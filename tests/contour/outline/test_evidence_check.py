@@ -1,0 +1,60 @@
+"""The outline against the wall ends: what is refused, and what is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from contour.errors import NoBlockFound
+from contour.outline.evidence_check import check_against_evidence
+from tests.support.pictures.outline_scenes import PITCH, rectangle, witnesses
+
+BLOCK = rectangle(900.0, 600.0)
+
+
+class Lens:
+    """A lens about (700, 500) that bends the long edges of BLOCK by a third of PITCH and more."""
+
+    centre = np.array([700.0, 500.0])
+    strength = 1e-7
+
+    def unrectify(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        away = points - self.centre
+        return self.centre + away * (1.0 - self.strength * (away**2).sum(axis=1, keepdims=True))
+
+    def rectify(self, points_px: NDArray[np.float64]) -> NDArray[np.float64]:
+        seen = points_px - self.centre
+        away = seen.copy()
+        for _ in range(40):
+            away = seen / (1.0 - self.strength * (away**2).sum(axis=1, keepdims=True))
+        return self.centre + away
+
+
+def test_a_long_edge_bent_by_the_lens_by_more_than_half_a_small_cell_passes_none_of_its_ends() -> None:
+    lens, pitch = Lens(), 8.0
+    flat = witnesses(BLOCK, seed=1, spacing=pitch)
+    seen = replace(flat, points=lens.unrectify(flat.points))
+    ring = lens.unrectify(BLOCK)
+    check_against_evidence(seen, ring, pitch, lens)
+    with pytest.raises(NoBlockFound, match="more than half a cell"):
+        check_against_evidence(seen, ring, pitch, None)
+
+
+@pytest.mark.parametrize("pitches", [-0.8, 0.8])
+def test_four_ends_in_a_row_far_off_on_either_side_are_refused_with_their_place(pitches: float) -> None:
+    evidence = witnesses(BLOCK, seed=2)
+    off = np.isin(np.arange(len(evidence.points)), np.arange(10, 14))
+    moved = evidence.points + np.where(off, pitches * PITCH, 0.0)[:, None] * evidence.normal
+    x, y = moved[13]
+    with pytest.raises(NoBlockFound, match=rf"near \({x:.0f}, {y:.0f}\) px"):
+        check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
+
+
+def test_three_ends_in_a_row_are_missing_cells() -> None:
+    evidence = witnesses(BLOCK, seed=2)
+    off = np.isin(np.arange(len(evidence.points)), np.arange(10, 13))
+    moved = evidence.points - np.where(off, 0.8 * PITCH, 0.0)[:, None] * evidence.normal
+    check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)

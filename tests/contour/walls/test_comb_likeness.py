@@ -1,0 +1,97 @@
+"""What has patches side by side, and is no honeycomb."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from contour.acceptance.acceptance import Limits, Refusal, judge
+from contour.errors import NoBlockFound
+from contour.polygon.polygon import cutting_polygon
+from contour.tracing.tracing import TraceSettings, trace
+from contour.walls.comb_likeness import Comb, surely_comb, unlike_comb
+from tests.support.pictures.small_scenes import block
+
+
+@pytest.mark.parametrize(
+    "comb",
+    [
+        Comb(24.0, 3.0, True, 300, 0.6, 0.6),
+        Comb(8.0, 3.4, True, 900, 0.2, 0.2),  # fine cells look wide-walled
+        Comb(37.0, 17.0, True, 60, 0.21, 0.25),  # foam
+        Comb(23.0, 7.6, True, 150, 0.3, 0.25),  # a perforated plate
+        Comb(149.0, 6.0, True, 6, 0.4, 0.8),  # few cells, each large
+        Comb(17.0, 6.2, False, 300, 0.5, 0.5),  # dark walls under blur
+        Comb(30.0, 7.8, True, 118, 0.3, 0.3, order=0.38, solid=0.82),  # foam
+        Comb(31.0, 4.3, True, 37, 0.12, 0.18, order=0.22, solid=0.95),  # half of its walls broken
+    ],
+)
+def test_combs_foams_and_plates_may_be_blocks(comb: Comb) -> None:
+    assert unlike_comb(comb) is None
+
+
+@pytest.mark.parametrize(
+    "comb",
+    [
+        Comb(86.0, 35.6, False, 42, 1.0, 1.0),  # a chessboard
+        Comb(38.0, 16.3, True, 169, 0.73, 0.75),  # lines of text
+        Comb(41.0, 12.8, False, 10, 0.2, 0.37),  # a square code
+        Comb(42.0, 10.6, True, 75, 0.22, 0.24, order=0.02, solid=0.77),  # bold letters
+        Comb(46.0, 3.7, True, 46, 0.22, 0.33, order=0.09, solid=0.97),  # squares of a board that lie apart
+    ],
+)
+def test_boards_prints_and_codes_are_none(comb: Comb) -> None:
+    assert unlike_comb(comb) is not None
+
+
+def bold_print() -> NDArray[np.uint8]:
+    """A sheet full of bold letters whose paper leaves walls as thin as a comb's."""
+    picture = np.full((960, 1280), 40, np.uint8)
+    cv2.rectangle(picture, (180, 120), (1080, 820), 205, -1)
+    letters = np.random.default_rng(5).integers(33, 126, (12, 22))
+    for row, line in enumerate(letters):
+        words = "".join(chr(letter) for letter in line)
+        cv2.putText(picture, words, (215, 165 + 54 * row), cv2.FONT_HERSHEY_DUPLEX, 1.6, 30, 8, cv2.LINE_AA)
+    return picture
+
+
+def test_letters_are_no_cells_although_thin_walls_part_them() -> None:
+    try:
+        found = trace(bold_print(), TraceSettings())
+    except NoBlockFound:
+        return
+    assert found.comb is not None
+    assert unlike_comb(found.comb) is not None
+
+
+def test_three_small_blocks_are_found_though_they_fill_little_of_the_picture() -> None:
+    comb = Comb(22.9, 4.4, True, 63, 0.11, 0.16, order=0.35, solid=0.95)
+    assert surely_comb(comb)
+    assert not surely_comb(replace(comb, solid=0.8))  # letters
+    assert not surely_comb(replace(comb, order=0.05))  # nuts on a table
+    assert not surely_comb(replace(comb, count=9))
+
+
+@pytest.mark.parametrize("side", [25, 40])
+def test_a_chessboard_on_the_table_is_no_block(side: int) -> None:
+    picture = np.full((720, 960), 60, np.uint8)
+    squares = (np.indices((600 // side, 800 // side)).sum(axis=0) % 2 * 180 + 25).astype(np.uint8)
+    picture[60:660, 80:880] = np.kron(squares, np.ones((side, side), np.uint8))
+    try:
+        found = trace(cv2.GaussianBlur(picture, (0, 0), 0.8), TraceSettings())
+    except NoBlockFound:
+        return
+    findings = judge(
+        cutting_polygon(found.contour, None, height_mm=0.0, tolerance_mm=0.1), (960, 720), Limits(), traced=found
+    )
+    assert findings[0].refusal == Refusal.NO_BLOCK_FOUND
+
+
+def test_a_block_looks_like_one() -> None:
+    found = trace(block("rectangle", "shop").picture, TraceSettings())
+    assert found.comb is not None
+    assert unlike_comb(found.comb) is None

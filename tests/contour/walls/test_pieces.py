@@ -1,0 +1,105 @@
+"""Which other things in a picture are blocks, and which are debris."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from contour.geometry.rings import Contour, area
+from contour.tracing.tracing import TraceSettings, trace
+from contour.walls.pieces import pieces_beside
+from tests.support.pictures.small_scenes import block
+
+PITCH = 20.0
+RING = np.array([[20.0, 20.0], [20.0, 220.0], [220.0, 220.0], [220.0, 20.0]])
+
+
+def comb(mask: np.ndarray, left: int, top: int, columns: int, rows: int, pitch: float = PITCH) -> None:
+    """Hexagonal cells drawn as walls, three pixels wide."""
+    for row in range(rows):
+        for column in range(columns):
+            at = np.array([left + (column + 0.5 * (row % 2)) * pitch, top + row * 0.866 * pitch])
+            angles = np.radians(np.arange(30, 390, 60))
+            corners = at + pitch / np.sqrt(3) * np.column_stack((np.cos(angles), np.sin(angles)))
+            cv2.polylines(mask, [np.rint(corners).astype(np.int32)], True, 255, 3)
+
+
+def empty() -> np.ndarray:
+    return np.zeros((480, 640), np.uint8)
+
+
+def test_a_second_comb_is_a_piece_with_its_area_and_place() -> None:
+    mask = empty()
+    comb(mask, 40, 40, 9, 10)
+    comb(mask, 350, 120, 8, 7)
+    (piece,) = pieces_beside(mask, RING, PITCH)
+    assert piece.area_px2 == pytest.approx(56 * 0.866 * PITCH**2, rel=0.25)
+    assert abs(area(Contour(piece.outline_px))) == pytest.approx(piece.area_px2, rel=0.1)
+    np.testing.assert_allclose(piece.outline_px.min(axis=0), piece.box_px[:2], atol=10)
+    np.testing.assert_allclose(piece.outline_px.max(axis=0), piece.box_px[2:], atol=10)
+    left, top, right, bottom = piece.box_px
+    assert 320 <= left <= 345
+    assert 95 <= top <= 115
+    assert 500 <= right <= 535
+    assert 230 <= bottom <= 255
+
+
+def test_equal_blocks_measure_alike_whatever_lies_open_at_their_borders() -> None:
+    rendered = block("rectangle")
+    two = np.concatenate([rendered.picture, rendered.picture], axis=1)
+    found = trace(two, TraceSettings())
+    (other,) = found.others
+    assert other.area_px2 == pytest.approx(area(found.contour), rel=0.07)
+
+
+def test_a_corner_that_the_frame_cuts_is_seen_by_its_walls() -> None:
+    rendered = block("rectangle")
+    left = rendered.truth_px.exterior[:, 0].min()
+    for over in (4, 10, 20):
+        assert trace(rendered.picture[:, round(left) + over :], TraceSettings()).reaches_frame
+    assert not trace(rendered.picture[:, round(left) - 4 :], TraceSettings()).reaches_frame
+
+
+def test_pieces_come_largest_first_and_in_pixels_of_the_picture() -> None:
+    mask = empty()
+    comb(mask, 300, 60, 5, 4)
+    comb(mask, 300, 250, 12, 10)
+    large, small = pieces_beside(mask, RING, PITCH, 2)
+    assert large.area_px2 > 4 * small.area_px2
+    assert large.box_px[1] > 400
+
+
+@pytest.mark.parametrize("cells", [(2, 2), (3, 2), (6, 1)])
+def test_an_offcut_of_a_few_cells_is_none(cells: tuple[int, int]) -> None:
+    mask = empty()
+    comb(mask, 350, 120, *cells)
+    assert pieces_beside(mask, RING, PITCH) == ()
+
+
+def test_chips_cables_letters_and_grids_of_other_sizes_are_none() -> None:
+    mask = empty()
+    rng = np.random.default_rng(7)
+    for _ in range(60):
+        start = rng.uniform((260, 20), (600, 220))
+        cv2.line(mask, np.rint(start).astype(int), np.rint(start + rng.uniform(-15, 15, 2)).astype(int), 255, 2)
+    cv2.putText(mask, "BLOCK 808", (260, 300), cv2.FONT_HERSHEY_SIMPLEX, 1.5, 255, 3)
+    for x in range(250, 640, 90):
+        cv2.line(mask, (x, 320), (x, 479), 255, 2)
+    cv2.line(mask, (230, 400), (639, 400), 255, 2)
+    assert pieces_beside(mask, RING, PITCH) == ()
+
+
+def test_what_belongs_to_the_traced_block_is_none() -> None:
+    mask = empty()
+    comb(mask, 40, 40, 9, 10)
+    assert pieces_beside(mask, RING, PITCH) == ()
+
+
+@pytest.mark.parametrize("method", ["wall-tips", "sliding-matrix"])
+def test_a_traced_picture_tells_of_the_block_beside(method: str) -> None:
+    one = block("rectangle").picture
+    assert trace(one, TraceSettings(method=method)).others == ()
+    two = np.concatenate([one, one[:, :420]], axis=1)
+    (other,) = trace(two, TraceSettings(method=method)).others
+    assert other.area_px2 > 5000

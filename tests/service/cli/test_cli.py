@@ -1,0 +1,132 @@
+"""The command line: reads like a manual page, loads nothing heavy for it, and says what is wrong in one line."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service.cli.examples import EXAMPLES, examples_of
+from service.cli.main import COMMANDS, EPILOG, build_parser, main
+from tests.support.processes.processes import combtrace
+
+
+def test_help_reads_like_a_manual_page() -> None:
+    done = combtrace("--help")
+    assert done.returncode == 0
+    for heading in ("NAME", "DESCRIPTION", "COMMANDS", "FILES", "EXIT STATUS", "EXAMPLES"):
+        assert f"\n{heading}" in f"\n{done.stdout}"
+    for command in COMMANDS:
+        assert f"\n    {command}" in done.stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_command_has_its_own_help(command: str) -> None:
+    done = combtrace(command, "--help")
+    assert done.returncode == 0
+    assert len(done.stdout) > 100
+
+
+def test_every_command_shows_examples_in_its_help() -> None:
+    assert set(EXAMPLES) == set(COMMANDS)
+    help_text = combtrace("jobs", "--help").stdout
+    assert f"\n{examples_of('jobs')}\n" in help_text
+
+
+@pytest.mark.parametrize("line", [line for lines in EXAMPLES.values() for line, _ in lines])
+def test_every_example_is_a_command_as_the_parser_takes_it(line: str) -> None:
+    program, command, *rest = shlex.split(line.partition(" > ")[0])
+    assert (program, line in examples_of(command)) == ("combtrace", True)
+    assert build_parser().parse_args([command, *rest]).command == command
+
+
+def test_every_example_of_the_main_help_is_too() -> None:
+    lines = re.findall(r"^ +combtrace (.+)$", EPILOG, re.MULTILINE)
+    assert len(lines) >= 6
+    for line in lines:
+        build_parser().parse_args(shlex.split(line))
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["trace", "--help"], ["run", "--help"], ["--version"]])
+def test_help_loads_neither_numpy_nor_cv2_nor_pydantic_nor_pymodbus(arguments: list[str]) -> None:
+    code = (
+        "import sys\nfrom service.cli.main import main\n"
+        "try:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'cv2', 'pydantic', 'pymodbus', 'yaml', 'serial'} & set(sys.modules)\n"
+        "sys.exit(f'loaded: {heavy}' if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_without_a_command_help_is_shown_and_the_status_is_2() -> None:
+    done = combtrace()
+    assert done.returncode == 2
+    assert "COMMANDS" in done.stdout
+
+
+def test_an_unknown_command_is_a_usage_error() -> None:
+    done = combtrace("tarce")
+    assert done.returncode == 2
+    assert "tarce" in done.stderr
+
+
+def test_an_error_is_one_line_without_a_traceback(tmp_path: Path) -> None:
+    done = combtrace("run", "--config", tmp_path / "nowhere.yaml")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "nowhere.yaml: cannot be read" in done.stderr
+
+
+def test_debug_shows_the_traceback(tmp_path: Path) -> None:
+    done = combtrace("run", "--config", tmp_path / "nowhere.yaml", "--debug")
+    assert "Traceback" in done.stderr
+
+
+@pytest.mark.parametrize("address", ["5020", "127.0.0.1:", "127.0.0.1:99999", ":5020", "127.0.0.1:x"])
+def test_a_bad_address_is_a_usage_error(address: str) -> None:
+    done = combtrace("simulate-controller", "--tcp", address)
+    assert done.returncode == 2
+    assert "expected HOST:PORT" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--trigger-every", "-1"],
+        ["--scan-ms", "0"],
+        ["--scan-ms", "nan"],
+        ["--recipe", "70000"],
+        ["--device-id", "300"],
+        ["--baudrate", "0"],
+    ],
+)
+def test_a_number_that_no_controller_has_is_refused_with_what_is_expected(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate-controller", "--tcp", "127.0.0.1:0", *arguments]) == 2
+    assert f"{arguments[0]} {arguments[1]}: expected" in capsys.readouterr().err
+
+
+def test_an_address_in_use_is_an_error_that_names_it() -> None:
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        done = combtrace("simulate-controller", "--tcp", f"127.0.0.1:{port}")
+    assert done.returncode == 2
+    assert str(port) in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_missing_serial_port_is_an_error_that_names_it() -> None:
+    done = combtrace("trigger", "--port", "/dev/nowhere")
+    assert done.returncode == 2
+    assert "/dev/nowhere" in done.stderr
+    assert done.stderr.count("\n") == 1

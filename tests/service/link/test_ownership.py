@@ -1,0 +1,533 @@
+"""One service per controller: what is found in `owner`, and what may then be written."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from drivers.controller.mailbox.mailbox import Answer, LinkBlock, ServiceBlock
+from service.link.link import Link
+from service.link.ownership import ForeignOwner, Ownership
+from service.link.transfer import Settlement, TransferSettings, Validity
+from service.reasons import Outcome, Reason
+from tests.service.link.test_link import QUICK, linked
+from tests.support.service.scripted_controller import ScriptedController
+from tests.support.service.transferring import JOB, Run, transferring
+from tests.support.service.transferring import QUICK as STEPS
+from tests.support.service.waiting import until
+
+OURS, THEIRS = 100, 200
+
+
+class Watched:
+    """An ownership on a clock that the test moves."""
+
+    def __init__(self) -> None:
+        self.time = 0.0
+        self.ownership = Ownership(OURS, now=lambda: self.time)
+
+    def see(self, owner: int, beat: int = 0, *, after_s: float = 0.1) -> bool:
+        self.time += after_s
+        return self.ownership.saw(ServiceBlock(owner=owner, service_heartbeat=beat))
+
+    def write(self, beat: int) -> None:
+        """A write of ours that was confirmed."""
+        self.ownership.writing(beat)
+        self.ownership.wrote()
+
+    def begin(self) -> None:
+        """Begin on registers that nobody has written: our heartbeat 1 stands there now."""
+        assert self.see(0)
+        self.write(1)
+        assert self.ownership.ours
+
+    def see_for(self, seconds: float, owner: int, beats: Iterable[int]) -> list[bool]:
+        return [self.see(owner, beat) for beat in itertools.islice(beats, round(seconds * 10))]
+
+
+def test_registers_that_nobody_has_written_are_ours_with_the_first_write() -> None:
+    watched = Watched()
+    assert watched.see(0)
+    assert not watched.ownership.ours
+    watched.write(1)
+    assert watched.ownership.ours
+
+
+def test_our_own_number_is_watched_for_1_5_s_before_anything_is_written() -> None:
+    watched = Watched()
+    assert watched.see_for(1.5, OURS, itertools.repeat(7)) == [False] * 15
+    assert "with our number" in (watched.ownership.fault() or "")
+    assert watched.see(OURS, 7)
+    watched.write(8)
+    assert watched.ownership.ours
+
+
+def test_a_copy_of_our_journal_that_lives_is_left_alone() -> None:
+    watched = Watched()
+    assert not any(watched.see_for(20.0, OURS, (number // 9 for number in itertools.count())))
+    assert watched.ownership.conflict
+    assert "a copied journal" in (watched.ownership.fault() or "")
+
+
+def test_one_late_write_of_our_former_life_is_no_other_service() -> None:
+    watched = Watched()
+    watched.see_for(1.0, OURS, itertools.repeat(7))
+    assert watched.see_for(1.5, OURS, itertools.repeat(8)) == [False] * 15, "watched anew"
+    assert watched.see(OURS, 8)
+
+
+def test_a_heartbeat_that_we_did_not_write_twice_in_a_row_is_another_with_our_number() -> None:
+    watched = Watched()
+    watched.begin()
+    assert watched.see(OURS, 1)
+    watched.write(2)
+    assert not watched.see(OURS, 77)
+    assert not watched.ownership.ours
+    assert not watched.ownership.decided, "looked at again at once"
+    assert not watched.see(OURS, 78)
+    assert watched.ownership.conflict
+
+
+def test_a_heartbeat_of_ours_that_lands_late_is_ours() -> None:
+    watched = Watched()
+    watched.begin()
+    watched.ownership.writing(2)  # no reply
+    watched.ownership.disconnected()
+    watched.write(3)
+    assert watched.see(OURS, 3)
+    assert watched.see(OURS, 2)
+    assert watched.see(OURS, 2)
+    assert watched.ownership.ours
+
+
+def test_what_a_controller_remembers_after_its_restart_is_ours() -> None:
+    watched = Watched()
+    watched.begin()
+    for beat in range(2, 60):
+        watched.write(beat)
+    watched.ownership.controller_restarted()
+    assert watched.see(OURS, 5), "registers of long ago"
+    watched.write(60)
+    assert watched.see(OURS, 60)
+    assert not watched.see(OURS, 30)
+
+
+def test_a_persons_word_begins_anew() -> None:
+    watched = Watched()
+    watched.begin()
+    watched.see(THEIRS, 5)
+    watched.see(THEIRS, 5)
+    assert watched.ownership.conflict
+    watched.ownership.begin()
+    assert watched.see_for(3.0, THEIRS, itertools.repeat(5)) == [False] * 30
+    assert watched.see(THEIRS, 5)
+
+
+def test_before_the_first_look_nothing_may_be_sent() -> None:
+    with pytest.raises(ForeignOwner, match="not been read yet"):
+        Watched().ownership.check()
+
+
+def test_a_foreign_owner_whose_heartbeat_moves_is_left_alone_for_good() -> None:
+    watched = Watched()
+    assert not any(watched.see_for(20.0, THEIRS, itertools.count()))
+    assert watched.ownership.conflict
+    assert "Stop one of the two" in (watched.ownership.fault() or "")
+    assert not any(watched.see_for(20.0, THEIRS, itertools.repeat(7))), "also when it stops: a person decides"
+    assert not watched.see(OURS)
+
+
+def test_a_foreign_owner_whose_heartbeat_stands_for_3_s_is_taken_over_and_ours_must_stand_for_3_s_more() -> None:
+    watched = Watched()
+    assert watched.see_for(3.0, THEIRS, itertools.repeat(7)) == [False] * 30
+    assert not watched.ownership.ours
+    while not watched.see(THEIRS, 7):  # from here on our own stands there
+        assert watched.time < 3.5
+    beats = itertools.count(1)
+    watched.write(0)
+    claimed_at = watched.time
+    while not watched.ownership.ours:
+        beat = next(beats)
+        assert watched.see(OURS, beat - 1), "the heartbeat goes on meanwhile"
+        watched.write(beat)
+        with suppress(ForeignOwner):
+            watched.ownership.check()
+            assert watched.ownership.ours
+    assert 3.0 <= watched.time - claimed_at < 3.3
+
+
+def test_a_heartbeat_that_moves_in_the_last_moment_counts() -> None:
+    watched = Watched()
+    watched.see_for(2.9, THEIRS, itertools.repeat(7))
+    watched.see(THEIRS, 8)
+    assert watched.ownership.conflict
+
+
+def test_another_that_writes_while_ours_must_stand_is_left_alone() -> None:
+    watched = Watched()
+    while not watched.see(THEIRS, 7):
+        pass
+    watched.write(1)
+    assert all(watched.see_for(1.0, OURS, itertools.repeat(1)))
+    assert not any(watched.see_for(20.0, THEIRS, itertools.repeat(9)))
+    assert watched.ownership.conflict
+
+
+def test_a_claim_whose_write_was_lost_with_the_connection_is_watched_anew() -> None:
+    watched = Watched()
+    while not watched.see(THEIRS, 7):
+        pass
+    watched.ownership.writing(1)
+    watched.ownership.disconnected()
+    assert not watched.see(THEIRS, 7, after_s=1.1)
+    assert watched.see_for(2.8, THEIRS, itertools.repeat(7)) == [False] * 28
+    assert any(watched.see_for(0.3, THEIRS, itertools.repeat(7)))
+
+
+def test_a_pause_without_a_connection_is_no_time_of_watching() -> None:
+    watched = Watched()
+    watched.see_for(1.0, THEIRS, itertools.repeat(7))
+    watched.ownership.disconnected()
+    assert not watched.see(THEIRS, 7, after_s=60.0)
+    assert watched.see_for(2.9, THEIRS, itertools.repeat(7)) == [False] * 29
+
+
+@pytest.mark.parametrize(("owner", "watch_s"), [(THEIRS, 3.0), (OURS, 1.5)])
+def test_a_line_that_loses_replies_is_watched_to_the_end_without_its_pauses(owner: int, watch_s: float) -> None:
+    watched = Watched()
+    seen_s = -0.1
+    while not watched.see(owner, 7):
+        seen_s += 0.1
+        if round(seen_s, 1) in (0.3, 0.8, 1.3, 1.4):
+            watched.ownership.disconnected()
+            assert not watched.see(owner, 7, after_s=0.4)
+    assert seen_s == pytest.approx(watch_s, abs=0.15)
+
+
+def test_a_heartbeat_that_moved_while_replies_were_lost_has_moved() -> None:
+    watched = Watched()
+    watched.see_for(1.0, THEIRS, itertools.repeat(7))
+    watched.ownership.disconnected()
+    assert not watched.see(THEIRS, 8, after_s=0.4)
+    assert watched.ownership.conflict
+
+
+def test_our_claim_stands_over_a_lost_reply() -> None:
+    watched = Watched()
+    while not watched.see(THEIRS, 7):
+        pass
+    watched.write(1)
+    assert all(watched.see_for(1.5, OURS, itertools.repeat(1)))
+    watched.ownership.disconnected()
+    assert watched.see(OURS, 1, after_s=0.5)
+    assert not watched.ownership.ours
+    assert all(watched.see_for(1.8, OURS, itertools.repeat(1)))
+    assert watched.ownership.ours
+
+
+def test_one_reading_alone_is_not_acted_on() -> None:
+    watched = Watched()
+    watched.begin()
+    assert not watched.see(THEIRS)
+    assert not watched.ownership.conflict
+    assert watched.see(OURS, 1)
+    assert watched.ownership.ours
+
+
+def test_a_foreign_owner_later_stops_all_writing_until_a_person_says_so() -> None:
+    watched = Watched()
+    watched.begin()
+    watched.see(THEIRS)
+    assert not watched.see(THEIRS)
+    assert watched.ownership.conflict
+    with pytest.raises(ForeignOwner, match="combtrace confirm"):
+        watched.ownership.check()
+    assert not any(watched.see_for(20.0, THEIRS, itertools.repeat(0))), "also when it stands still"
+    assert not watched.see(OURS, 1)
+
+
+@example(readings=[(THEIRS, 0, 0.0), (THEIRS, 0, 0.0), (THEIRS, 0, 2.9)], written=False)  # hardly ever drawn
+@example(readings=[(OURS, 0, 0.0), (OURS, 0, 0.0), (OURS, 0, 1.4)], written=False)
+@given(
+    st.lists(st.tuples(st.sampled_from([0, OURS, THEIRS, 300]), st.integers(0, 1), st.floats(0, 2.9)), max_size=60),
+    st.booleans(),
+)
+def test_nothing_is_written_over_another_that_moved_or_was_watched_for_less_than_3_s(
+    readings: list[tuple[int, int, float]], written: bool
+) -> None:
+    watched = Watched()
+    still: tuple[int, int] | None = None
+    since = 0.0
+    for owner, beat, after_s in readings:
+        allowed = watched.see(owner, beat, after_s=after_s)
+        if (owner, beat) != still:
+            still, since = (owner, beat), watched.time
+        if allowed and owner not in (0, OURS):
+            assert watched.time - since >= 3.0
+        if allowed and owner == OURS and not watched.ownership.begun:
+            assert watched.time - since >= 1.5
+        if allowed and written:
+            watched.write(beat)
+
+
+# --- over a link ------------------------------------------------------------------------------------------------
+
+
+class Another:
+    """Another service: its number stands in the block, its heartbeat moves while it lives."""
+
+    def __init__(self, controller: ScriptedController, *, alive: bool) -> None:
+        self.alive = alive
+        self._controller = controller
+        self._read_service = controller.read_service
+        controller.read_service = self.read_service  # type: ignore[method-assign]
+        controller.service = ServiceBlock(owner=THEIRS, service_heartbeat=1)
+
+    async def read_service(self) -> ServiceBlock:
+        block = await self._read_service()
+        if self.alive and block.owner == THEIRS:
+            block = replace(block, service_heartbeat=(block.service_heartbeat + 1) & 0xFFFF)
+            self._controller.service = block
+        return block
+
+
+@pytest.fixture
+def short_watch(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.link.ownership.WATCH_S", 0.3)
+    monkeypatch.setattr("service.link.ownership.WATCH_OWN_S", 0.2)
+
+
+def written(controller: ScriptedController) -> set[str]:
+    return {name for name, _ in controller.requests}
+
+
+async def test_beside_a_living_service_nothing_at_all_is_written(short_watch: None) -> None:
+    controller = ScriptedController()
+    Another(controller, alive=True)
+    async with linked(controller) as link:
+        link.publish(owner=OURS)
+        await until(lambda: link.ownership.conflict)
+        link.publish(job_id=4)
+        await asyncio.sleep(0.3)
+        assert "another service (owner 200, this one is 100)" in (link.fault() or "")
+        assert link.fault_reason is Reason.OTHER_SERVICE
+    assert written(controller) == set()
+
+
+async def test_what_stands_still_is_not_overwritten_before_it_was_watched() -> None:
+    controller = ScriptedController()
+    Another(controller, alive=False)
+    async with linked(controller) as link:
+        link.publish(owner=OURS)
+        await until(lambda: link.view is not None and "watching whether the other" in (link.fault() or ""))
+        await asyncio.sleep(0.2)
+    assert written(controller) == set()
+
+
+async def test_after_a_service_that_ended_ours_takes_over_and_says_what_it_found(short_watch: None) -> None:
+    controller = ScriptedController()
+    Another(controller, alive=False)
+    controller.service = replace(controller.service, job_id=41)
+    async with linked(controller) as link:
+        found: list[ServiceBlock] = []
+
+        async def on_found(block: ServiceBlock) -> None:
+            assert controller.count("write_service") == 0, "told before it is overwritten"
+            found.append(block)
+
+        link.on_found = on_found
+        link.publish(owner=OURS)
+        await until(lambda: link.fault() is None)
+        assert [block.job_id for block in found] == [41]
+        assert controller.service.owner == OURS
+
+
+async def test_owner_is_read_before_each_write_of_the_service_block() -> None:
+    controller = ScriptedController()
+    steps: list[str] = []
+    read, write = controller.read_service, controller.write_service
+
+    async def read_service() -> ServiceBlock:
+        steps.append("read")
+        return await read()
+
+    async def write_service(block: ServiceBlock) -> None:
+        steps.append("write")
+        await write(block)
+
+    controller.read_service, controller.write_service = read_service, write_service  # type: ignore[method-assign]
+    async with linked(controller) as link:
+        for number in range(5):
+            link.publish(job_id=number + 1)
+            assert await link.flush(2.0)
+    assert steps[:3] == ["read", "read", "write"], "at the start once more, after what was found is durable"
+    assert steps[3:11] == ["read", "write"] * 4
+
+
+def page_of(valid_for_ms: int) -> Validity:
+    return Validity(captured_at=1000, valid_for=valid_for_ms)  # the scripted clock begins at 1000
+
+
+async def another_comes(run: Run, controller: ScriptedController) -> tuple[asyncio.Task[Settlement], int]:
+    """The run after its commit, which nobody answers, beside another service's number; and how much was written."""
+    run.link.publish(owner=OURS)
+    task = asyncio.ensure_future(run.end())
+    await until(lambda: controller.count("commit") == 1)
+    controller.service = ServiceBlock(owner=THEIRS)
+    await until(lambda: run.link.ownership.conflict)
+    return task, len(controller.requests)
+
+
+async def test_a_job_that_was_sent_stays_in_flight_beside_another_service_and_its_acceptance_settles_it() -> None:
+    controller = ScriptedController([None])
+    async with transferring(controller, replace(STEPS, ack_timeout_s=5), validity=page_of(30_000)) as run:
+        task, written_so_far = await another_comes(run, controller)
+        await asyncio.sleep(0.3)
+        assert not task.done(), "it may be accepted still"
+        controller.link = replace(controller.link, last_result=1, last_job=JOB)
+        settlement = await task
+    assert settlement.outcome is Outcome.ACCEPTED
+    assert len(controller.requests) == written_so_far, "nothing more is written, not even a withdrawal"
+    assert controller.service.owner == THEIRS
+
+
+@pytest.mark.parametrize("says", [{"last_job": JOB + 1, "last_result": 1}, {"session": 10}])
+async def test_beside_another_service_a_higher_last_job_or_another_session_ends_the_job_with_155(
+    says: dict[str, int],
+) -> None:
+    controller = ScriptedController([None])
+    async with transferring(controller) as run:
+        task, written_so_far = await another_comes(run, controller)
+        controller.link = replace(controller.link, **says)
+        settlement = await task
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.OTHER_SERVICE)
+    assert len(controller.requests) == written_so_far
+
+
+async def test_beside_another_service_a_job_ends_with_155_once_the_controller_would_not_accept_it_any_more() -> None:
+    controller = ScriptedController([None])
+    async with transferring(controller, validity=page_of(400)) as run:
+        task, _ = await another_comes(run, controller)
+        settlement = await task
+        age_ms = controller.shown().clock - 1000
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.OTHER_SERVICE)
+    assert "too old to be accepted" in (settlement.detail or "")
+    assert age_ms > 400 + 100, "valid_for and then ack_timeout"
+
+
+async def test_beside_another_service_and_without_a_limit_it_ends_after_job_timeout_and_says_so() -> None:
+    controller = ScriptedController([None])
+    async with transferring(controller, lifetime_s=0.5, validity=Validity()) as run:
+        task, _ = await another_comes(run, controller)
+        settlement = await task
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.OTHER_SERVICE)
+    assert "may have accepted it" in (settlement.detail or "")
+
+
+async def test_a_job_of_which_nothing_was_sent_fails_with_155_at_once() -> None:
+    controller = ScriptedController([None])
+    controller.link = replace(controller.link, controller_state=2)
+    async with transferring(controller, replace(STEPS, ready_timeout_s=5), validity=page_of(30_000)) as run:
+        run.link.publish(owner=OURS)
+        task = asyncio.ensure_future(run.end())
+        await until(lambda: run.link.ownership.ours)
+        controller.service = ServiceBlock(owner=THEIRS)
+        settlement = await task
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.OTHER_SERVICE)
+    assert run.durable == []
+
+
+async def test_after_a_persons_word_the_job_in_flight_goes_on(short_watch: None) -> None:
+    controller = ScriptedController([None, Answer.ACCEPTED])
+    async with transferring(controller) as run:
+        task, _ = await another_comes(run, controller)
+        assert run.link.confirm() == ["the controller is watched anew, and written to if no other service is seen"]
+        settlement = await task
+    assert settlement.outcome is Outcome.ACCEPTED
+    assert controller.count("commit") == 2
+
+
+async def test_a_withdrawal_waits_beside_another_service_and_the_controllers_answer_ends_it() -> None:
+    controller = ScriptedController([None])
+    async with transferring(controller) as run:
+        run.link.publish(owner=OURS)
+        task = asyncio.ensure_future(run.end())
+        await until(lambda: run.durable == ["sent", "withdraw controller_timeout"])
+        controller.service = ServiceBlock(owner=THEIRS)
+        await until(lambda: run.link.ownership.conflict)
+        await asyncio.sleep(0.1)
+        assert not task.done()
+        controller.link = replace(controller.link, last_result=int(Answer.WITHDRAWN), last_job=JOB)
+        settlement = await task
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.CONTROLLER_TIMEOUT)
+
+
+async def test_without_handshake_a_foreign_owner_ends_the_job_with_155_and_nothing_is_written() -> None:
+    controller = ScriptedController()
+    Another(controller, alive=True)
+    async with transferring(controller, TransferSettings(handshake=False)) as run:
+        run.link.publish(owner=OURS)
+        await until(lambda: run.link.ownership.conflict)
+        settlement = await run.end()
+    assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.OTHER_SERVICE)
+    assert written(controller) == set()
+
+
+async def test_an_observing_link_reads_and_never_writes() -> None:
+    controller = ScriptedController()
+    controller.link = replace(controller.link, test_echo=0)  # nobody wrote a test value that it could echo
+    Another(controller, alive=True)
+    async with linked(controller, replace(QUICK, observe=True)) as link:
+        link.publish(owner=OURS, job_id=3)
+        await until(lambda: link.fault() is None)
+        await asyncio.sleep(0.6)
+        assert link.fault() is None
+        assert isinstance(link, Link)
+    assert written(controller) == set()
+
+
+async def test_another_that_writes_while_what_it_left_is_made_durable_is_not_overwritten(short_watch: None) -> None:
+    controller = ScriptedController()
+    Another(controller, alive=False)
+    async with linked(controller) as link:
+
+        async def slow_disk(block: ServiceBlock) -> None:
+            controller.service = replace(block, service_heartbeat=block.service_heartbeat + 1)
+
+        link.on_found = slow_disk
+        link.publish(owner=OURS)
+        await asyncio.sleep(0.6)
+    assert written(controller) == set()
+
+
+async def test_what_another_left_is_not_taken_over_before_the_controllers_block_holds_still(short_watch: None) -> None:
+    """In which session its job is to be taken back would not be known."""
+    controller = ScriptedController()
+    Another(controller, alive=False)
+    sessions: list[int | None] = []
+    async with linked(controller) as link:
+
+        async def on_found(_block: ServiceBlock) -> None:
+            sessions.append(link.view.session if link.view else None)
+
+        link.on_found = on_found
+        read_link, numbers, unsteady = controller.read_link, itertools.count(), True
+
+        async def changing() -> LinkBlock:
+            block = await read_link()
+            return replace(block, recipe=next(numbers) & 0xFFFF) if unsteady else block
+
+        link.publish(owner=OURS)
+        controller.read_link = changing  # type: ignore[method-assign]
+        await asyncio.sleep(0.8)
+        assert sessions == []
+        unsteady = False
+        await until(lambda: link.ownership.ours)
+    assert sessions == [9]

@@ -1,0 +1,196 @@
+"""A picture becomes the polygon that would be sent: stages timed, findings by code, nothing thrown at the daemon."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from contour.calibration.position_uncertainty import PositionUncertainty
+from contour.errors import ParameterError, PictureError
+from contour.geometry.rings import area, hausdorff
+from contour.synthetic import render
+from service.config.config import Recipe
+from service.measuring.calibration_file import load_calibration
+from service.measuring.measure import Measurer, trace_settings
+from service.reasons import Reason
+from tests.support.scenes.sample_scenes import THICKNESS_MM, sample_scenes
+
+SAMPLES = Path(__file__).parents[3] / "service" / "samples"
+RECIPE = Recipe(number=1, name="default")
+
+
+@pytest.fixture(scope="module")
+def rendered():
+    return render(sample_scenes()[0])
+
+
+@pytest.fixture(scope="module")
+def measurer() -> Measurer:
+    return Measurer(load_calibration(SAMPLES / "calibration.yaml"))
+
+
+def test_the_shipped_calibration_is_that_of_the_camera_that_rendered_the_samples(rendered, measurer: Measurer) -> None:
+    """The rendered outline in pixels, taken through the calibration file, is the outline in millimetres."""
+    calibration = load_calibration(SAMPLES / "calibration.yaml")
+    back = calibration.to_machine(calibration.to_work(rendered.truth_px.exterior, THICKNESS_MM))
+    assert hausdorff(back, rendered.truth_mm.exterior, 1.0) < 0.001
+
+
+def test_the_contour_in_millimetres_lies_near_the_true_outline(rendered, measurer: Measurer) -> None:
+    """Within a third of a pixel on the whole outline; corners included."""
+    seen = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM)
+    assert seen.findings == ()
+    assert seen.millimetres is not None
+    assert hausdorff(seen.millimetres.exterior, rendered.truth_mm.exterior, 0.5) < 0.375
+    assert seen.area_mm2 == pytest.approx(area(rendered.truth_mm), rel=0.002)
+
+
+def test_each_stage_is_timed_and_total_is_their_sum(rendered, measurer: Measurer) -> None:
+    times = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM).timings_ms
+    assert set(times) == {"mask", "trace", "quality", "convert", "simplify", "judge", "total"}
+    assert times["total"] == pytest.approx(sum(value for name, value in times.items() if name != "total"))
+
+
+def test_a_step_above_twice_the_core_is_logged_once_a_recipe(
+    rendered, measurer: Measurer, caplog: pytest.LogCaptureFixture
+) -> None:
+    followed = Recipe(number=1, name="a", method="sliding-matrix", parameters={"step_px": 25})  # the core is 10
+    given = Recipe(number=2, name="b", method="sliding-matrix", parameters={"step_px": 25, "core_px": 12})
+    sound = Recipe(number=3, name="c", method="sliding-matrix", parameters={"step_px": 24, "core_px": 12})
+    measurer = Measurer(None)
+    for recipe in (followed, given, sound, followed, given):
+        measurer.measure(rendered.picture, recipe, THICKNESS_MM)
+    assert [record.getMessage().split(":")[0] for record in caplog.records] == ["recipe 1", "recipe 2"]
+    assert "step_px is 25, expected up to 24, twice core_px" in caplog.text
+
+
+def test_the_clock_is_the_callers(rendered) -> None:
+    ticks = iter(range(100))
+    times = Measurer(None, clock=lambda: next(ticks)).measure(rendered.picture, RECIPE, 20).timings_ms
+    assert times["mask"] == 1000.0
+
+
+def test_an_empty_table_is_a_finding_and_no_exception(measurer: Measurer) -> None:
+    seen = measurer.measure(np.full((1200, 1600), 30, np.uint8), RECIPE, 20)
+    assert seen.reasons == (Reason.NO_BLOCK_FOUND,)
+    assert seen.pixels is None
+    assert "total" in seen.timings_ms
+
+
+def test_a_picture_of_another_size_is_a_finding_by_name(measurer: Measurer) -> None:
+    seen = measurer.measure(np.full((1200, 1601), 30, np.uint8), RECIPE, 20)
+    assert seen.reasons == (Reason.CALIBRATION_MISMATCH,)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"max_area_mm2": 1000.0}, Reason.AREA_OUT_OF_LIMITS),
+        ({"min_area_mm2": 1e6}, Reason.AREA_OUT_OF_LIMITS),
+        ({"max_vertices": 3}, Reason.TOO_MANY_POINTS),
+    ],
+)
+def test_the_recipes_limits_refuse(rendered, measurer: Measurer, change: dict, reason: Reason) -> None:
+    seen = measurer.measure(rendered.picture, RECIPE.model_copy(update=change), THICKNESS_MM)
+    assert seen.reasons == (reason,)
+    assert seen.pixels is not None
+
+
+def test_a_region_in_pixels_and_the_same_in_millimetres_see_the_same(rendered, measurer: Measurer) -> None:
+    whole = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM)
+    assert whole.millimetres is not None
+    low, high = whole.millimetres.exterior.min(axis=0) - 8, whole.millimetres.exterior.max(axis=0) + 8
+    recipe = RECIPE.model_copy(update={"roi_mm": (*low.tolist(), *high.tolist())})
+    seen = measurer.measure(rendered.picture, recipe, THICKNESS_MM)
+    assert seen.findings == ()
+    assert seen.millimetres is not None
+    assert hausdorff(seen.millimetres.exterior, whole.millimetres.exterior, 0.5) < 0.2
+
+
+@pytest.mark.parametrize("shift", [(-60, 0), (60, 0), (0, -60), (0, 60)])
+def test_a_block_that_the_region_cuts_is_refused_with_words_for_it(rendered, measurer: Measurer, shift) -> None:
+    low, high = rendered.truth_px.exterior.min(axis=0) - 9, rendered.truth_px.exterior.max(axis=0) + 9
+    box = (*(low + shift).tolist(), *(high + shift).tolist())
+    seen = measurer.measure(rendered.picture, RECIPE.model_copy(update={"roi_px": box}), THICKNESS_MM)
+    assert seen.reasons[0] == Reason.TOUCHES_BORDER
+    assert "region of interest" in seen.texts[0]
+
+
+def test_a_turned_region_that_cuts_a_block_refuses_too(rendered, measurer: Measurer) -> None:
+    whole = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM)
+    low, high = whole.millimetres.exterior.min(axis=0), whole.millimetres.exterior.max(axis=0)
+    recipe = RECIPE.model_copy(update={"roi_mm": (*(low - 10).tolist(), high[0] - 40.0, high[1] + 10.0)})
+    seen = measurer.measure(rendered.picture, recipe, THICKNESS_MM)
+    assert seen.reasons[0] == Reason.TOUCHES_BORDER
+
+
+def test_a_region_in_millimetres_needs_a_calibration(rendered) -> None:
+    with pytest.raises(ParameterError, match="roi_mm needs a calibration"):
+        Measurer(None).measure(rendered.picture, RECIPE.model_copy(update={"roi_mm": (0, 0, 300, 300)}), 20)
+
+
+def test_a_covered_lens_is_bad_quality_before_it_is_no_block(measurer: Measurer) -> None:
+    seen = measurer.measure(np.full((1200, 1600), 2, np.uint8), RECIPE, 20)
+    assert seen.reasons == (Reason.IMAGE_QUALITY, Reason.NO_BLOCK_FOUND)
+
+
+def test_the_work_area_refuses(rendered) -> None:
+    calibration = load_calibration(SAMPLES / "calibration.yaml")
+    area_mm = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
+    seen = Measurer(calibration, work_area_mm=area_mm).measure(rendered.picture, RECIPE, THICKNESS_MM)
+    assert seen.reasons == (Reason.OUTSIDE_WORK_AREA,)
+
+
+def test_a_contour_beyond_what_the_calibration_covers_is_refused_by_that_name(rendered) -> None:
+    plain = load_calibration(SAMPLES / "calibration.yaml")
+    exterior = rendered.truth_px.exterior
+    low, high = exterior.min(axis=0) - 20, exterior.max(axis=0) + 20
+    for right, reasons in ((high[0], ()), (high[0] - 40, (Reason.OUTSIDE_WORK_AREA,))):
+        ring = np.array([low, [right, low[1]], [right, high[1]], [low[0], high[1]]])
+        sure = replace(PositionUncertainty.everywhere(1600, 1200, 0.05), covered_px=ring)
+        seen = Measurer(replace(plain, uncertainty=sure)).measure(rendered.picture, RECIPE, THICKNESS_MM)
+        assert seen.reasons == reasons
+    assert "leaves the part of the picture that the calibration covers: vertex (" in seen.texts[0]
+
+
+def test_limits_in_millimetres_do_not_apply_without_a_calibration(rendered) -> None:
+    seen = Measurer(None).measure(rendered.picture, RECIPE.model_copy(update={"max_area_mm2": 1.0}), 20)
+    assert seen.findings == ()
+
+
+@pytest.mark.parametrize("picture", [np.zeros((0, 5), np.uint8), np.zeros((5, 5), np.uint16), np.zeros(7, np.uint8)])
+def test_an_array_that_is_no_picture_is_an_error(picture: np.ndarray) -> None:
+    with pytest.raises(PictureError):
+        Measurer(None).measure(picture, RECIPE, 20)
+
+
+def test_what_the_recipe_says_reaches_the_method() -> None:
+    recipe = Recipe(
+        number=1,
+        name="a",
+        method="sliding-matrix",
+        polarity="dark",
+        binarize=90,
+        parameters={"core_px": 8, "threshold": 70.5},
+    )
+    settings = trace_settings(recipe)
+    assert (settings.polarity, settings.binarize, settings.core_px, settings.threshold) == ("dark", 90, 8, 70.5)
+    assert isinstance(settings.core_px, int)
+    assert settings.step_px is None
+
+
+def test_a_method_that_is_not_built_in_is_an_error(rendered) -> None:
+    recipe = RECIPE.model_copy(update={"method": "magic"})
+    with pytest.raises(ParameterError):
+        Measurer(None).measure(rendered.picture, recipe, 20)
+
+
+def test_the_summary_for_the_journal_is_plain_json(rendered, measurer: Measurer) -> None:
+    import json
+
+    summary = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM).summary()
+    assert json.loads(json.dumps(summary)) == summary
+    assert summary["vertices"] > 3

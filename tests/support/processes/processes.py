@@ -1,0 +1,121 @@
+"""The product's own commands as processes, as a user starts them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+COMBTRACE = [sys.executable, "-m", "service.cli.main"]
+ROOT = Path(__file__).parents[3]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
+
+
+def combtrace(
+    *arguments: str | Path, cwd: Path | None = None, bound_s: float = 60, variables: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    return subprocess.run(
+        [*COMBTRACE, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=bound_s,
+        check=False,
+        cwd=cwd,
+        env={**ENVIRONMENT, **(variables or {})},
+    )
+
+
+class Process:
+    """A command that goes on until it is stopped or killed; its output is in a file."""
+
+    def __init__(self, log: Path, *arguments: str | Path) -> None:
+        self.log = log
+        with log.open("ab") as file:
+            self._process = subprocess.Popen(
+                [*COMBTRACE, *map(str, arguments)], stdout=file, stderr=subprocess.STDOUT, env=ENVIRONMENT
+            )
+
+    def kill(self) -> None:
+        """kill -9."""
+        self._process.kill()
+        self._process.wait()
+
+    def stop(self, bound_s: float = 60) -> int:
+        """SIGTERM, and its exit status."""
+        self.send(signal.SIGTERM)
+        return self.ended(bound_s)
+
+    def send(self, number: signal.Signals) -> None:
+        """A signal."""
+        self._process.send_signal(number)
+
+    def ended(self, bound_s: float = 60) -> int:
+        """Its exit status, once it has ended by itself."""
+        try:
+            return self._process.wait(bound_s)
+        finally:
+            if self._process.poll() is None:
+                self._process.kill()
+                self._process.wait()
+
+    def reload(self) -> None:
+        """SIGHUP."""
+        self.send(signal.SIGHUP)
+
+    @property
+    def running(self) -> bool:
+        return self._process.poll() is None
+
+    @property
+    def process_id(self) -> int:
+        return self._process.pid
+
+    @property
+    def text(self) -> str:
+        return self.log.read_text(errors="replace")
+
+
+def until(condition: Callable[[], Any], bound_s: float = 60, what: str = "it") -> Any:
+    """What `condition` gives once it is true."""
+    give_up_at = time.monotonic() + bound_s
+    while not (result := condition()):
+        assert time.monotonic() < give_up_at, f"{what} did not come within {bound_s:g} s"
+        time.sleep(0.02)
+    return result
+
+
+def free_port() -> int:
+    """A TCP port that is free now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def jobs(journal: Path) -> list[dict[str, Any]]:
+    """All jobs of a journal, read by SQLite's own hands while the service may be writing."""
+    if not journal.exists():
+        return []
+    database = sqlite3.connect(f"file:{journal}?mode=ro", uri=True, timeout=5)
+    try:
+        database.row_factory = sqlite3.Row
+        return [dict(row) for row in database.execute("SELECT * FROM jobs ORDER BY job_id")]
+    except sqlite3.OperationalError:  # the tables are not made yet
+        return []
+    finally:
+        database.close()
+
+
+def lines(path: Path) -> list[dict[str, Any]]:
+    """JSON Lines, whole ones only."""
+    if not path.exists():
+        return []
+    return [json.loads(line) for line in path.read_text().splitlines(keepends=True) if line.endswith("\n")]

@@ -1,0 +1,162 @@
+"""`combtrace trigger` without a serial line: the same answers and exit statuses, by the daemon's control socket."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from service.daemon.control import MOST_STREAMS, ask
+from tests.support.processes.cell import Cell
+from tests.support.processes.processes import COMBTRACE, ENVIRONMENT, combtrace, jobs
+
+RECIPES = "recipes: [{number: 1, name: a}, {number: 2, name: b, min_area_mm2: 1, max_area_mm2: 100}]\n"
+QUEUE = "{state_dir: state, queue_depth: 20}"
+
+
+NEVER_ANSWERS = "machine: {check_scans: 10000}"  # not within 100 s
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Iterator[Cell]:
+    yield from _running(tmp_path, "")
+
+
+@pytest.fixture
+def stuck(tmp_path: Path) -> Iterator[Cell]:
+    """A cell whose controller leaves a job undecided until it is started again."""
+    yield from _running(tmp_path, NEVER_ANSWERS)
+
+
+def _running(folder: Path, scenario: str) -> Iterator[Cell]:
+    started = Cell(
+        folder,
+        triggers="[]",
+        trigger_every_s=None,
+        service=QUEUE,
+        more=RECIPES,
+        scenario=scenario,
+        link=", max_repeats: 100",
+    )
+    try:
+        started.ready()
+        yield started
+    finally:
+        started.controller.kill()
+        started.stop()
+
+
+def restart_controller(cell: Cell) -> None:
+    """It forgets the job under way: that fails with 153."""
+    cell.controller.kill()
+    cell.scenario = ""
+    cell.controller = cell.start_controller()
+
+
+def acknowledged(client: subprocess.Popen[str]) -> str:
+    """The job's number, once it is told."""
+    assert client.stdout is not None
+    word, number = client.stdout.readline().split()
+    assert word == "ACK"
+    return number
+
+
+def trigger(cell: Cell, *options: str) -> subprocess.CompletedProcess[str]:
+    return combtrace("trigger", "--config", cell.folder / "config.yaml", *options)
+
+
+def waiting(cell: Cell, *options: str) -> subprocess.Popen[str]:
+    """A trigger that is being waited for."""
+    command = [*COMBTRACE, "trigger", "--config", str(cell.folder / "config.yaml"), *options]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+
+
+def test_a_trigger_is_acknowledged_and_its_end_told_by_line_and_status(cell: Cell) -> None:
+    done = trigger(cell, "--thickness-mm", "20.5")
+    assert done.returncode == 0, done.stderr
+    assert re.fullmatch(r"ACK (\d+)\nDONE \1 \d+ \d+\n", done.stdout)
+    (job,) = jobs(cell.journal)
+    assert (job["trigger_kind"], job["outcome"]) == ("shell", "accepted")
+    shown = combtrace("jobs", "show", str(job["job_id"]), "--config", cell.folder / "config.yaml").stdout
+    assert "thickness 20.5 mm" in shown
+    refused = trigger(cell, "--recipe", "2")
+    assert re.fullmatch(r"ACK (\d+)\nFAIL \1 112 area_out_of_limits\n", refused.stdout)
+    assert (refused.returncode, "the recipe expects 1 to 100 mm²" in refused.stderr) == (3, True)
+    unknown = trigger(cell, "--recipe", "3")
+    assert re.fullmatch(r"ACK (\d+)\nFAIL \1 122 unknown_recipe\n", unknown.stdout)
+    none = trigger(cell, "--recipe", "70000")
+    assert (none.returncode, none.stdout) == (3, "NAK 122 unknown_recipe\n")
+
+
+def test_a_halted_daemon_answers_nak_and_says_why(cell: Cell) -> None:
+    assert combtrace("halt", "--config", cell.folder / "config.yaml", "--reason", "blade").returncode == 0
+    done = trigger(cell)
+    assert (done.returncode, done.stdout) == (3, "NAK 121 not_ready\n")
+    assert "halted: blade" in done.stderr
+
+
+def test_a_trigger_that_waits_is_told_its_place_and_a_halt_still_finds_room(stuck: Cell) -> None:
+    first = waiting(stuck)
+    number = acknowledged(first)
+    others = [waiting(stuck) for _ in range(MOST_STREAMS)]
+    lines = [other.stdout.readline() for other in others if other.stdout is not None]
+    assert sum(line.startswith("WAIT ") for line in lines) == MOST_STREAMS - 1
+    assert ask(stuck.folder / "state", {"command": "halt", "reason": "enough"})["state"]
+    ended = [other.communicate(timeout=30) for other in others]
+    assert sum(out == "NAK 161 aborted\n" for out, _ in ended) == MOST_STREAMS - 1
+    assert sum("wait for ends of jobs already. Try again" in error for _, error in ended) == 1
+    restart_controller(stuck)
+    out, error = first.communicate(timeout=60)
+    assert (first.returncode, out) == (1, f"FAIL {number} 153 controller_restarted\n"), error
+
+
+def test_the_end_is_told_across_a_kill_of_the_daemon(stuck: Cell) -> None:
+    client = waiting(stuck)
+    number = acknowledged(client)
+    stuck.service.kill()
+    restart_controller(stuck)
+    stuck.service = stuck.start_service()
+    out, error = client.communicate(timeout=90)
+    (job,) = jobs(stuck.journal)
+    assert re.fullmatch(rf"FAIL {number} {job['reason']} \w+\n", out), error
+    assert client.returncode == 1
+
+
+def test_a_daemon_that_stops_does_not_wait_for_those_who_wait(stuck: Cell) -> None:
+    client = waiting(stuck, "--timeout-s", "20")
+    number = acknowledged(client)
+    assert stuck.service.stop(bound_s=30) == 0
+    out, error = client.communicate(timeout=60)
+    assert (client.returncode, out) == (1, "")
+    assert f"`combtrace jobs show {number}` tells how it ended" in error
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--thickness-mm", "0"], "--thickness-mm 0: expected above 0"),
+        (["--port", "/dev/nowhere", "--thickness-mm", "3"], "cannot be told over a serial line"),
+    ],
+)
+def test_what_no_block_has_is_a_usage_error(cell: Cell, options: list[str], expected: str) -> None:
+    done = trigger(cell, *options)
+    assert (done.returncode, expected in done.stderr) == (2, True), done.stderr
+
+
+def test_the_socket_refuses_numbers_that_are_none(cell: Cell) -> None:
+    for request in ({"recipe": -1}, {"recipe": "2"}, {"thickness_um": True}, {"thickness_um": 10**9}):
+        with pytest.raises(Exception, match="expected"):
+            ask(cell.folder / "state", {"command": "trigger", **request})
+    with pytest.raises(Exception, match="there is no job 77"):
+        ask(cell.folder / "state", {"command": "end", "job": 77})
+    assert json.loads(combtrace("status", "--config", cell.folder / "config.yaml", "--json").stdout)["job"] is None
+
+
+def test_without_a_daemon_it_says_so(tmp_path: Path) -> None:
+    done = combtrace("trigger", "--state-dir", tmp_path)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert "no daemon listens. Check that it runs" in done.stderr

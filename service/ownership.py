@@ -167,7 +167,8 @@ class Ownership:
     def _watch(self, block: ServiceBlock) -> bool:
         """At the start: True where what stands there has stood still for as long as it must."""
         if block.owner == NOBODY:
-            self._other, self._beats = NOBODY, deque(maxlen=OWN_BEATS_KEPT)
+            self._other = NOBODY
+            self._keep_beats()
             return True
         now = self._now()
         if block.owner != self._other:
@@ -185,5 +186,9 @@ class Ownership:
         if now - self._since_s < (WATCH_S if foreign else WATCH_OWN_S):
             return False
         self._taken_over = self._taken_over or foreign
-        self._beats = deque([block.service_heartbeat], OWN_BEATS_KEPT)
+        self._keep_beats(block.service_heartbeat)
         return True
+
+    def _keep_beats(self, *found: int) -> None:
+        """From here on others are strange; a first write of ours without a reply may still land."""
+        self._beats = deque((*(self._beats or ()), *found), OWN_BEATS_KEPT)

@@ -233,6 +233,18 @@ def test_our_first_write_that_lands_late_is_ours(owner: int, found: int) -> None
     assert watched.ownership.ours
 
 
+def test_a_write_of_before_a_restart_of_the_controller_that_lands_after_it_is_ours() -> None:
+    watched = Watched()
+    watched.begin()
+    watched.ownership.writing(2)  # no reply
+    watched.ownership.disconnected()
+    watched.ownership.controller_restarted()
+    assert watched.see(OURS, 1)
+    watched.write(3)
+    assert all(watched.see_for(0.3, OURS, itertools.repeat(2)))
+    assert watched.ownership.ours
+
+
 def test_our_claim_stands_over_a_lost_reply() -> None:
     watched = Watched()
     while not watched.see(THEIRS, 7):

@@ -214,7 +214,9 @@ class TwinCell(FaultedCell):
     async def _both_come_to_an_end(self, *twins: Twin) -> None:
         """Also one that must not write any more: by `valid_for` and `ack_timeout`."""
         give_up_at = time.monotonic() + 5.0
-        while time.monotonic() < give_up_at and any(twin.parts.journal.unsettled() for twin in twins):
+        while time.monotonic() < give_up_at and (
+            self.controller.trigger_open or any(twin.parts.journal.unsettled() for twin in twins)
+        ):
             await asyncio.sleep(0.02)
 
     async def _person_decides(self, first: Twin, second: Twin) -> None:

@@ -17,7 +17,7 @@ WATCH_S = 3.0  # how long a foreign heartbeat must stand still, and then how lon
 WATCH_OWN_S = 1.5  # how long a heartbeat beside our own number must stand still: a former life's does
 SHORT_PAUSE_S = 1.0  # without readings: a service that lives has moved its heartbeat by then
 NOBODY = 0  # in `owner`: registers that nobody has written yet
-OWN_BEATS_KEPT = 16  # of writes without a reply, one of which may land late
+OWN_BEATS_KEPT = 256  # own writes of the last seconds: one without a reply may land late
 
 
 class ForeignOwner(ControllerError):

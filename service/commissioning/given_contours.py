@@ -21,7 +21,7 @@ from contour.acceptance.acceptance import judge_millimetres
 from contour.acceptance.error_budget import ErrorBudget
 from contour.geometry.rings import Contour, Ring, area, oriented_contour
 from drivers.camera import Frame
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.measuring.measure import Measurement, Measurer, told
 
 LARGEST_FILE = 100_000_000

@@ -22,7 +22,7 @@ from contour.image.taught_table import TableLimits, look_at
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.tracing import Trace, TraceSettings, check_picture, trace
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.measuring.calibration_guard import CalibrationGuard
 from service.measuring.table_file import TableRecord
 from service.reasons import Reason

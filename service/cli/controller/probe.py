@@ -45,8 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Probe, print, and tell by the exit status."""
-    from service.config.config import NoController
     from service.config.config_file import ConfigError, load_config
+    from service.config.controllers import NoController
 
     try:
         config = load_config(args.config)
@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
 async def _probe(config: Config, args: argparse.Namespace) -> int:
     from drivers.controller import ControllerError
     from service.commissioning.probing import Finding, Probe
-    from service.config.config import NoController
+    from service.config.controllers import NoController
     from service.daemon.lock import LockError, Locks, NameLock
     from service.wiring import controller_names, make_controller
 

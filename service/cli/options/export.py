@@ -12,7 +12,7 @@ from service.cli.file_names import distinct_stems, output_path
 from service.export.forms import ENDINGS
 
 if TYPE_CHECKING:
-    from service.config.config import Recipe
+    from service.config.recipes import Recipe
     from service.export.gcode import GcodeSettings
     from service.measuring.measure import Measurement
 

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 from service.cli.errors import UserError
 
 if TYPE_CHECKING:
-    from service.config.config import Config, Recipe
+    from service.config.config import Config
+    from service.config.recipes import Recipe
     from service.measuring.calibration_guard import CalibrationGuard
     from service.measuring.measure import Measurer
     from service.measuring.trend_file import TrendLine

@@ -20,7 +20,8 @@ from service.cli.pictures.given_pictures import add_pictures_argument, pictures_
 
 if TYPE_CHECKING:
     from contour.geometry.rings import Contour
-    from service.config.config import Config, Recipe
+    from service.config.config import Config
+    from service.config.recipes import Recipe
     from service.measuring.measure import Measurement, Measurer
     from service.measuring.table_file import TableRecord
 
@@ -144,7 +145,7 @@ def _overlays(overlay: Path, images: list[Path], *, several: bool) -> dict[Path,
 
 def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
     """The recipe, by name, number or default, with what the command line says otherwise."""
-    from service.config.config import Recipe
+    from service.config.recipes import Recipe
 
     found = find_recipe(config, args.recipe)
     changes: dict[str, Any] = {

@@ -17,7 +17,10 @@ from drivers.controller import ControllerError
 from drivers.trigger import TriggerUnavailable
 from service.commissioning.checkup.finding import Finding, fault, ok, warning
 from service.commissioning.checkup.running import other_user_of_controller
-from service.config.config import Config, FilesCamera, ModbusRtu, SerialTrigger, V4l2Camera
+from service.config.cameras import FilesCamera, V4l2Camera
+from service.config.config import Config
+from service.config.controllers import ModbusRtu
+from service.config.triggers import SerialTrigger
 from service.link.link import Link, LinkSettings
 from service.wiring import WiringError, find_guard, make_camera, make_controller, make_serial_port
 

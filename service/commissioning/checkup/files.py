@@ -10,7 +10,8 @@ from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
 from service.commissioning.checkup.finding import Finding, fault, ok, warning
 from service.commissioning.checkup.page import check_page
-from service.config.config import Config, Gcode
+from service.config.config import Config
+from service.config.recipes import Gcode
 from service.export.recipe_exports import trial
 from service.measuring.calibration_guard import CalibrationGuard
 from service.measuring.measure import step_doubt

@@ -40,8 +40,9 @@ from drivers.controller.mailbox.mailbox import (
     withdrawal,
 )
 from drivers.controller.simulated.controller import SimulatedController
-from service.config.config import Config, NoController
+from service.config.config import Config
 from service.config.config_file import ConfigError, load_config
+from service.config.controllers import NoController
 from service.config.mistakes import describe
 from service.jobs.executor import ROOM
 from service.link.controller_clock import BEATS_TO_HOLD

@@ -12,7 +12,7 @@ from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import ParameterError, PictureError
 from contour.geometry.rings import area, hausdorff
 from contour.synthetic import render
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.measuring.calibration_file import load_calibration
 from service.measuring.measure import Measurer, trace_settings
 from service.reasons import Reason

@@ -32,10 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the script."""
-    from service.cli.main import build_parser
-
     script = {"bash": bash, "zsh": zsh, "fish": fish}[args.shell]
-    print(script(commands_of(build_parser())), end="")
+    print(script(commands_of(args.parser)), end="")
     return EXIT_OK
 
 

@@ -18,12 +18,12 @@ from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
 from contour.geometry.rings import Contour, Ring, densified
 from contour.image.region import Region
-from contour.image.taught_table import TableLimits, look_at
+from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.tracing import Trace, TraceSettings, check_picture, trace
 from service.config.recipes import Recipe
-from service.measuring.calibration_guard import CalibrationGuard
+from service.measuring.calibration_guard import CalibrationGuard, Rejection
 from service.measuring.table_file import TableRecord
 from service.reasons import Reason
 
@@ -54,7 +54,7 @@ class Measurement:
     thickness_mm: float | None = None
     aligned: bool = False
     quality: Quality | None = None
-    findings: tuple[tuple[Reason, str], ...] = ()
+    findings: tuple[Rejection, ...] = ()
     timings_ms: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -170,7 +170,7 @@ class Measurer:
             result = self._traced(picture, recipe, thickness_mm, result, watch, camera)
         except NoBlockFound as error:
             watch.lap("trace")
-            result = replace(result, findings=told(judge_without_block(picture, str(error))))
+            result = replace(result, findings=rejections(judge_without_block(picture, str(error))))
         except CalibrationError as error:
             result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))
         if self._guard is not None:
@@ -199,16 +199,11 @@ class Measurer:
         if calibration is not None:
             calibration.check_fits(width, height)
         if self._table is not None:
-            if camera and self._table.camera not in ("", camera):
-                raise CalibrationError(
-                    f"The table was taught with camera {self._table.camera}, the picture is of {camera}. Use that "
-                    "camera, or teach the table again."
-                )
-            look = look_at(picture, self._table.table)
+            look = self._look_at_table(self._table, picture, camera)
             watch.lap("table")
             changes = judge_table(look, TableLimits())
             if changes:
-                return replace(result, findings=told(changes))
+                return replace(result, findings=rejections(changes))
             picture = look.picture
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
@@ -216,30 +211,11 @@ class Measurer:
         result = replace(
             result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour, quality=traced.quality
         )
-        polygon = cutting_polygon(
-            traced.contour,
-            calibration,
-            height_mm=thickness_mm,
-            tolerance_mm=recipe.tolerance_mm,
-            finish=Finish(recipe.margin_mm, recipe.max_vertices, recipe.budget_mm, recipe.first_vertex),
-            on_stage=watch.lap,
-        )
-        # What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither.
-        # What the vertex budget gave up is of one sign, and adds in full.
-        sure_px = traced.uncertainty_px
-        if sure_px is not None:
-            sure_px = float(np.hypot(sure_px, polygon.shift_px)) + polygon.given_up_px
+        polygon = self._polygon(traced.contour, recipe, thickness_mm, watch)
+        sure_px = _uncertainty_px(traced, polygon)
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
         limits = self._limits(recipe)
-        findings = judge(
-            polygon,
-            (width, height),
-            limits,
-            traced=traced,
-            region=region,
-            budget=budget,
-            picture=picture,
-        )
+        findings = judge(polygon, (width, height), limits, traced=traced, region=region, budget=budget, picture=picture)
         watch.lap("judge")
         return replace(
             result,
@@ -250,7 +226,25 @@ class Measurer:
             area_mm2=polygon.area_mm2,
             uncertainty_px=sure_px,
             uncertainty=budget,
-            findings=told(findings),
+            findings=rejections(findings),
+        )
+
+    def _look_at_table(self, record: TableRecord, picture: NDArray[np.uint8], camera: str) -> TableLook:
+        if camera and record.camera not in ("", camera):
+            raise CalibrationError(
+                f"The table was taught with camera {record.camera}, the picture is of {camera}. Use that "
+                "camera, or teach the table again."
+            )
+        return look_at(picture, record.table)
+
+    def _polygon(self, contour: Contour, recipe: Recipe, thickness_mm: float, watch: _Stopwatch) -> Polygon:
+        return cutting_polygon(
+            contour,
+            self._calibration,
+            height_mm=thickness_mm,
+            tolerance_mm=recipe.tolerance_mm,
+            finish=Finish(recipe.margin_mm, recipe.max_vertices, recipe.budget_mm, recipe.first_vertex),
+            on_stage=watch.lap,
         )
 
     def _region(self, recipe: Recipe, thickness_mm: float) -> Region | None:
@@ -293,7 +287,18 @@ class Measurer:
         )
 
 
-def told(findings: tuple[Finding, ...]) -> tuple[tuple[Reason, str], ...]:
+def _uncertainty_px(traced: Trace, polygon: Polygon) -> float | None:
+    """95 % bound on where the polygon's edges lie, px; None where tracing gives none.
+
+    What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither. What the
+    vertex budget gave up is of one sign, and adds in full.
+    """
+    if traced.uncertainty_px is None:
+        return None
+    return float(np.hypot(traced.uncertainty_px, polygon.shift_px)) + polygon.given_up_px
+
+
+def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:
     """The findings by the names that journal and registers carry."""
     return tuple((Reason(int(finding.refusal)), finding.text) for finding in findings)
 

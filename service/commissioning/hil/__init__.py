@@ -20,7 +20,8 @@ except ModuleNotFoundError as error:
         name=error.name,
     ) from error
 
-from service.commissioning.hil.bench import Bench, HilError, open_bench
+from service.commissioning.hil.bench import Bench, open_bench
+from service.commissioning.hil.presence import HilError
 
 __all__ = ["Bench", "HilError", "hil", "hil_moves"]
 

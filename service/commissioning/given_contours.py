@@ -22,7 +22,8 @@ from contour.acceptance.error_budget import ErrorBudget
 from contour.geometry.rings import Contour, Ring, area, oriented_contour
 from drivers.camera import Frame
 from service.config.recipes import Recipe
-from service.measuring.measure import Measurement, Measurer, rejections
+from service.measuring.measure import Measurer, rejections
+from service.measuring.measurement import Measurement
 
 LARGEST_FILE = 100_000_000
 LARGEST_COORDINATE_MM = 2_147_483.647  # what an i32 of micrometres holds

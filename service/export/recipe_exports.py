@@ -10,7 +10,7 @@ from service.export.document import ExportDocument, ExportError
 from service.export.files import exported, read_template
 from service.export.forms import ENDINGS
 from service.export.gcode import TEMPLATE, GcodeSettings
-from service.measuring.measure import Measurement
+from service.measuring.measurement import Measurement
 
 
 def gcode_settings(recipe: Recipe) -> GcodeSettings:

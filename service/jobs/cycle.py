@@ -21,7 +21,8 @@ from service.link.contour_message import Envelope, contour_pages
 from service.link.controller_clock import Stamp
 from service.link.link import Link
 from service.link.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
-from service.measuring.measure import Measurement, Measurer
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
 from service.reasons import Outcome, Reason
 from service.records.evidence import Evidence, Keeper, KeepsNothing
 from service.records.journal import Job, Journal, JournalError, Terms

@@ -14,7 +14,7 @@ from service.export.forms import ENDINGS
 if TYPE_CHECKING:
     from service.config.recipes import Recipe
     from service.export.gcode import GcodeSettings
-    from service.measuring.measure import Measurement
+    from service.measuring.measurement import Measurement
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:

@@ -22,7 +22,8 @@ from service.cli.pictures.trace_record import record_of, sentence, unusable_reco
 if TYPE_CHECKING:
     from service.config.config import Config
     from service.config.recipes import Recipe
-    from service.measuring.measure import Measurement, Measurer
+    from service.measuring.measure import Measurer
+    from service.measuring.measurement import Measurement
     from service.measuring.table_file import TableRecord
 
 HELP = "trace the contour in pictures"

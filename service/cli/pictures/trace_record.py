@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from contour.geometry.rings import Contour
-    from service.measuring.measure import Measurement
+    from service.measuring.measurement import Measurement
 
 
 def sentence(measurement: Measurement, language: str) -> str:
@@ -64,7 +64,7 @@ def record_of(image: Path, measurement: Measurement) -> dict[str, Any]:
 
 def unusable_record(image: Path, method: str, text: str) -> dict[str, Any]:
     """The contract's object for a picture that could not be used."""
-    from service.measuring.measure import Measurement
+    from service.measuring.measurement import Measurement
 
     return {**record_of(image, Measurement(method=method)), "status": "error", "details": [text]}
 

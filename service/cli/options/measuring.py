@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -140,8 +139,3 @@ def note_trend(path: Path | None, line: TrendLine) -> None:
         print(f"trend     {plot}: cannot be written: {error.strerror}; the line is in {path}", file=sys.stderr)
     else:
         print(f"plot      {plot}")
-
-
-def now() -> datetime:
-    """The time by this computer's clock."""
-    return datetime.now(UTC)

@@ -24,7 +24,7 @@ from contour.geometry.rings import Contour, Ring, densified, oriented_contour, s
 from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import render
 from contour.tracing.tracing import TraceSettings, trace
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from tests.support.scenes.random_scenes import random_scene
 from tests.support.scenes.trials import calibration_for
 

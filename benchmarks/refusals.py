@@ -19,8 +19,9 @@ from benchmarks.refusal_scenes import refusal_scenes
 from benchmarks.report import table
 from benchmarks.table_scenes import table_scenes
 from contour.synthetic import render
-from service.config.config import Recipe
-from service.measuring.measure import Measurement, Measurer
+from service.config.recipes import Recipe
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
 from tests.support.scenes.bench_scenes import BenchScene, measured_scenes, tuned_scenes
 from tests.support.scenes.metrics import agreement
 from tests.support.scenes.random_scenes import random_scene

@@ -113,8 +113,9 @@ def simulated_config(args: argparse.Namespace) -> Config:
     """The configuration that the options name, without camera and calibration, with a state of its own."""
     from pydantic import ValidationError
 
-    from service.config.config import Config, NoController
+    from service.config.config import Config
     from service.config.config_file import ConfigError, default_config, load_config
+    from service.config.controllers import NoController
 
     try:
         config = default_config() if args.config is None else load_config(args.config)

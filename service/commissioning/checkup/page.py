@@ -5,11 +5,11 @@ from __future__ import annotations
 import ipaddress
 from collections.abc import Iterator
 
-from service.commissioning.checkup.finding import Finding, fault, ok, warning
+from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.config.config import Page
 
 
-def check_page(settings: Page) -> Iterator[Finding]:
+def check_page(settings: Page) -> Iterator[CheckResult]:
     """What it is made of, its tokens, its certificate, and who could listen on the line."""
     try:
         from service.web.server import PageError, check_certificate

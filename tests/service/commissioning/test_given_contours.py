@@ -13,8 +13,8 @@ from service.cli.controller.simulate_service import SHAPES as OFFERED
 from service.cli.main import main
 from service.commissioning.given_contours import GivenContour, GivenContours, GivenContoursError, read_contours
 from service.commissioning.given_shapes import SHAPES, shape
-from service.config.config import Recipe
 from service.config.config_file import SAMPLES
+from service.config.recipes import Recipe
 from service.export.document import ExportDocument
 from service.export.geojson import to_geojson
 from service.reasons import Reason

@@ -10,8 +10,11 @@ import pytest
 import yaml
 
 from service.config import reference as config_reference
-from service.config.config import Config, FilesCamera, ModbusTcp, NoController, SerialTrigger
+from service.config.cameras import FilesCamera
+from service.config.config import Config
 from service.config.config_file import ConfigError, config_schema, default_config, load_config
+from service.config.controllers import ModbusTcp, NoController
+from service.config.triggers import SerialTrigger
 
 ROOT = Path(__file__).parents[3]
 SMALL = "camera: {kind: files, path: in}\ncalibration: {file: c.yaml}\ncontroller: {kind: modbus-tcp}\n"

@@ -71,6 +71,6 @@ def test_every_reason_that_a_page_names_has_that_code(page: Path) -> None:
 
 
 def test_the_states_are_told_with_their_values() -> None:
-    page = (ROOT / "docs" / "operating.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "how-to" / "operating.md").read_text(encoding="utf-8")
     told = dict(re.findall(r"^\| (\w+) \| (\d) \|", page, re.MULTILINE))
     assert told == {state.label: str(int(state)) for state in State}

@@ -1,4 +1,4 @@
-"""docs/methods.md shows what the methods do: its figures and tables are drawn again, and compared.
+"""docs/reports/methods.md shows what the methods do: its figures and tables are drawn again, and compared.
 
 Not byte by byte: another OpenCV draws other letters, and a last bit of a float may move a pixel of a rendered block.
 A contour that lies elsewhere by a pixel changes ten times what is allowed here.

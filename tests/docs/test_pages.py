@@ -98,6 +98,12 @@ def test_every_test_that_a_page_names_exists(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_file_and_folder_of_the_source_that_a_page_names_is_there(page: Path) -> None:
+    named = re.findall(rf"`((?:{'|'.join(FOLDERS)})/[\w./-]*)", page.read_text(encoding="utf-8"))
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_reason_that_a_page_names_has_that_code(page: Path) -> None:
     named = re.findall(r"\b(1\d\d) `([a-z]+(?:_[a-z]+)*)`", page.read_text(encoding="utf-8"))
     codes = {str(int(reason)): reason.label for reason in Reason}

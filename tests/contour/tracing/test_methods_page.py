@@ -26,7 +26,7 @@ ANEW = "Run `make methods`, and read the page again: its sentences may no longer
 
 def test_the_figures_are_what_is_drawn_now() -> None:
     drawn = figures()
-    named = set(re.findall(r"\(pictures/([^)]+)\)", PAGE.read_text(encoding="utf-8")))
+    named = set(re.findall(r"\(\.\./pictures/([^)]+)\)", PAGE.read_text(encoding="utf-8")))
     assert named == set(drawn) == {path.name for path in PICTURES.glob("methods-*")}
     for name, figure in drawn.items():
         shown = cv2.imread(str(PICTURES / name))

@@ -219,6 +219,32 @@ def test_a_heartbeat_that_moved_while_replies_were_lost_has_moved() -> None:
     assert watched.ownership.conflict
 
 
+@pytest.mark.parametrize(("owner", "found"), [(OURS, 7), (0, 0)])
+def test_our_first_write_that_lands_late_is_ours(owner: int, found: int) -> None:
+    watched = Watched()
+    while not watched.see(owner, found):
+        pass
+    watched.ownership.writing(20)  # no reply
+    watched.ownership.disconnected()
+    assert watched.see(owner, found, after_s=0.4)
+    watched.write(21)
+    assert watched.see(OURS, 21)
+    assert all(watched.see_for(0.3, OURS, itertools.repeat(20)))
+    assert watched.ownership.ours
+
+
+def test_a_write_of_before_a_restart_of_the_controller_that_lands_after_it_is_ours() -> None:
+    watched = Watched()
+    watched.begin()
+    watched.ownership.writing(2)  # no reply
+    watched.ownership.disconnected()
+    watched.ownership.controller_restarted()
+    assert watched.see(OURS, 1)
+    watched.write(3)
+    assert all(watched.see_for(0.3, OURS, itertools.repeat(2)))
+    assert watched.ownership.ours
+
+
 def test_our_claim_stands_over_a_lost_reply() -> None:
     watched = Watched()
     while not watched.see(THEIRS, 7):

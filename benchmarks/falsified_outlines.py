@@ -1,7 +1,7 @@
 """How many false outlines the second account of the block sees: `python -m benchmarks.falsified_outlines` (`--help`).
 
 Outlines of traceable random scenes are falsified in three ways and judged as the service judges them, by the limit of a
-recipe that sets none. Prints the shares; with `--write` they take their place in docs/accuracy.md.
+recipe that sets none. Prints the shares; with `--write` they take their place in docs/reports/accuracy.md.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.falsified_outlines", description=__doc__)
     parser.add_argument("--first", type=int, default=SCENES[0], metavar="SEED", help="seed of the first random scene")
     parser.add_argument("--count", type=int, default=SCENES[1], metavar="N", help="so many random scenes")
-    parser.add_argument("--write", action="store_true", help="write the section of docs/accuracy.md")
+    parser.add_argument("--write", action="store_true", help="write the section of docs/reports/accuracy.md")
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.count)
     with ProcessPoolExecutor(max_workers=2) as pool:

@@ -1,6 +1,6 @@
 """The configuration's reference as Markdown, made from the models, so that it cannot say what is not so.
 
-`python -m service.config.reference docs/configuration.md config.schema.json` writes both generated files.
+`python -m service.config.reference docs/reference/configuration.md config.schema.json` writes both generated files.
 """
 
 from __future__ import annotations

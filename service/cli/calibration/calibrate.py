@@ -28,7 +28,7 @@ Three ways:
 With a board, --plane is the picture in which it lies flat on the table. Its lower-left
 square's outer corner becomes the origin, x runs along its lower edge, y up. Take 12 to 20
 pictures, the board tilted by about 20 degrees to all sides, in all parts of the view.
-A report with pictures is written beside the file. docs/calibrating.md goes step by step.
+A report with pictures is written beside the file. docs/how-to/calibrating.md goes step by step.
 
 Pictures of a board do not tell its size. --camera-height-mm and --known-length-mm, measured
 by hand, are told beside what the calibration says: from 3 % apart with a warning, from

@@ -155,7 +155,7 @@ async def _answer(config: Config) -> CheckResult:
         return fault(
             "controller",
             "it answers, but its session is 0: its program does not run, or link_address is another's",
-            "Start the controller's program; compare link_address with docs/register-map.md",
+            "Start the controller's program; compare link_address with docs/reference/register-map.md",
         )
     return ok("controller", f"it answers: session {block.session}, controller_state {block.controller_state}")
 

@@ -52,7 +52,8 @@ def check_calibration(config: Config) -> Iterator[CheckResult]:
     yield fault("calibration", expired[1]) if expired else ok("calibration", _told(config, guard))
     allowed, age = guard.limits.max_age_days, guard.age_days
     if not expired and allowed and age is not None and age > _SOON * allowed:
-        yield warning("calibration", f"it expires in {allowed - age:.1f} days", "Calibrate again: docs/calibrating.md")
+        next_step = "Calibrate again: docs/how-to/calibrating.md"
+        yield warning("calibration", f"it expires in {allowed - age:.1f} days", next_step)
     calibration = guard.record.calibration
     blind = [recipe.name for recipe in config.recipes if not calibration.height_known(recipe.thickness_mm)]
     if blind:

@@ -30,7 +30,7 @@ def check_page(settings: Page) -> Iterator[CheckResult]:
         yield warning(
             "page",
             f"{settings.host}:{settings.port} is open to the network without TLS: tokens can be read on the line",
-            "Give page.certificate and page.key, or host 127.0.0.1: docs/security.md",
+            "Give page.certificate and page.key, or host 127.0.0.1: docs/reference/security.md",
         )
     yield ok("page", f"{settings.host}:{settings.port}, {who}")
 

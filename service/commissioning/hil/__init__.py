@@ -2,7 +2,8 @@
 Needs the extra `combtrace[hil]`.
 
 Load it with `-p service.commissioning.hil`, or name it in `pytest_plugins` of the topmost conftest.py. Without
-`--hil-controller` and `--hil-config` the fixture works on a simulated controller. docs/hardware-in-loop.md tells more.
+`--hil-controller` and `--hil-config` the fixture works on a simulated controller; more in
+docs/how-to/hardware-in-loop.md.
 """
 
 from __future__ import annotations

@@ -118,7 +118,7 @@ def test_contours_come_in_turn_and_begin_again():
 
 
 def test_the_page_shows_every_shape():
-    page = (Path(__file__).parents[3] / "docs" / "simulated-service.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "simulated-service.md").read_text(encoding="utf-8")
     shown = [line.split("`")[1] for line in page.splitlines() if line.startswith("| `")]
     assert shown == list(SHAPES)
 

@@ -24,7 +24,8 @@ from contour.synthetic import (
 )
 from contour.tracing.binarize import WallMask, binarize
 from contour.tracing.paper_cells import Cells
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from tests.support.scenes.metrics import agreement
 
 WIDTH, HEIGHT, MM_PER_PX = 500, 430, 0.6

@@ -24,7 +24,8 @@ from contour.errors import ContourError
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import LEAST_PX, Coefficients, Stretches, bound, ring_stretches
 from contour.synthetic import Rendered, render
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from contour.walls.see_block import see_block
 from contour.walls.wall_evidence import BlockEvidence
 from tests.support.scenes.bench_scenes import BenchScene, measured_scenes

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import CalibrationError
+from contour.geometry.rectifier import Rectifier
 from contour.image.opencv import camera_rays, project, rotation_matrix
-from contour.tracing.tracing import Rectifier
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contour.calibration.calibration import HEIGHT_BOUND_MM, Alignment, Frames, scales
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import CalibrationError
-from contour.tracing.tracing import Rectifier
+from contour.geometry.rectifier import Rectifier
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contour.geometry.rings import Contour, Ring
 from contour.image import opencv as _cv
-from contour.tracing.tracing import check_picture
+from contour.image.picture_check import check_picture
 
 Picture = NDArray[np.uint8]
 Colour = tuple[int, int, int]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from contour.errors import NoBlockFound
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside
-from contour.tracing.tracing import Rectifier
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 _FAR_OFF_PITCHES = 0.5

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.outline.bevels import bevelled
 from contour.outline.chains import Chain, free_curves
@@ -20,7 +21,6 @@ from contour.outline.proposals import FEW, gather, propose
 from contour.outline.runs import Segments, around, fitted, runs
 from contour.outline.spread import unseen_share, vertex_sigma
 from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
-from contour.tracing.tracing import Rectifier
 from contour.walls.wall_evidence import RingEvidence
 
 _FEWEST = 6

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside
-from contour.tracing.tracing import Rectifier
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 Index = NDArray[np.intp]

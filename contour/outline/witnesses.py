@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contour.geometry.rectifier import Rectifier
 from contour.outline.lines_and_arcs import Complex, Index, Models, Real, distance
-from contour.tracing.tracing import Rectifier
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 # Shares of witnesses that are no clean wall end, for the price of calling one an outlier.

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from contour.errors import ParameterError
 from contour.image import opencv as _cv
 from contour.tracing.paper_cells import Cells, measure_cells
+from contour.tracing.trace import Polarity
 
 Picture = NDArray[np.uint8]
-Polarity = Literal["bright", "dark"]
 
 _CONTRAST_SHARE = 0.45
 """Where a wall's profile is cut, as a share of the contrast of walls around; half, less a little for dim walls."""

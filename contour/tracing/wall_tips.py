@@ -6,20 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, ParameterError
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.outline.evidence_check import check_against_evidence
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import material_edge
-from contour.tracing.tracing import OnStage, Rectifier, Trace, TraceSettings
+from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import pieces_beside
 from contour.walls.see_block import see_block
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
 from contour.walls.wall_mask import wall_mask
-
-__all__ = ["see_block", "wall_tips"]
 
 _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.

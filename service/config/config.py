@@ -14,7 +14,7 @@ from pydantic import Field, field_validator, model_validator
 
 from contour.geometry.rings import ring_defect
 from contour.polygon.start_vertex import Start
-from contour.tracing.tracing import Method
+from contour.tracing.trace import Method
 from service.config.values import REGISTERS, FilePath, Host, MistakeAt, Model, Number, Point, Port, Register, Seconds
 
 DEFAULT_METHOD: Method = "wall-tips"

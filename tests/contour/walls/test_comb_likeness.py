@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contour.acceptance.acceptance import Limits, Refusal, judge
+from contour.acceptance.acceptance import View, judge
+from contour.acceptance.findings import Limits, Refusal
+from contour.acceptance.trace_check import CheckedTrace
 from contour.errors import NoBlockFound
 from contour.polygon.polygon import cutting_polygon
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from contour.walls.comb_likeness import Comb, surely_comb, unlike_comb
 from tests.support.pictures.small_scenes import block
 
@@ -85,9 +88,8 @@ def test_a_chessboard_on_the_table_is_no_block(side: int) -> None:
         found = trace(cv2.GaussianBlur(picture, (0, 0), 0.8), TraceSettings())
     except NoBlockFound:
         return
-    findings = judge(
-        cutting_polygon(found.contour, None, height_mm=0.0, tolerance_mm=0.1), (960, 720), Limits(), traced=found
-    )
+    polygon = cutting_polygon(found.contour, None, height_mm=0.0, tolerance_mm=0.1)
+    findings = judge(polygon, View((960, 720)), Limits(), traced=CheckedTrace(found))
     assert findings[0].refusal == Refusal.NO_BLOCK_FOUND
 
 

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from contour.acceptance.block_findings import (
     disagrees,
     no_comb,
@@ -29,6 +26,7 @@ from contour.acceptance.polygon_findings import (
     too_unsure,
 )
 from contour.acceptance.trace_check import CheckedTrace
+from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour, area, contour_defect
 from contour.image.region import Region
 from contour.polygon.polygon import Polygon
@@ -40,7 +38,7 @@ class View:
 
     size: tuple[int, int]
     region: Region | None = None
-    picture: NDArray[np.uint8] | None = None
+    picture: Bytes | None = None
 
 
 def judge(
@@ -101,7 +99,7 @@ def judge_millimetres(contour: Contour, limits: Limits, bound_mm: float | None) 
     return tuple(finding for finding in findings if finding)
 
 
-def judge_without_block(picture: NDArray[np.uint8], text: str) -> tuple[Finding, ...]:
+def judge_without_block(picture: Bytes, text: str) -> tuple[Finding, ...]:
     """Why there is no contour, lowest code first: what is wrong with the picture as a whole, and `text`, which says
     what was looked for in vain.
     """

@@ -14,14 +14,10 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.acceptance.block_level import told_by_level
+from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s
 from contour.geometry.rings import Contour, Ring
-
-Picture = NDArray[np.uint8]
-Mask = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 
 _PITCH_PX = 6
 _SHARE_OF_LEVEL = 0.5
@@ -58,7 +54,7 @@ class Disagreement:
         return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
 
 
-def disagreement(picture: Picture, contour: Contour, pitch_px: float) -> Disagreement:
+def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreement:
     """The widest disagreement between the contour, in pixels, and the busy part of `picture`, grey or BGR, uint8.
 
     Width is that of the largest disc that fits into the difference; a spike or a notch has little, but its tip lies far
@@ -95,7 +91,7 @@ def disagreement(picture: Picture, contour: Contour, pitch_px: float) -> Disagre
     return Disagreement(apart / pitch, (x, y), claims, on_the_whole / pitch)
 
 
-def _reduced(picture: Picture, shrink: int) -> Picture:
+def _reduced(picture: Bytes, shrink: int) -> Bytes:
     if shrink == 1:
         return picture
     size = (max(1, picture.shape[1] // shrink), max(1, picture.shape[0] // shrink))
@@ -104,7 +100,7 @@ def _reduced(picture: Picture, shrink: int) -> Picture:
     return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _busy(small: Picture, pitch: float) -> Mask:
+def _busy(small: Bytes, pitch: float) -> Bytes:
     """Where the picture differs from its mean over a pitch as it does in comb, 0 or 255."""
     window = _odd(pitch)
     off = cv2.absdiff(small, cv2.blur(small, (window, window)))
@@ -120,30 +116,30 @@ def _busy(small: Picture, pitch: float) -> Mask:
     return np.asarray(busy, np.uint8) * np.uint8(255)
 
 
-def _without_small_gaps(mask: Mask, area_px2: float) -> Mask:
+def _without_small_gaps(mask: Bytes, area_px2: float) -> Bytes:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(cv2.bitwise_not(mask), connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] < area_px2
     small[0] = False
     return np.asarray(np.where(small[labels], np.uint8(255), mask), np.uint8)
 
 
-def _opened(mask: Mask, shape: Mask) -> Mask:
+def _opened(mask: Bytes, shape: Bytes) -> Bytes:
     """The mask without what is narrower than the shape."""
     return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, shape), np.uint8)
 
 
-def _drawn(contour: Contour, shape: tuple[int, int], shrink: int) -> Mask:
+def _drawn(contour: Contour, shape: tuple[int, int], shrink: int) -> Bytes:
     mask = np.zeros(shape, np.uint8)
     rings = [_fixed_point((ring + 0.5) / shrink - 0.5) for ring in contour.rings]
     cv2.fillPoly(mask, rings, 255, cv2.LINE_8, _FRACTION_BITS)
     return mask
 
 
-def _fixed_point(ring: Ring) -> NDArray[np.int32]:
+def _fixed_point(ring: Ring) -> Int32s:
     return np.asarray(np.rint(ring * (1 << _FRACTION_BITS)), np.int32)
 
 
-def _touched(mask: Mask, ours: Mask) -> Mask:
+def _touched(mask: Bytes, ours: Bytes) -> Bytes:
     """The parts of `mask` that meet `ours`."""
     count, labels, _, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
     meets = np.bincount(labels[ours > 0], minlength=count) > 0
@@ -151,29 +147,29 @@ def _touched(mask: Mask, ours: Mask) -> Mask:
     return np.asarray(np.where(meets[labels], np.uint8(255), np.uint8(0)), np.uint8)
 
 
-def _but(mask: Mask, other: Mask) -> Mask:
+def _but(mask: Bytes, other: Bytes) -> Bytes:
     """What is in `mask` and not in `other`."""
     return np.asarray(cv2.bitwise_and(mask, cv2.bitwise_not(other)), np.uint8)
 
 
-def _inverted(mask: Mask) -> Mask:
+def _inverted(mask: Bytes) -> Bytes:
     return np.asarray(cv2.bitwise_not(mask), np.uint8)
 
 
-def _distances(mask: Mask) -> Floats:
+def _distances(mask: Bytes) -> Float32s:
     """Of each pixel in `mask` from what is not, pixels; 0 elsewhere. The picture's border ends a mask too."""
     framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_CONSTANT)
     return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1], np.float32)
 
 
-def _widest(difference: Mask) -> tuple[float, tuple[float, float]]:
+def _widest(difference: Bytes) -> tuple[float, tuple[float, float]]:
     """Diameter of the largest disc inside, in pixels, and its middle (x, y)."""
     depth = _distances(difference)
     y, x = np.unravel_index(int(depth.argmax()), depth.shape)
     return 2.0 * float(depth[y, x]), (float(x), float(y))
 
 
-def _reduced_points(contour: Contour, spacing_px: float, shrink: int) -> NDArray[np.float64]:
+def _reduced_points(contour: Contour, spacing_px: float, shrink: int) -> Float64s:
     """Points at equal spacing along all rings, in the reduced picture, shape (N, 2)."""
     rings = [_along(ring, spacing_px) for ring in contour.rings]
     return np.asarray((np.concatenate(rings) + 0.5) / shrink - 0.5, np.float64)
@@ -188,14 +184,14 @@ def _along(ring: Ring, spacing: float) -> Ring:
     return np.concatenate((between, ring))
 
 
-def _at(values: Floats, points: NDArray[np.float64]) -> Floats:
+def _at(values: Float32s, points: Float64s) -> Float32s:
     """The values at the pixels that the points lie in, shape (N,)."""
     last = np.array(values.shape[::-1]) - 1
     x, y = np.clip(np.rint(points), 0, last).astype(np.intp).T
     return np.asarray(values[y, x], np.float32)
 
 
-def _farthest(values: Floats, points: NDArray[np.float64], less: float) -> tuple[float, tuple[float, float]]:
+def _farthest(values: Float32s, points: Float64s, less: float) -> tuple[float, tuple[float, float]]:
     """The largest value at a point, less so much, and that point (x, y)."""
     there = _at(values, points)
     k = int(there.argmax())
@@ -203,12 +199,12 @@ def _farthest(values: Floats, points: NDArray[np.float64], less: float) -> tuple
     return float(there[k]) - less, (x, y)
 
 
-def _disc(diameter: float) -> Mask:
+def _disc(diameter: float) -> Bytes:
     size = _odd(diameter)
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
 
 
-def _square(side: float) -> Mask:
+def _square(side: float) -> Bytes:
     return np.ones((_odd(side), _odd(side)), np.uint8)
 
 

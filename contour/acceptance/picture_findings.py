@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from contour.acceptance.findings import Finding, Refusal
 from contour.acceptance.quality import QualityLimits, picture_faults, quality_faults
 from contour.acceptance.trace_check import CheckedTrace
+from contour.geometry.arrays import Bytes
 from contour.image.taught_table import TableLimits, TableLook
 
 
@@ -19,7 +17,7 @@ def badly_seen(traced: CheckedTrace | None, limits: QualityLimits) -> list[Findi
     return [_bad_picture(". Besides, ".join(faults))] if faults else []
 
 
-def useless_picture(picture: NDArray[np.uint8] | None) -> list[Finding]:
+def useless_picture(picture: Bytes | None) -> list[Finding]:
     """What is wrong with a picture as a whole, whatever it shows."""
     return [] if picture is None else [_bad_picture(fault) for fault in picture_faults(picture)]
 

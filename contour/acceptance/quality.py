@@ -10,13 +10,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Float32s
 from contour.geometry.rings import Contour, Ring
 from contour.walls.lightness import wall_light
-
-Picture = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 
 # So many pixels tell enough, and cost about a millisecond.
 _SAMPLED_PX = 60_000
@@ -75,7 +72,7 @@ class QualityLimits:
     min_contrast_to_noise: float = 4.0
 
 
-def block_quality(picture: Picture, contour: Contour, pitch_px: float | None) -> Quality:
+def block_quality(picture: Bytes, contour: Contour, pitch_px: float | None) -> Quality:
     """The quality of the walls within `contour` (pixels) in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
     `pitch_px` None takes the place of an unknown pitch by a usual one.
@@ -137,7 +134,7 @@ def lost_in_noise(quality: Quality, limits: QualityLimits) -> str | None:
     )
 
 
-def _tiles(picture: Picture, exterior: Ring, pitch: float) -> Picture:
+def _tiles(picture: Bytes, exterior: Ring, pitch: float) -> Bytes:
     """Tiles along and inside the outline, shape (N, S, S) or (N, S, S, 3)."""
     height, width = picture.shape[:2]
     side = int(min(max(_LEAST_TILE_PX, round(_TILE_PITCHES * pitch)), height, width))
@@ -156,7 +153,7 @@ def _tiles(picture: Picture, exterior: Ring, pitch: float) -> Picture:
     return np.stack([picture[y : y + side, x : x + side] for x, y in zip(left, top, strict=True)])
 
 
-def _tails(light: Picture) -> tuple[Floats, Floats]:
+def _tails(light: Bytes) -> tuple[Float32s, Float32s]:
     """Grey levels that _TAIL of each tile lies below and above, shape (N,) each."""
     flat = light.reshape(len(light), -1)
     cut = max(1, round(_TAIL * flat.shape[1]))
@@ -164,7 +161,7 @@ def _tails(light: Picture) -> tuple[Floats, Floats]:
     return ordered[:, cut].astype(np.float32), ordered[:, -1 - cut].astype(np.float32)
 
 
-def _noise(light: Picture) -> float:
+def _noise(light: Bytes) -> float:
     """Standard deviation of a pixel's noise: what second differences both ways see where they see least else."""
     part = light.astype(np.int16)
     bent = part[:, :, :-2] - 2 * part[:, :, 1:-1] + part[:, :, 2:]
@@ -174,7 +171,7 @@ def _noise(light: Picture) -> float:
     return float((fifth + 0.5) / _SECOND_OF_NOISE)
 
 
-def _blur_px(light: Picture, contrast: Floats, noise: float) -> float:
+def _blur_px(light: Bytes, contrast: Float32s, noise: float) -> float:
     """Blur in the direction in which it is worst: contrast over the steepest rise, median over the tiles.
 
     A honeycomb has walls in three directions: none leaves a direction without rises, unless the block moved along it.
@@ -194,7 +191,7 @@ def _blur_px(light: Picture, contrast: Floats, noise: float) -> float:
     return float(np.sqrt(max(worst**2 - 0.5, 0.0)))
 
 
-def picture_faults(picture: Picture) -> tuple[str, ...]:
+def picture_faults(picture: Bytes) -> tuple[str, ...]:
     """What is wrong with a picture as a whole, in which nothing was traced: too dark, overexposed, nothing sharp.
 
     Only what no table and no thing on it can look like: black all over, white over most of it, or things that stand out
@@ -223,7 +220,7 @@ def picture_faults(picture: Picture) -> tuple[str, ...]:
     return ()
 
 
-def _edge_width_px(light: Picture) -> float | None:
+def _edge_width_px(light: Bytes) -> float | None:
     """Blur of the sharpest edges in a picture, pixels; None where nothing stands out of the noise.
 
     The sharpest are those with the steepest rise for their height within a few pixels; a step blurred by sigma rises by

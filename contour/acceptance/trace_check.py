@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from contour.acceptance.disagreement import Disagreement, disagreement
 from contour.acceptance.quality import Quality, block_quality
+from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, densified
 from contour.tracing.trace import Trace
@@ -29,14 +27,14 @@ class CheckedTrace:
     quality: Quality | None = None
     disagreement: Disagreement | None = None
 
-    def moved(self, first: NDArray[np.float64]) -> CheckedTrace:
+    def moved(self, first: Float64s) -> CheckedTrace:
         """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
         apart = None if self.disagreement is None else self.disagreement.moved(x, y)
         return replace(self, trace=self.trace.moved(first), disagreement=apart)
 
 
-def check_trace(picture: NDArray[np.uint8], traced: Trace, rectifier: Rectifier | None) -> CheckedTrace:
+def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> CheckedTrace:
     """The trace with its quality and its disagreement with the picture, (H, W) grey or (H, W, 3) BGR, uint8.
 
     `picture` and `rectifier` are those it was traced with.

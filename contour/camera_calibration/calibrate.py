@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.calibration import CameraCalibration
 from contour.camera_calibration.board import Board
@@ -32,10 +31,9 @@ from contour.camera_calibration.view_selection import (
     without_outliers,
 )
 from contour.errors import CalibrationError, CalibrationFailed
+from contour.geometry.arrays import Float64s
 from contour.image import opencv_boards as cv
 from contour.image.opencv import rotation_matrix
-
-Floats = NDArray[np.float64]
 
 FOLDS = 5
 WIDEST_VIEW_DEG, NARROWEST_VIEW_DEG = 150.0, 2.0
@@ -73,7 +71,7 @@ class CameraResult:
     model: LensModel
     trials: tuple[Trial, ...]
     views: tuple[BoardView, ...]
-    residuals_px: tuple[Floats, ...]
+    residuals_px: tuple[Float64s, ...]
     """Seen less expected, of each view's corners."""
     dropped: tuple[Dropped, ...]
     noise_px: float
@@ -147,7 +145,7 @@ def _calibration(solved: cv.Solved, plane: int, size: tuple[int, int], setup: Se
         raise CalibrationFailed(f"the views give no usable camera: {error}") from error
 
 
-def table_translation(rotation: Floats, translation_mm: Floats, board_thickness_mm: float) -> Floats:
+def table_translation(rotation: Float64s, translation_mm: Float64s, board_thickness_mm: float) -> Float64s:
     """The translation of the table's frame, whose z = 0 lies under a board that thick, shape (3,)."""
     return np.asarray(translation_mm - rotation_matrix(rotation)[:, 2] * board_thickness_mm)
 

@@ -8,7 +8,6 @@ from enum import Enum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.camera_calibration.calibration_spread import covariance, on_plane, position_variances
@@ -17,9 +16,8 @@ from contour.camera_calibration.length_check import LengthCheck, rounded_up
 from contour.camera_calibration.lens_models import LensModel, Observed, Progress, residuals, solve
 from contour.camera_calibration.residual_structure import structure_px
 from contour.camera_calibration.student_t import two_sided_95
+from contour.geometry.arrays import Float64s
 from contour.image import opencv_boards as cv
-
-Floats = NDArray[np.float64]
 
 SPLITS = 5
 ROWS, COLUMNS = 13, 17
@@ -100,7 +98,7 @@ class Verdict:
     sentence: str
     overrides: tuple[str, ...]
     uncertainty: PositionUncertainty
-    halves_mm: Floats
+    halves_mm: Float64s
     inflation: float
     zones: Zones
     structure_px: float
@@ -160,13 +158,13 @@ def judge_calibration(
     )
 
 
-def places(size: tuple[int, int]) -> Floats:
+def places(size: tuple[int, int]) -> Float64s:
     """The pixels of the maps' places, row by row, shape (ROWS * COLUMNS, 2)."""
     across, down = np.meshgrid(np.linspace(0, size[0] - 1, COLUMNS), np.linspace(0, size[1] - 1, ROWS))
     return np.column_stack([across.ravel(), down.ravel()])
 
 
-def finite(values: Floats) -> Floats:
+def finite(values: Float64s) -> Float64s:
     """The values, those that are no numbers (a lens model folds over there) as the largest of the others."""
     bad = ~np.isfinite(values)
     return np.where(bad, values[~bad].max(initial=0.0), values) if bad.any() else values
@@ -178,10 +176,10 @@ def _halves(
     model: LensModel,
     solved: cv.Solved,
     plane: int,
-    heights: Floats,
-    grid: Floats,
+    heights: Float64s,
+    grid: Float64s,
     on_progress: Progress,
-) -> Floats:
+) -> Float64s:
     """Distance between the maps of two halves, root mean square over the splits, shape (heights, places), mm."""
     rng = np.random.default_rng(len(views))
     others = [index for index in range(len(views)) if index != plane]
@@ -205,7 +203,7 @@ def _halves(
     return np.asarray(np.sqrt(squares / used))
 
 
-def _inflation(halves: Floats, propagated: Floats) -> float:
+def _inflation(halves: Float64s, propagated: Float64s) -> float:
     """How much farther apart two halves lie than propagated noise says, at least 1.
 
     Half the views have twice the variance, and the difference of two halves twice that again: half their distance is to

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from contour.geometry.arrays import Float64s
 
 
 class Rectifier(Protocol):
@@ -15,9 +14,9 @@ class Rectifier(Protocol):
     Both verbs take and return shape (N, 2), float64.
     """
 
-    def rectify(self, points_px: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def rectify(self, points_px: Float64s) -> Float64s: ...
 
-    def unrectify(self, points: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def unrectify(self, points: Float64s) -> Float64s: ...
 
 
 @dataclass(frozen=True)
@@ -25,10 +24,10 @@ class CroppedRectifier:
     """A rectifier for the pixels of a part of the picture, whose first one is `first` (x, y) of the whole."""
 
     whole: Rectifier
-    first: NDArray[np.float64]
+    first: Float64s
 
-    def rectify(self, points_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rectify(self, points_px: Float64s) -> Float64s:
         return self.whole.rectify(points_px + self.first)
 
-    def unrectify(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def unrectify(self, points: Float64s) -> Float64s:
         return self.whole.unrectify(points) - self.first

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import PictureError
+from contour.geometry.arrays import Bytes
 
 
-def check_picture(picture: NDArray[np.uint8]) -> None:
+def check_picture(picture: Bytes) -> None:
     """Raise PictureError unless the array is a grey (H, W) or BGR (H, W, 3) picture, uint8, with pixels in it."""
     kind = f"{picture.dtype} of shape {picture.shape}"
     if picture.dtype != np.uint8:

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.outline.lines_and_arcs import Complex, Index, Models, Real, distance, feet
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.outline.lines_and_arcs import Models, distance, feet
 from contour.outline.runs import Segments
 from contour.outline.witnesses import Witnesses
-
-Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 _REACH = 1.7
 _SLACK = 0.8
@@ -29,12 +28,12 @@ class Joints:
     kink: how far the two are from flowing into one another, the turn in radians; infinite where they step aside.
     """
 
-    end: Complex
-    begin: Complex
-    kink: Real
+    end: Complexes
+    begin: Complexes
+    kink: Float64s
 
 
-def ends(witnesses: Witnesses, segments: Segments, inlier: Flags, *, but: int = 0) -> tuple[Complex, Complex]:
+def ends(witnesses: Witnesses, segments: Segments, inlier: Bools, *, but: int = 0) -> tuple[Complexes, Complexes]:
     """Feet of each segment's first and last inlying witness on its model, shape (S,) each; `but` so many at either."""
     count = len(witnesses)
     places_first, places_last = segments.first.copy(), segments.first + segments.length - 1
@@ -49,7 +48,7 @@ def ends(witnesses: Witnesses, segments: Segments, inlier: Flags, *, but: int = 
     return first, last
 
 
-def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
+def joints(witnesses: Witnesses, segments: Segments, inlier: Bools) -> Joints:
     """The joint after each segment: a corner at the intersection where it lies within reach of the evidence, a smooth
     join where the two all but touch, else a bevel from the last witness of one to the first of the next."""
     first, last = ends(witnesses, segments, inlier)
@@ -89,7 +88,7 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
     return Joints(end, begin, np.where(aside < _ASIDE * witnesses.pitch, kink, np.inf))
 
 
-def _intersections(models: Models, following: Models, near: Complex, far: Complex) -> tuple[Complex, Flags]:
+def _intersections(models: Models, following: Models, near: Complexes, far: Complexes) -> tuple[Complexes, Bools]:
     """Where neighbours intersect nearest to the evidence (Newton on the two distances), and whether they do."""
     point = 0.5 * (near + far)
     foot, tangent = feet(models, near)
@@ -106,7 +105,7 @@ def _intersections(models: Models, following: Models, near: Complex, far: Comple
     return point, met
 
 
-def without_reversed(witnesses: Witnesses, segments: Segments, inlier: Flags) -> tuple[Segments, Joints]:
+def without_reversed(witnesses: Witnesses, segments: Segments, inlier: Bools) -> tuple[Segments, Joints]:
     """Segments and joints after dropping short segments that their neighbours' corners leave no room for."""
     while True:
         found = joints(witnesses, segments, inlier)
@@ -154,7 +153,7 @@ def sweep(model: Models, start: complex, stop: complex, run: float) -> tuple[flo
 
 def arc_points(
     model: Models, start: complex, stop: complex, *, run: float, tolerance: float, whole: bool = False
-) -> Complex:
+) -> Complexes:
     """Inner vertices of an arc from `start` to `stop` (both on it, not included), chords within `tolerance` pixels.
 
     `run` is about the arc's length. Vertices stand out by two thirds of the sagitta, so that the area under the
@@ -171,11 +170,13 @@ def arc_points(
     turned = np.exp(1j * (from_ + turn * np.arange(0 if whole else 1, chords) / chords))
     sagitta = (1.0 - np.cos(0.5 * turn / chords)) / curvature
     origin, tangent = complex(model.origin), complex(model.tangent)
-    inner: Complex = origin + 1j * tangent * (1.0 - turned) / curvature - 1j * tangent * turned * (2.0 / 3.0) * sagitta
+    inner: Complexes = (
+        origin + 1j * tangent * (1.0 - turned) / curvature - 1j * tangent * turned * (2.0 / 3.0) * sagitta
+    )
     return inner
 
 
-def thinned(ring: Complex, tolerance: float) -> Index:
+def thinned(ring: Complexes, tolerance: float) -> Indices:
     """Indices of the vertices to keep: none twice, none within `tolerance` of the chord of its neighbours."""
     keep = np.arange(len(ring))
     while len(keep) > 3:

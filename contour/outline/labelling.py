@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.outline.lines_and_arcs import Complex, Index, Real, distance, feet
+from contour.geometry.arrays import Complexes, Float64s, Indices
+from contour.outline.lines_and_arcs import distance, feet
 from contour.outline.proposals import FEW, Proposals
 from contour.outline.reach import Reach, reach, supports
 from contour.outline.witnesses import Witnesses, cost
@@ -47,7 +48,7 @@ _FAR = 1e6
 class Labelling:
     """label: proposal of each witness, shape (N,). energy: nats of the whole ring."""
 
-    label: Index
+    label: Indices
     energy: float
 
 
@@ -73,7 +74,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     return Labelling(here[np.arange(count), path], energy)
 
 
-def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Index, Index, Index]:
+def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Indices, Indices, Indices]:
     """The proposals that explain each witness's neighbourhood best, shape (N, A), -1 where fewer reach it; and the
     nearest witness back and ahead that lies on the proposal, -1 where none does."""
     count = len(witnesses)
@@ -106,8 +107,8 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Index, Index, I
 
 
 def _steps(
-    witnesses: Witnesses, proposals: Proposals, here: Index, foot: Complex, tangent: Complex, reached: Reach
-) -> Real:
+    witnesses: Witnesses, proposals: Proposals, here: Indices, foot: Complexes, tangent: Complexes, reached: Reach
+) -> Float64s:
     """Price of going from state a at witness i to state b at witness i + 1, shape (N, A, A)."""
 
     def after(of_next: NDArray[Any]) -> NDArray[Any]:
@@ -131,17 +132,17 @@ def _steps(
 
 
 def joint_cost(
-    foot: Complex,
-    tangent: Complex,
-    next_foot: Complex,
-    next_tangent: Complex,
+    foot: Complexes,
+    tangent: Complexes,
+    next_foot: Complexes,
+    next_tangent: Complexes,
     *,
-    gap: Real,
-    unseen: Real,
-    sigma: Real,
+    gap: Float64s,
+    unseen: Float64s,
+    sigma: Float64s,
     pitch: float,
     rare: float,
-) -> Real:
+) -> Float64s:
     """Nats of a joint between two models, given their feet and tangents at the last and the next witness (shapes
     broadcast).
 
@@ -175,7 +176,7 @@ def joint_cost(
     return np.minimum(np.minimum(corner, smooth), _JUMP + reflex)
 
 
-def _cheapest_cycle(step: Real, first: Real) -> tuple[Index, float]:
+def _cheapest_cycle(step: Float64s, first: Float64s) -> tuple[Indices, float]:
     """Cheapest closed path: step[i] holds prices from i to i + 1 (cyclic), with the price of being there; and its
     price.
 
@@ -195,7 +196,7 @@ def _cheapest_cycle(step: Real, first: Real) -> tuple[Index, float]:
     return np.roll(path, anchor), energy
 
 
-def _cheapest_path(step: Real, initial: Real, closing: int | None) -> tuple[Index, float]:
+def _cheapest_path(step: Float64s, initial: Float64s, closing: int | None) -> tuple[Indices, float]:
     """Cheapest path from the initial prices, open or (where `closing` is a state) back to that state, and its price."""
     count, width = step.shape[0], step.shape[1]
     back = np.empty((count, width), dtype=np.intp)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from contour.outline.corners import Flags
-from contour.outline.lines_and_arcs import Complex, Index, Models, Real, feet
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.outline.lines_and_arcs import Models, feet
 from contour.outline.runs import Segments, stretch
 from contour.outline.witnesses import Witnesses
 
@@ -19,13 +18,13 @@ _MOST_FREE = 0.25
 def vertex_sigma(
     witnesses: Witnesses,
     segments: Segments,
-    inlier: Flags,
+    inlier: Bools,
     *,
-    ring: Complex,
-    owners: NDArray[np.intp],
-    free: Flags,
+    ring: Complexes,
+    owners: Indices,
+    free: Bools,
     spread: float,
-) -> Real:
+) -> Float64s:
     """Standard deviation of each vertex, shape (M,), pixels: of its place across its segment, or of a corner's place.
 
     owners: the two segments that meet in each vertex (twice the same inside one), shape (M, 2). A segment's own
@@ -44,10 +43,10 @@ def vertex_sigma(
     normal = np.einsum("kmi,km,kmj->kij", design, weight, design) + 1e-6 * count[:, None, None] * np.eye(3)
     inverse = np.linalg.inv(normal)
 
-    def leverage(which: Index) -> Real:
+    def leverage(which: Indices) -> Float64s:
         place = (_along(segments.models.take(which), ring) - middle[which]) / scale[which]
         row = _powers(place, segments.bend[which])
-        spread_there: Real = np.einsum("mi,mij,mj->m", row, inverse[which], row)
+        spread_there: Float64s = np.einsum("mi,mij,mj->m", row, inverse[which], row)
         return spread_there
 
     first, second = owners[:, 0], owners[:, 1]
@@ -61,7 +60,7 @@ def vertex_sigma(
     return np.minimum(spread * np.sqrt(ratio), most)
 
 
-def unseen_share(witnesses: Witnesses, inlier: Flags) -> float:
+def unseen_share(witnesses: Witnesses, inlier: Bools) -> float:
     """Share of the outline farther than a pitch from every inlying witness along the coarse ring, 0 to 1."""
     total = float(witnesses.gap.sum())
     if not inlier.any() or total <= 0.0:
@@ -71,7 +70,7 @@ def unseen_share(witnesses: Witnesses, inlier: Flags) -> float:
     return float(np.maximum(gaps - 2.0 * witnesses.pitch, 0.0).sum() / total)
 
 
-def _along(models: Models, points: Complex) -> Real:
+def _along(models: Models, points: Complexes) -> Float64s:
     """Arc length of the points' feet from the models' origins."""
     local = (points - models.origin) * models.tangent.conj()
     bent = np.abs(models.curvature) > 1e-9
@@ -79,6 +78,6 @@ def _along(models: Models, points: Complex) -> Real:
     return np.where(bent, np.angle(1.0 + 1j * curvature * local) / curvature, local.real)
 
 
-def _powers(place: Real, bend: NDArray[np.bool_]) -> Real:
+def _powers(place: Float64s, bend: Bools) -> Float64s:
     """1, place and (where `bend`) place squared, on a new last axis."""
     return np.stack([np.ones(place.shape), place, np.where(bend, place**2, 0.0)], axis=-1)

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.calibration import Calibration, scales
 from contour.errors import MarginImpossible, ParameterError
+from contour.geometry.arrays import Float64s, Indices
 from contour.geometry.offset import offset_contour
 from contour.geometry.rings import Contour, area, contour_defect, oriented_contour, simplify_indices
 from contour.geometry.segments import distances_to_ring
@@ -152,7 +152,7 @@ def _with_margin(contour_mm: Contour, margin_mm: float) -> Contour:
     return offset_contour(contour_mm, margin_mm)
 
 
-def _mirrored(ring: NDArray[np.float64]) -> NDArray[np.float64]:
+def _mirrored(ring: Float64s) -> Float64s:
     return ring * [1.0, -1.0]
 
 
@@ -162,7 +162,7 @@ def convert(contour_px: Contour, calibration: Calibration, height_mm: float) -> 
     return Contour(rings[0], tuple(rings[1:]))
 
 
-def _kept_vertices(contour: Contour, tolerance: float) -> list[NDArray[np.intp]]:
+def _kept_vertices(contour: Contour, tolerance: float) -> list[Indices]:
     """Indices of the vertices to keep, ring by ring; rings that were apart stay apart."""
     if not (np.isfinite(tolerance) and tolerance >= 0):
         raise ParameterError(f"tolerance is {tolerance}: expected a number of 0 or more, in the contour's unit.")
@@ -179,6 +179,6 @@ def _shift(traced: Contour, kept: Contour) -> float:
     return max((float(distances_to_ring(one, few).max()) for one, few in pairs), default=0.0)
 
 
-def _subset(contour: Contour, kept: list[NDArray[np.intp]]) -> Contour:
+def _subset(contour: Contour, kept: list[Indices]) -> Contour:
     rings = [ring[indices] for ring, indices in zip(contour.rings, kept, strict=True)]
     return Contour(rings[0], tuple(rings[1:]))

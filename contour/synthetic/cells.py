@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Float32s, Float64s, Int32s
 
-Floats = NDArray[np.float32]
 CellKind = Literal["honeycomb", "irregular", "foam", "perforated", "solid"]
 
 _ROW = math.sqrt(3.0) / 2.0
@@ -85,12 +84,12 @@ class Lattice:
 
     first: tuple[int, int]
     counts: tuple[int, int]
-    keep: Floats
-    tone: Floats
-    shift: Floats
-    cell: Floats
+    keep: Float32s
+    tone: Float32s
+    shift: Float32s
+    cell: Float32s
 
-    def index(self, i: Floats, j: Floats) -> NDArray[np.int32]:
+    def index(self, i: Float32s, j: Float32s) -> Int32s:
         """Row of the tables for the cell (i, j)."""
         return ((j - self.first[1]) * self.counts[0] + (i - self.first[0])).astype(np.int32)
 
@@ -107,16 +106,14 @@ class WallField:
     `cell` is a number 0…1 of the cell the point lies in; `lean` where in the cell (−1…1 along the light).
     """
 
-    distance: Floats
-    half_width: Floats
-    tone: Floats
-    cell: Floats
-    lean: Floats
+    distance: Float32s
+    half_width: Float32s
+    tone: Float32s
+    cell: Float32s
+    lean: Float32s
 
 
-def lattice_coordinates(
-    geometry: CellGeometry, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64], seed: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def lattice_coordinates(geometry: CellGeometry, x_mm: Float64s, y_mm: Float64s, seed: int) -> tuple[Float64s, Float64s]:
     """Work points in the lattice's own frame, millimetres: turned to the ribbon, shifted, smoothly warped."""
     turn = math.radians(geometry.ribbon_deg) - math.pi / 2.0  # the lattice's y axis is the ribbon
     x, y = x_mm - geometry.offset_mm[0], y_mm - geometry.offset_mm[1]
@@ -138,8 +135,8 @@ def lattice_coordinates(
 
 def _add_waves(
     rng: np.random.Generator,
-    moved: tuple[NDArray[np.float64], NDArray[np.float64]],
-    place: tuple[NDArray[np.float64], NDArray[np.float64]],
+    moved: tuple[Float64s, Float64s],
+    place: tuple[Float64s, Float64s],
     length: float,
     size: float,
 ) -> None:
@@ -152,8 +149,8 @@ def _add_waves(
 
 def draw_lattice(
     geometry: CellGeometry,
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
+    x: Float64s,
+    y: Float64s,
     seed: int,
     glints: float = 0.05,
     spread: float = 0.22,
@@ -198,7 +195,7 @@ def _remove_cells(geometry: CellGeometry, lattice: Lattice, seed: int) -> None:
         lattice.keep[lattice.index(i - di, j - dj), axis] = GONE
 
 
-def wall_field(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> WallField:
+def wall_field(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
     """The walls around lattice points x, y (mm), arrays of one shape, float32."""
     if geometry.kind == "honeycomb":
         return _hexagons(geometry, lattice, x, y)
@@ -218,7 +215,7 @@ def _steps(geometry: CellGeometry) -> tuple[float, float]:
     return geometry.pitch_mm, geometry.pitch_mm * (1.0 if geometry.square_grid else _ROW)
 
 
-def _canonical(geometry: CellGeometry, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def _canonical(geometry: CellGeometry, x: Float32s, y: Float32s) -> tuple[Float32s, Float32s]:
     """Coordinates in which cells are regular hexagons one apart; straight and slanted walls stretch separately."""
     step_x, step_y = _steps(geometry)
     xc = x * np.float32(1.0 / step_x)
@@ -238,7 +235,7 @@ def _canonical(geometry: CellGeometry, x: Floats, y: Floats) -> tuple[Floats, Fl
     return xc, row * np.float32(_ROW) + within - np.float32(straight / 2.0)
 
 
-def _nearest_hex(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def _nearest_hex(x: Float32s, y: Float32s) -> tuple[Float32s, Float32s, Float32s, Float32s]:
     """Indices (i, j) of the nearest site i·(1, 0) + j·(½, √3/2), and the offset from it."""
     tall = np.float32(2.0 * _ROW)
     row_a = np.rint(y * np.float32(0.5 / _ROW))
@@ -253,7 +250,7 @@ def _nearest_hex(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return i, j, np.where(first, ax, bx), np.where(first, ay, by)
 
 
-def _hexagons(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> WallField:
+def _hexagons(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
     xc, yc = _canonical(geometry, x, y)
     i, j, dx, dy = _nearest_hex(xc, yc)
     here = lattice.index(i, j)
@@ -281,7 +278,7 @@ def _hexagons(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) ->
     return WallField(distance, half, lattice.tone.ravel()[wall], lattice.cell[here], dx - dy)
 
 
-def _holes(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> WallField:
+def _holes(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
     pitch = np.float32(geometry.pitch_mm)
     xc, yc = x / pitch, y / pitch
     if geometry.square_grid:
@@ -298,7 +295,7 @@ def _holes(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> Wa
     return WallField(np.float32(500.0) - outside, np.float32(500.0) * one, one, lattice.cell[here], dx - dy)
 
 
-def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> WallField:
+def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
     pitch = np.float32(geometry.pitch_mm)
     xc, yc = x / pitch, y / pitch
     i, j, dx, dy = _nearest_hex(xc, yc)
@@ -337,7 +334,7 @@ def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> 
     return WallField(distance.astype(np.float32), half, tone, lattice.cell[id1], lean)
 
 
-def lattice_centres(geometry: CellGeometry, lattice: Lattice) -> NDArray[np.float64]:
+def lattice_centres(geometry: CellGeometry, lattice: Lattice) -> Float64s:
     """Centres of all cells in the tables' order, work millimetres, shape (cells, 2); the warp is left out."""
     columns, rows = np.meshgrid(np.arange(lattice.counts[0]), np.arange(lattice.counts[1]))
     i, j = columns.ravel() + lattice.first[0], rows.ravel() + lattice.first[1]

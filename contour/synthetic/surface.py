@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float32s
 from contour.geometry.rings import Contour
 from contour.synthetic.cells import Lattice, draw_lattice, lattice_centres, lattice_coordinates, wall_field
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import signed_distance
 from contour.synthetic.scene import Scene
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -28,8 +26,8 @@ class Surface:
 
     left: int
     top: int
-    cover: Floats
-    light: Floats
+    cover: Float32s
+    light: Float32s
 
 
 def surface(scene: Scene, outline: Contour, seed: int) -> Surface | None:
@@ -51,13 +49,15 @@ def surface(scene: Scene, outline: Contour, seed: int) -> Surface | None:
     return Surface(left, top, _shrunk(inside, size), _shrunk(light, size))
 
 
-def _shrunk(raster: Floats, size: tuple[int, int]) -> Floats:
+def _shrunk(raster: Float32s, size: tuple[int, int]) -> Float32s:
     if raster.shape == (size[1], size[0]):
         return raster
     return np.asarray(cv2.resize(raster, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
-def _fill(scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], inside: Floats, light: Floats) -> None:
+def _fill(
+    scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], inside: Float32s, light: Float32s
+) -> None:
     """Turn `inside` (share inside the outline) into the share of material, and write its light beside it, by bands."""
     camera, ss, cells = scene.camera, scene.sensor.supersample, scene.cells
     scale = camera.mm_per_px(_middle(outline), scene.thickness_mm) / ss
@@ -92,7 +92,9 @@ def _fill(scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], in
         )
 
 
-def _paint(scene: Scene, lattice: Lattice, x: Floats, y: Floats, scale: float, cover: Floats, light: Floats) -> None:
+def _paint(
+    scene: Scene, lattice: Lattice, x: Float32s, y: Float32s, scale: float, cover: Float32s, light: Float32s
+) -> None:
     material, cells = scene.material, scene.cells
     field = wall_field(cells, lattice, x, y)
     per_mm = np.float32(1.0 / scale)

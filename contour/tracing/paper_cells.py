@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Int32s
 from contour.image.opencv import region_boxes_and_areas
 
 HEXAGON = 2 / math.sqrt(3)
@@ -64,7 +64,7 @@ class Cells:
         return self.pitch_px**2 / HEXAGON
 
 
-def measure_cells(mask: NDArray[np.uint8]) -> Cells | None:
+def measure_cells(mask: Bytes) -> Cells | None:
     """The measures of the cells in a wall mask, shape (H, W), walls 255; None if it has too few regular cells."""
     boxes, areas = region_boxes_and_areas(mask)
     left, top, width, height = boxes.T
@@ -92,7 +92,7 @@ def measure_cells(mask: NDArray[np.uint8]) -> Cells | None:
     )
 
 
-def _typical_area(areas: NDArray[np.int32]) -> float:
+def _typical_area(areas: Int32s) -> float:
     """The area that most areas are alike to, each counting by its root.
 
     Counted alike, a thousand noise spots would outvote the cells; by area, a few cells that have run together would.
@@ -104,7 +104,7 @@ def _typical_area(areas: NDArray[np.int32]) -> float:
     return float(ordered[np.argmax(votes[high] - votes[low])])
 
 
-def _wall_width(mask: NDArray[np.uint8]) -> float:
+def _wall_width(mask: Bytes) -> float:
     """Mean width of the white bands: area over half the boundary's length (Crofton: from changes along both axes)."""
     changes = np.count_nonzero(mask[1:] != mask[:-1]) + np.count_nonzero(mask[:, 1:] != mask[:, :-1])
     return float(2 * np.count_nonzero(mask) / (math.pi / 4 * max(int(changes), 1)))

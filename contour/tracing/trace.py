@@ -6,9 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour
 from contour.image.region import shifted
 from contour.walls.comb_likeness import Comb
@@ -51,7 +49,7 @@ class Trace:
     comb: Comb | None = None
     reaches_frame: bool = False
 
-    def moved(self, first: NDArray[np.float64]) -> Trace:
+    def moved(self, first: Float64s) -> Trace:
         """The trace in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
         others = tuple(piece.moved(x, y) for piece in self.others)

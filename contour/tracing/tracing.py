@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, ParameterError
+from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, oriented_contour
 from contour.image.picture_check import check_picture
@@ -21,7 +21,7 @@ from contour.walls.pieces import pieces_beside
 
 
 def trace(
-    picture: NDArray[np.uint8],
+    picture: Bytes,
     settings: TraceSettings,
     *,
     rectifier: Rectifier | None = None,
@@ -45,7 +45,7 @@ def trace(
 class _MethodCall(Protocol):
     def __call__(
         self,
-        picture: NDArray[np.uint8],
+        picture: Bytes,
         settings: TraceSettings,
         *,
         rectifier: Rectifier | None,
@@ -59,9 +59,7 @@ _FromMask = Callable[[binarize.WallMask, TraceSettings], Contour]
 def _on_mask(contour_of: _FromMask) -> _MethodCall:
     """A method that works on the wall mask's pixel centres alone."""
 
-    def call(
-        picture: NDArray[np.uint8], settings: TraceSettings, *, rectifier: Rectifier | None, on_stage: OnStage
-    ) -> Trace:
+    def call(picture: Bytes, settings: TraceSettings, *, rectifier: Rectifier | None, on_stage: OnStage) -> Trace:
         walls = binarize.binarize(picture, settings.binarize, settings.polarity)
         on_stage("mask")
         contour = contour_of(walls, settings)

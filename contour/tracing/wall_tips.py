@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, ParameterError
+from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.outline.evidence_check import check_against_evidence
@@ -26,7 +26,7 @@ _MOST_UNSEEN = 0.5
 
 
 def wall_tips(
-    picture: NDArray[np.uint8],
+    picture: Bytes,
     settings: TraceSettings,
     *,
     rectifier: Rectifier | None = None,
@@ -70,7 +70,7 @@ def wall_tips(
     return _told(seen, contour, uncertainty_px=sure_px)
 
 
-def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
+def _cut_off(picture: Bytes, seen: BlockEvidence, on_stage: OnStage) -> Trace:
     """The coarse outline of a block that leaves the picture, along its border there: for a refusal to show."""
     last = np.array([picture.shape[1] - 1.0, picture.shape[0] - 1.0])
     rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
@@ -92,7 +92,7 @@ def _told(seen: BlockEvidence, contour: Contour, *, uncertainty_px: float | None
     )
 
 
-def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
+def _closed_cells(picture: Bytes, settings: TraceSettings, on_stage: OnStage) -> Trace:
     """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
     light = wall_light(picture)
     cells = probe(light, settings.polarity)

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
+from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s
 from contour.walls.comb_likeness import Comb, surely_comb
 from contour.walls.lattice_order import lattice_order, solidity
 from contour.walls.wall_mask import wall_mask
-
-Gray = NDArray[np.uint8]
 
 _TILE_PX = 512
 _TILES = 4
@@ -67,7 +65,7 @@ class Cells:
         )
 
 
-def probe(light: Gray, polarity: str) -> Cells:
+def probe(light: Bytes, polarity: str) -> Cells:
     """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound.
 
     The busiest tile at full size is asked first, then the whole picture at a quarter of its size, where large cells are
@@ -94,7 +92,7 @@ def probe(light: Gray, polarity: str) -> Cells:
     return best
 
 
-def _parts(light: Gray) -> Iterator[tuple[Gray, int]]:
+def _parts(light: Bytes) -> Iterator[tuple[Bytes, int]]:
     tiles = _busiest_tiles(light)
     yield from ((tile, 1) for tile in tiles[:1])
     if min(light.shape) >= 4 * 64:
@@ -103,7 +101,7 @@ def _parts(light: Gray) -> Iterator[tuple[Gray, int]]:
     yield from ((tile, 1) for tile in tiles[1:])
 
 
-def _busiest_tiles(light: Gray) -> list[Gray]:
+def _busiest_tiles(light: Bytes) -> list[Bytes]:
     """Tiles of up to 512 px with the most local contrast, busiest first, apart from each other."""
     block = 32
     sample = light[::4, ::4].astype(np.float32)
@@ -126,7 +124,7 @@ def _busiest_tiles(light: Gray) -> list[Gray]:
     return tiles
 
 
-def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> Cells | None:
+def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> Cells | None:
     """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own
     pitch.
     """
@@ -147,7 +145,7 @@ def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> C
     return best if again is None or (same and again.score < best.score) else again
 
 
-def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
+def cells_of(light: Bytes, pitch: float, *, bright: bool) -> Cells | None:
     """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are."""
     seen = wall_mask(light, pitch, bright=bright)
     mask = seen.mask
@@ -200,9 +198,7 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     )
 
 
-def _enclosed(
-    stats: NDArray[np.int32], centroids: NDArray[np.float64], shape: tuple[int, ...]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+def _enclosed(stats: Int32s, centroids: Float64s, shape: tuple[int, ...]) -> tuple[Float64s, Float64s, Indices]:
     """Areas (N,), centroids (N, 2) and labels (N,) of the pieces that lie within the part and are no slivers."""
     left, top, wide, high, area = (stats[:, column] for column in range(5))
     within = (left > 0) & (top > 0) & (left + wide < shape[1]) & (top + high < shape[0])
@@ -211,7 +207,7 @@ def _enclosed(
     return area[chosen].astype(np.float64), centroids[chosen], chosen + 1
 
 
-def wall_width(mask: Gray) -> float:
+def wall_width(mask: Bytes) -> float:
     """Mean wall width of a mask, pixels: area over half its boundary length (Cauchy-Crofton: π/4 of its crossings)."""
     crossings = np.count_nonzero(mask[1:] != mask[:-1]) + np.count_nonzero(mask[:, 1:] != mask[:, :-1])
     return float(2 * np.count_nonzero(mask) / max(1.0, np.pi / 4 * crossings))

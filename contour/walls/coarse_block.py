@@ -6,15 +6,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
+from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, Int64s
 from contour.geometry.rings import Ring
 from contour.image.pixel_sampling import sample_at
 from contour.walls.coarse_threads import without_threads
-
-Gray = NDArray[np.uint8]
-Points = NDArray[np.float64]
 
 # About six and a half samples a pitch hold a wall's place and make every later pass cheap.
 _SAMPLES_PER_PITCH = 6.5
@@ -46,9 +43,9 @@ class CoarseRing:
     """
 
     vertices: Ring
-    base: Points
-    arc: NDArray[np.float64]
-    normal: Points
+    base: Float64s
+    arc: Float64s
+    normal: Float64s
     length: float
     is_hole: bool
 
@@ -64,22 +61,22 @@ class CoarseBlock:
     """
 
     rings: tuple[CoarseRing, ...]
-    filled: Gray
-    walls: Gray
-    strands: Gray
-    depth: NDArray[np.float32]
-    nearest: NDArray[np.int32]
+    filled: Bytes
+    walls: Bytes
+    strands: Bytes
+    depth: Float32s
+    nearest: Int32s
     step: int
     leaves: bool
 
-    def depth_at(self, points: Points) -> NDArray[np.float64]:
+    def depth_at(self, points: Float64s) -> Float64s:
         """Distance inside the coarse edge, negative outside, shape (N,), mask pixels, for points (N, 2) in mask
         pixels.
         """
         grid = self._grid(points)
         return sample_at(self.depth, grid[:, 0], grid[:, 1])
 
-    def height_at(self, points: Points) -> NDArray[np.float64]:
+    def height_at(self, points: Float64s) -> Float64s:
         """How far points (N, 2) stand out of the ring smoothed over two pitches, along its normal, shape (N,), mask
         pixels.
         """
@@ -88,12 +85,12 @@ class CoarseBlock:
         normal = np.concatenate([r.normal for r in self.rings])[index]
         return np.asarray(((points - base) * normal).sum(axis=1), np.float64)
 
-    def strands_near(self, reach: float) -> Points:
+    def strands_near(self, reach: float) -> Float64s:
         """Places of strands within `reach` mask pixels outside of the coarse edge, shape (K, 2), mask pixels."""
         rows, columns = np.nonzero(self.strands & (self.depth > -reach))
         return np.asarray((np.stack([columns, rows], axis=1) - _PAD + 0.5) * self.step - 0.5, np.float64)
 
-    def feet(self, points: Points) -> tuple[NDArray[np.int64], NDArray[np.float64], Points]:
+    def feet(self, points: Float64s) -> tuple[Int64s, Float64s, Float64s]:
         """Ring number, arc length and outward normal at the foot of each point on its nearest ring."""
         index = self._nearest_at(points)
         sizes = np.array([len(ring.vertices) for ring in self.rings])
@@ -108,27 +105,27 @@ class CoarseBlock:
         arc = (arcs[index] + np.clip(along, -self.step, self.step)) % lengths
         return ring, arc, normals[index]
 
-    def unpadded(self, grid: Gray) -> Gray:
+    def unpadded(self, grid: Bytes) -> Bytes:
         """A map on the coarse grid without its margin: sample (i, j) covers mask pixels from step · i and step · j
         on.
         """
         return grid[_PAD:-_PAD, _PAD:-_PAD]
 
-    def enlarged(self, grid: Gray, shape: tuple[int, ...]) -> Gray:
+    def enlarged(self, grid: Bytes, shape: tuple[int, ...]) -> Bytes:
         """A map on the coarse grid at the size of the wall mask, whose `shape` is (H, W)."""
         rows = np.repeat(self.unpadded(grid), self.step, axis=0)
         return np.repeat(rows, self.step, axis=1)[: shape[0], : shape[1]]
 
-    def _nearest_at(self, points: Points) -> NDArray[np.int32]:
+    def _nearest_at(self, points: Float64s) -> Int32s:
         grid = np.rint(self._grid(points)).astype(np.int64)
         height, width = self.nearest.shape
         return self.nearest[np.clip(grid[:, 1], 0, height - 1), np.clip(grid[:, 0], 0, width - 1)]
 
-    def _grid(self, points: Points) -> Points:
+    def _grid(self, points: Float64s) -> Float64s:
         return (points + 0.5) / self.step - 0.5 + _PAD
 
 
-def coarse_block(mask: Gray, light: Gray, pitch: float) -> CoarseBlock:
+def coarse_block(mask: Bytes, light: Bytes, pitch: float) -> CoarseBlock:
     """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch` pixels wide.
 
     Raises NoBlockFound.
@@ -153,7 +150,7 @@ def coarse_block(mask: Gray, light: Gray, pitch: float) -> CoarseBlock:
     return _with_rings(filled, kept, _strands(walls & (1 - kept), samples), step, samples)
 
 
-def _main_piece(walls: Gray, samples: float) -> Gray:
+def _main_piece(walls: Bytes, samples: float) -> Bytes:
     """The walls of the largest piece of comb; `samples` is the pitch on the coarse grid. Raises NoBlockFound.
 
     Chips and neighbouring pieces may lie nearer than the closing reaches, but do not hang together with the block. Only
@@ -180,7 +177,7 @@ def _main_piece(walls: Gray, samples: float) -> Gray:
     return np.asarray((main | kept[labels]).astype(np.uint8), np.uint8)
 
 
-def _close(walls: Gray, radius: float) -> Gray:
+def _close(walls: Bytes, radius: float) -> Bytes:
     """Closing with a disc, by two distance transforms."""
     pad = int(radius) + 2
     wide = cv2.copyMakeBorder(walls, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
@@ -189,7 +186,7 @@ def _close(walls: Gray, radius: float) -> Gray:
     return np.asarray(shrunk[pad:-pad, pad:-pad] | walls, np.uint8)
 
 
-def _linked(walls: Gray, kept: Gray, filled: Gray, samples: float) -> tuple[Gray, Gray]:
+def _linked(walls: Bytes, kept: Bytes, filled: Bytes, samples: float) -> tuple[Bytes, Bytes]:
     """The filled block and its walls with a thin line across every gap of less than a cell that leads into an opening.
 
     Closing joins what lies side by side, but not the ends of a strand of walls between an opening and the table. Grown
@@ -228,23 +225,23 @@ def _linked(walls: Gray, kept: Gray, filled: Gray, samples: float) -> tuple[Gray
     return filled | line.astype(np.uint8), kept | joined[labels].astype(np.uint8)
 
 
-def _sides(filled: Gray, samples: float) -> list[int]:
+def _sides(filled: Bytes, samples: float) -> list[int]:
     """Sides of the picture (top, bottom, left, right as 0…3) that the block meets over more than half a pitch."""
     inner = filled[_PAD:-_PAD, _PAD:-_PAD]
     sides = (inner[:2].max(axis=0), inner[-2:].max(axis=0), inner[:, :2].max(axis=1), inner[:, -2:].max(axis=1))
     return [number for number, side in enumerate(sides) if np.count_nonzero(side) > 0.5 * samples]
 
 
-def _largest(filled: Gray) -> Gray:
+def _largest(filled: Bytes) -> Bytes:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
     return np.asarray(labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])), np.uint8)
 
 
-def _padded(grid: Gray, border: int) -> Gray:
+def _padded(grid: Bytes, border: int) -> Bytes:
     return np.asarray(cv2.copyMakeBorder(grid, _PAD, _PAD, _PAD, _PAD, border, value=0), np.uint8)
 
 
-def _averaged(picture: Gray, step: int, border: int) -> Gray:
+def _averaged(picture: Bytes, step: int, border: int) -> Bytes:
     """Mean over squares of `step` pixels, the last ones filled up."""
     wide, high = -picture.shape[1] % step, -picture.shape[0] % step
     even = cv2.copyMakeBorder(picture, 0, high, 0, wide, border, value=0)
@@ -252,7 +249,7 @@ def _averaged(picture: Gray, step: int, border: int) -> Gray:
     return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _fill_missing_cells(filled: Gray, walls: Gray, shade: Gray, radius: float) -> Gray:
+def _fill_missing_cells(filled: Bytes, walls: Bytes, shade: Bytes, radius: float) -> Bytes:
     """The block with every inner opening filled in which no disc of `radius` fits, or that is as dark as dark walls.
 
     Looked into at a slant, black cells show nothing but wall: no mask of walls against cells, and no hole either.
@@ -275,7 +272,7 @@ def _fill_missing_cells(filled: Gray, walls: Gray, shade: Gray, radius: float) -
     return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
 
 
-def _strands(walls: Gray, samples: float) -> Gray:
+def _strands(walls: Bytes, samples: float) -> Bytes:
     """Those of the walls that are as long as a cell's wall and more, no specks."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > _STRAND_PITCHES * samples
@@ -283,7 +280,7 @@ def _strands(walls: Gray, samples: float) -> Gray:
     return np.asarray(long[labels], np.uint8)
 
 
-def _with_rings(filled: Gray, walls: Gray, strands: Gray, step: int, samples: float) -> CoarseBlock:
+def _with_rings(filled: Bytes, walls: Bytes, strands: Bytes, step: int, samples: float) -> CoarseBlock:
     chains, hierarchy = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     order = sorted(range(len(chains)), key=lambda i: (hierarchy[0][i][3] >= 0, -len(chains[i])))
     pixels = [
@@ -306,7 +303,7 @@ def _with_rings(filled: Gray, walls: Gray, strands: Gray, step: int, samples: fl
     return CoarseBlock(tuple(rings), filled, walls, strands, depth.astype(np.float32), nearest, step, leaves)
 
 
-def _ring(chain: NDArray[np.int32], is_hole: bool, step: int, samples: float) -> CoarseRing:
+def _ring(chain: Int32s, is_hole: bool, step: int, samples: float) -> CoarseRing:
     """A chain of coarse samples as a ring in mask pixels with normals smoothed over about two pitches."""
     points = chain.astype(np.float64)
     smooth = cyclic_mean(points, max(1, round(samples / 4)))
@@ -323,7 +320,7 @@ def _ring(chain: NDArray[np.int32], is_hole: bool, step: int, samples: float) ->
     return CoarseRing(vertices, base, arc, normal, float(lengths.sum()), is_hole)
 
 
-def cyclic_mean(points: Points, half: int) -> Points:
+def cyclic_mean(points: Float64s, half: int) -> Float64s:
     """Mean of each point with its `half` neighbours on both sides around a ring, shape (N, 2)."""
     count = len(points)
     half = min(half, (count - 1) // 2)
@@ -332,11 +329,11 @@ def cyclic_mean(points: Points, half: int) -> Points:
     return np.asarray((total[2 * half + 1 : 2 * half + 1 + count] - total[:count]) / (2 * half + 1), np.float64)
 
 
-def _turned(chain: NDArray[np.int32], is_hole: bool) -> NDArray[np.int32]:
+def _turned(chain: Int32s, is_hole: bool) -> Int32s:
     """The chain with positive shoelace, negative for a hole."""
     return chain[::-1] if (_shoelace(chain.astype(np.float64)) < 0) != is_hole else chain
 
 
-def _shoelace(points: Points) -> float:
+def _shoelace(points: Float64s) -> float:
     following = np.roll(points, -1, axis=0)
     return float(0.5 * (points[:, 0] * following[:, 1] - following[:, 0] * points[:, 1]).sum())

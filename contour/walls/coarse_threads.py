@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Gray = NDArray[np.uint8]
+from contour.geometry.arrays import Bytes
 
 # Cells make a block a pitch wide at the least; a horn with an angle of 25 degrees is thinner over 1.8 pitches, and
 # strands of broken cells lie along the block.
@@ -14,7 +13,7 @@ _THIN_PITCHES = 0.8
 _OUT_PITCHES = 2.3
 
 
-def without_threads(filled: Gray, samples: float) -> Gray:
+def without_threads(filled: Bytes, samples: float) -> Bytes:
     """The filled block on the coarse grid, 1 inside, without what is thinner than a cell, reaches more than two cells
     away from the block and ends on the table; `samples` is the pitch on that grid.
 

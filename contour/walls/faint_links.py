@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Gray = NDArray[np.uint8]
+from contour.geometry.arrays import Bools, Bytes
 
 _SAMPLES_PER_PITCH = 6.5
 _COVERAGE = 0.12
@@ -16,7 +15,7 @@ _REACH_PITCHES = 0.7
 _STRAND_PITCHES = (0.8, 6.0)
 
 
-def with_faint_links(mask: Gray, faint: Gray, pitch: float) -> Gray:
+def with_faint_links(mask: Bytes, faint: Bytes, pitch: float) -> Bytes:
     """The wall mask (H, W), uint8, with the walls of `faint`, a mask by a lower threshold, that lead from its largest
     piece to strands beside it.
 
@@ -49,7 +48,7 @@ def with_faint_links(mask: Gray, faint: Gray, pitch: float) -> Gray:
     return np.asarray(np.where(where, mask | faint, mask), np.uint8)
 
 
-def _coarse(mask: Gray, step: int) -> Gray:
+def _coarse(mask: Bytes, step: int) -> Bytes:
     """1 where an eighth of a square of `step` pixels is wall, the last squares filled up."""
     wide, high = -mask.shape[1] % step, -mask.shape[0] % step
     even = cv2.copyMakeBorder(mask, 0, high, 0, wide, cv2.BORDER_CONSTANT, value=0)
@@ -57,6 +56,6 @@ def _coarse(mask: Gray, step: int) -> Gray:
     return np.asarray((small > 255 * _COVERAGE).astype(np.uint8), np.uint8)
 
 
-def _within(places: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
+def _within(places: Bools, radius: float) -> Bools:
     """Where a sample of `places` lies within `radius` samples."""
     return np.asarray(cv2.distanceTransform((~places).astype(np.uint8), cv2.DIST_L2, 3) <= radius, np.bool_)

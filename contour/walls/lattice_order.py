@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from contour.geometry.arrays import Float64s, Indices, Int32s
 
 _SAMPLED = 64
 # Six neighbours of a honeycomb's cell are 1 pitch away, of an over-expanded one 0.8 to 1.2, the next ones 1.5.
@@ -12,7 +13,7 @@ _NEIGHBOUR_PITCHES = (0.75, 1.35)
 _NEIGHBOURS = 4
 
 
-def lattice_order(places: NDArray[np.float64], pitch: float) -> float:
+def lattice_order(places: Float64s, pitch: float) -> float:
     """Share of cells with four neighbours or more about a pitch away, 0 to 1; centroids of cells (N, 2), pixels."""
     some = places[_spread(len(places))]
     near = np.abs(some[:, None, :] - places[None, :, :])
@@ -22,7 +23,7 @@ def lattice_order(places: NDArray[np.float64], pitch: float) -> float:
     return float(np.mean(neighbours >= _NEIGHBOURS))
 
 
-def solidity(labels: NDArray[np.int32], numbers: NDArray[np.intp], stats: NDArray[np.int32]) -> float:
+def solidity(labels: Int32s, numbers: Indices, stats: Int32s) -> float:
     """Median share of their convex hull that the pieces of these numbers fill, 0 to 1."""
     shares = []
     for number in numbers[_spread(len(numbers))]:
@@ -35,5 +36,5 @@ def solidity(labels: NDArray[np.int32], numbers: NDArray[np.intp], stats: NDArra
     return float(np.median(shares))
 
 
-def _spread(count: int) -> NDArray[np.intp]:
+def _spread(count: int) -> Indices:
     return np.linspace(0, count - 1, min(count, _SAMPLED)).astype(np.intp)

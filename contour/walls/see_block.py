@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
+from contour.geometry.arrays import Bytes, Float64s
 from contour.walls.cell_scale import Cells, probe
 from contour.walls.coarse_block import CoarseBlock, coarse_block
 from contour.walls.dark_material import dark_beyond, dark_edge, midway_to_table
@@ -21,10 +22,6 @@ from contour.walls.wall_ends import Chains, edge_chains, find_ends, outermost
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WallPoints, WitnessKind
 from contour.walls.wall_mask import FINE_PITCH, WallMask, wall_mask, without_specks
 from contour.walls.wall_parallax import Parallax, parallax
-
-Gray = NDArray[np.uint8]
-Points = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 # Noise alone reaches a score of 0.18.
 _ORDERLY = 0.35
@@ -58,7 +55,7 @@ _STRANDS_PITCHES = 5.0
 _WALLS_INSIDE = 1.1
 
 
-def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
+def see_block(picture: Bytes, polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
     """Witnesses of the largest block in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
     `on_mask` is called when the wall mask is made. Raises PictureError, NoBlockFound.
@@ -99,7 +96,7 @@ def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], N
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
 
 
-def _darker_than_table(seen: WallMask, light: Gray, midway: float) -> WallMask:
+def _darker_than_table(seen: WallMask, light: Bytes, midway: float) -> WallMask:
     """The mask without what is lighter than midway from dark walls to the table.
 
     Cells of a black block are nearly as dark as its walls. Against so small a contrast the table's own shades, beside a
@@ -110,7 +107,7 @@ def _darker_than_table(seen: WallMask, light: Gray, midway: float) -> WallMask:
 
 
 def _with_beside(
-    evidence: BlockEvidence, light: Gray, coarse: CoarseBlock, scale: int, midway: float | None
+    evidence: BlockEvidence, light: Bytes, coarse: CoarseBlock, scale: int, midway: float | None
 ) -> BlockEvidence:
     """The evidence with strands that hang on nothing and, where `midway` is given, the edge of dark material."""
     pitch = evidence.pitch_px / scale
@@ -127,21 +124,21 @@ def _with_beside(
 class _Ends:
     """Ends in picture pixels before they are fitted: tip, axis and outward normal (N, 2), straight wall behind (N,)."""
 
-    tip: Points
-    axis: Points
-    normal: Points
-    straight: Vector
+    tip: Float64s
+    axis: Float64s
+    normal: Float64s
+    straight: Float64s
 
 
 @dataclass(frozen=True)
 class _Witnesses:
-    points: Points
+    points: Float64s
     kind: NDArray[np.int8]
-    sigma: Vector
+    sigma: Float64s
 
 
 def _evidence(
-    light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, scale: int, midway: float | None
+    light: Bytes, seen: WallMask, coarse: CoarseBlock, cells: Cells, scale: int, midway: float | None
 ) -> BlockEvidence:
     pitch, wall = cells.pitch / scale, max(1.0, cells.wall / scale)
     chains = edge_chains(seen.mask, coarse, pitch)
@@ -188,7 +185,7 @@ def _evidence(
     )
 
 
-def _learnt(light: Gray, ends: _Ends, cells: Cells, wall: float, seen: WallMask) -> EndModel:
+def _learnt(light: Bytes, ends: _Ends, cells: Cells, wall: float, seen: WallMask) -> EndModel:
     """What the straightest ends say of all: blur, usual height, and the true width of walls that measure `wall`."""
     model = EndModel(
         width=true_width(wall, float(np.hypot(_USUAL_BLUR_PX, _MASK_BLUR_PX))),
@@ -208,7 +205,7 @@ def _learnt(light: Gray, ends: _Ends, cells: Cells, wall: float, seen: WallMask)
     return replace(model, width=width, blur=blur, height=max(float(np.median(free.height)), 1.0))
 
 
-def _tips(light: Gray, ends: _Ends, cells: Cells, model: EndModel) -> _Witnesses:
+def _tips(light: Bytes, ends: _Ends, cells: Cells, model: EndModel) -> _Witnesses:
     """Fitted wall ends; those too faint or too unsure are left out."""
     fitted = fit_ends(light, ends.tip, ends.axis, ends.normal, model)
     good = (fitted.sigma < _MOST_SIGMA_PX) & (fitted.height > _LEAST_HEIGHT * (model.height or 1.0))
@@ -218,7 +215,7 @@ def _tips(light: Gray, ends: _Ends, cells: Cells, model: EndModel) -> _Witnesses
     return _Witnesses(fitted.point[good], kind[good], sigma[good])
 
 
-def _sides(light: Gray, place: Points, normal: Points, wall: float, model: EndModel) -> _Witnesses:
+def _sides(light: Bytes, place: Float64s, normal: Float64s, wall: float, model: EndModel) -> _Witnesses:
     """Outermost wall points, moved along the outline's normal to half height where that is near; `wall` is the width
     of walls at half height.
     """
@@ -236,11 +233,11 @@ def _sides(light: Gray, place: Points, normal: Points, wall: float, model: EndMo
 
 
 def _to_the_table(
-    light: Gray,
+    light: Bytes,
     seen: _Witnesses,
-    place: Points,
-    normal: Points,
-    least: Vector,
+    place: Float64s,
+    normal: Float64s,
+    least: Float64s,
     pitch: float,
     midway: float,
 ) -> _Witnesses:
@@ -255,14 +252,14 @@ def _to_the_table(
     return _Witnesses(points, np.where(moved, np.int8(WitnessKind.OUTERMOST), seen.kind), sigma)
 
 
-def _raised(points: Points, normal: Points, depth: Parallax) -> Points:
+def _raised(points: Float64s, normal: Float64s, depth: Parallax) -> Float64s:
     """Points moved from the lower edge of the block's outer side up to its top, where that side is in view."""
     return (
         points + np.minimum(depth.across(points, normal), 0.0)[:, None] * normal if depth.width is not None else points
     )
 
 
-def _nearest(points: Points, others: Points) -> Vector:
+def _nearest(points: Float64s, others: Float64s) -> Float64s:
     """Distance from each of `points` (N, 2) to the nearest of `others` (M, 2), shape (N,); inf where there is none."""
     if not len(others) or not len(points):
         return np.full(len(points), np.inf)
@@ -270,14 +267,14 @@ def _nearest(points: Points, others: Points) -> Vector:
     return np.asarray(np.sqrt(square.min(axis=1)), np.float64)
 
 
-def _walls(chains: Chains, coarse: CoarseBlock, pitch: float) -> Points:
+def _walls(chains: Chains, coarse: CoarseBlock, pitch: float) -> Float64s:
     """Points of the walls' boundary near the coarse edge, shape (K, 2), mask pixels."""
     points = chains.points[:: max(1, round(pitch / _WALL_POINTS_PER_PITCH))]
     return points[coarse.depth_at(points) < _WALLS_INSIDE * pitch]
 
 
 def _rings(
-    coarse: CoarseBlock, tips: _Witnesses, sides: _Witnesses, walls: Points, depth: Parallax, scale: int
+    coarse: CoarseBlock, tips: _Witnesses, sides: _Witnesses, walls: Float64s, depth: Parallax, scale: int
 ) -> tuple[RingEvidence, ...]:
     """All witnesses, each at its nearest ring, in order along it, and the walls about it."""
     points = np.concatenate([tips.points, sides.points])

@@ -6,12 +6,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Float64s, Int64s
 from contour.walls.coarse_block import CoarseBlock
-
-Gray = NDArray[np.uint8]
-Points = NDArray[np.float64]
 
 _BAND_PITCHES = 1.25
 _DEPTH_PITCHES = 0.9
@@ -23,32 +20,32 @@ class WallEnds:
     (N,).
     """
 
-    tip: Points
-    axis: Points
-    straight: NDArray[np.float64]
+    tip: Float64s
+    axis: Float64s
+    straight: Float64s
 
 
 @dataclass(frozen=True)
 class Chains:
     """Boundary chains one after the other: points (N, 2), first index and length of each point's chain, both (N,)."""
 
-    points: Points
-    first: NDArray[np.int64]
-    length: NDArray[np.int64]
+    points: Float64s
+    first: Int64s
+    length: Int64s
 
-    def shifted(self, steps: int, at: NDArray[np.int64]) -> NDArray[np.int64]:
+    def shifted(self, steps: int, at: Int64s) -> Int64s:
         """Index of the point `steps` further along the own closed chain of each point `at`."""
         first = self.first[at]
         return first + (at - first + steps) % self.length[at]
 
-    def free_side(self, at: NDArray[np.int64], arm: int) -> Points:
+    def free_side(self, at: Int64s, arm: int) -> Float64s:
         """Vector towards the side without wall, as long as the points `arm` steps ahead and back of `at` are apart."""
         # findContours runs with the free side at (−dy, dx) of its direction, for outer boundaries and inner ones alike.
         ahead, back = self.points[self.shifted(arm, at)], self.points[self.shifted(-arm, at)]
         return np.stack([(back - ahead)[:, 1], (ahead - back)[:, 0]], axis=1)
 
 
-def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
+def edge_chains(mask: Bytes, coarse: CoarseBlock, pitch: float) -> Chains:
     """Boundary chains of the walls within about a pitch of the coarse edge."""
     # A sample's margin around the block's own walls keeps chips that lie beside it out, and their thin ends in.
     own = cv2.dilate(coarse.walls, np.ones((3, 3), np.uint8))
@@ -89,7 +86,7 @@ def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) ->
     return WallEnds(chains.points[peak], axis, straight)
 
 
-def _arms(chains: Chains, at: NDArray[np.int64], arm: int) -> tuple[NDArray[np.float64], NDArray[np.float64], Points]:
+def _arms(chains: Chains, at: Int64s, arm: int) -> tuple[Float64s, Float64s, Float64s]:
     """Distance of the points `arm` steps back and ahead of `at`, how far each sticks out of their middle, and where
     to.
     """
@@ -100,7 +97,7 @@ def _arms(chains: Chains, at: NDArray[np.int64], arm: int) -> tuple[NDArray[np.f
     return gap, stick, out / np.maximum(stick, 1e-9)[:, None]
 
 
-def _peaks(chains: Chains, score: NDArray[np.float64], reach: int) -> NDArray[np.int64]:
+def _peaks(chains: Chains, score: Float64s, reach: int) -> Int64s:
     """Middle of each run of best scores that no score within `reach` steps along the chain exceeds."""
     best = np.flatnonzero(np.isfinite(score))
     for step in range(1, reach + 1):
@@ -109,7 +106,7 @@ def _peaks(chains: Chains, score: NDArray[np.float64], reach: int) -> NDArray[np
     return best
 
 
-def outermost(chains: Chains, coarse: CoarseBlock, pitch: float) -> NDArray[np.int64]:
+def outermost(chains: Chains, coarse: CoarseBlock, pitch: float) -> Int64s:
     """Indices of the chain points that reach further out of the block than all within 0.4 pitch along their chain.
 
     The wall must lie behind them, seen from outside, and no other such point within a pitch may reach a third of a

@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Gray = NDArray[np.uint8]
-Float = NDArray[np.float32]
+from contour.geometry.arrays import Bytes, Float32s
+
 AnyFloat = NDArray[np.floating[Any] | np.integer[Any]]
-Levels = NDArray[np.uint8] | NDArray[np.uint16]
+Levels = Bytes | NDArray[np.uint16]
 L = TypeVar("L", bound=NDArray[Any])
 
 # Standard deviations above the level that walls stand on, itself about 1.5 below the mean where there is nothing but
@@ -53,10 +53,10 @@ class WallMask:
     faint: the mask at a lower threshold.
     """
 
-    mask: Gray
+    mask: Bytes
     noise: float
     contrast: float
-    faint: Gray
+    faint: Bytes
 
     @property
     def may_be_noise(self) -> bool:
@@ -64,7 +64,7 @@ class WallMask:
         return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
-def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0, wall: float = 0.0) -> WallMask:
+def wall_mask(light: Bytes, pitch: float, *, bright: bool, contrast: float = 0.0, wall: float = 0.0) -> WallMask:
     """Walls of `light` (H, W) where cells are about `pitch` pixels apart and walls are brighter (or darker) than cells.
 
     Walls are what stands out on both sides over less than a cell, whatever the light: a table as light as the walls is
@@ -103,7 +103,7 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0,
     return WallMask(mask, noise / unit, _typical(typical) / unit, faint)
 
 
-def _standing_out(smooth: Levels, threshold: Float, unit: int, *, bright: bool) -> Gray:
+def _standing_out(smooth: Levels, threshold: Float32s, unit: int, *, bright: bool) -> Bytes:
     """Where the picture is brighter (or darker) than the threshold, a coarser map, in `unit`s a grey level."""
     level = np.clip(threshold, 0, 255 * unit)
     levels: Levels = level.astype(np.uint8) if unit == 1 else level.astype(np.uint16)
@@ -123,7 +123,7 @@ def without_specks(seen: WallMask, pitch: float, wall: float) -> WallMask:
     return replace(seen, mask=kept[labels])
 
 
-def _smoothed(light: Gray, step: int, contrast: float) -> tuple[Levels, int]:
+def _smoothed(light: Bytes, step: int, contrast: float) -> tuple[Levels, int]:
     """Lightly blurred picture, filled up to a multiple of `step` both ways, and its units a grey level.
 
     Grey levels are kept in 1/32 where steps of one would show in the threshold; bytes are faster for the rest.
@@ -134,12 +134,12 @@ def _smoothed(light: Gray, step: int, contrast: float) -> tuple[Levels, int]:
     return np.asarray(cv2.GaussianBlur(even.astype(np.uint16) * np.uint16(32), (3, 3), 0), np.uint16), 32
 
 
-def _shrunk(smooth: Levels, step: int) -> Float:
+def _shrunk(smooth: Levels, step: int) -> Float32s:
     size = (smooth.shape[1] // step, smooth.shape[0] // step)
     return (cv2.resize(smooth, size, interpolation=cv2.INTER_AREA) if step > 1 else smooth).astype(np.float32)
 
 
-def _beside(small: Float, pitch: float) -> Float:
+def _beside(small: Float32s, pitch: float) -> Float32s:
     """The level on which walls stand: what stays of `small` when all is taken away that is narrower than a cell.
 
     A morphological opening (Matheron): the highest of the lowest levels of all squares that hold a sample. A table's
@@ -154,7 +154,7 @@ def _opened(light: L, size: int, *, closed: bool = False) -> L:
     return cast(L, cv2.morphologyEx(light, way, square, borderType=cv2.BORDER_REFLECT))
 
 
-def _typical(span: Float) -> float:
+def _typical(span: Float32s) -> float:
     """Median of the wall contrast where there is any to speak of."""
     strong = span[span > 0.5 * np.quantile(span[::4, ::4], 0.98)]
     return float(np.median(strong[:: max(1, strong.size // 4096)])) if strong.size else 0.0
@@ -183,7 +183,7 @@ def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
     return max(quiet, 0.3 * unit)
 
 
-def _heights(height: Float, beside: Float, pitch: float) -> tuple[Float, Float, Float]:
+def _heights(height: Float32s, beside: Float32s, pitch: float) -> tuple[Float32s, Float32s, Float32s]:
     """How far walls near each sample rise above the level beside it, how far walls of the wider region, and the walls
     near it, rise above what lies beside themselves.
 
@@ -206,7 +206,7 @@ def _heights(height: Float, beside: Float, pitch: float) -> tuple[Float, Float, 
     return own + _ratio(beside * height, height, window) - beside, np.asarray(region, np.float32), own
 
 
-def _typical_peak(local: Float, pitch: float) -> float:
+def _typical_peak(local: Float32s, pitch: float) -> float:
     """What half of the walls' peaks over tiles of a pitch stay below."""
     size = max(2, round(pitch))
     rows, columns = local.shape[0] // size, local.shape[1] // size
@@ -217,7 +217,7 @@ def _typical_peak(local: Float, pitch: float) -> float:
     return float(np.quantile(walls, 0.5)) if walls.size else 0.0
 
 
-def _ratio(square: AnyFloat, weight: AnyFloat, window: int) -> Float:
+def _ratio(square: AnyFloat, weight: AnyFloat, window: int) -> Float32s:
     """Mean over a window of values weighted by themselves, from their squares and themselves; 0 where they vanish."""
     size = (window, window)
     return np.asarray(cv2.blur(square, size) / np.maximum(cv2.blur(weight, size), 1e-3), np.float32)

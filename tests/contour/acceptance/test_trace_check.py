@@ -49,7 +49,7 @@ def test_moved_moves_the_contour_and_the_place_of_disagreement() -> None:
     assert checked.disagreement is not None
     assert moved.disagreement is not None
     assert np.allclose(np.subtract(moved.disagreement.place_px, checked.disagreement.place_px), [30, 20])
-    assert np.array_equal(moved.trace.contour.exterior, checked.trace.contour.exterior + [30.0, 20.0])
+    assert np.array_equal(moved.trace.contour.exterior, checked.trace.contour.exterior + np.array([30.0, 20.0]))
     assert moved.quality == checked.quality
 
 

@@ -63,17 +63,17 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreem
     """
     shrink = max(1, int(pitch_px / _PITCH_PX))
     small = _reduced(picture, shrink)
-    pitch = pitch_px / shrink
-    busy = _without_small_gaps(_busy(small, pitch), (_OPENING_PITCHES * pitch) ** 2)
+    small_pitch_px = pitch_px / shrink
+    busy = _without_small_gaps(_busy(small, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
     ours = _drawn(contour, busy.shape[:2], shrink)
-    around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * pitch)), np.uint8)
-    level = np.asarray(cv2.blur(small, (_odd(pitch), _odd(pitch))), np.uint8)
+    around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * small_pitch_px)), np.uint8)
+    level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)
     # Glare hides walls, and scratches crowd; but the one stays as light as the block, the other as the table.
     told = told_by_level(level, np.asarray(cv2.bitwise_and(ours, busy), np.uint8), quiet_table)
     # Squares cost a tenth of discs.
-    only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * pitch)) for mask in told)
-    theirs = _touched(_opened(_but(busy, only_table), _disc(_SCRATCH_PITCHES * pitch)), ours)
+    only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * small_pitch_px)) for mask in told)
+    theirs = _touched(_opened(_but(busy, only_table), _disc(_SCRATCH_PITCHES * small_pitch_px)), ours)
     busy = np.asarray(cv2.bitwise_or(busy, only_block), np.uint8)
     # The picture's border is no block, and block ends there.
     outside = np.asarray(cv2.distanceTransform(_inverted(busy), cv2.DIST_L2, 3), np.float32)
@@ -83,12 +83,12 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreem
         (*_widest(_but(ours, busy)), True),
         (*_widest(_but(theirs, around)), False),
         (*_farthest(outside, points, 0.0), True),
-        (*_farthest(inside, points, _BLUR_PITCHES * pitch), False),
+        (*_farthest(inside, points, _BLUR_PITCHES * small_pitch_px), False),
     ]
     apart, place, claims = max(farthest, key=lambda one: one[0])
     x, y = ((value + 0.5) * shrink - 0.5 for value in place)
     on_the_whole = float(np.median(_at(outside, points) - _at(inside, points)))
-    return Disagreement(apart / pitch, (x, y), claims, on_the_whole / pitch)
+    return Disagreement(apart / small_pitch_px, (x, y), claims, on_the_whole / small_pitch_px)
 
 
 def _reduced(picture: Bytes, shrink: int) -> Bytes:
@@ -100,14 +100,14 @@ def _reduced(picture: Bytes, shrink: int) -> Bytes:
     return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _busy(small: Bytes, pitch: float) -> Bytes:
+def _busy(small: Bytes, small_pitch_px: float) -> Bytes:
     """Where the picture differs from its mean over a pitch as it does in comb, 0 or 255."""
-    window = _odd(pitch)
+    window = _odd(small_pitch_px)
     off = cv2.absdiff(small, cv2.blur(small, (window, window)))
     if off.ndim == 3:
         off = off.max(axis=2)
     average = cv2.boxFilter(off, cv2.CV_32F, (window, window))
-    nearby = _odd(_NEARBY_PITCHES * pitch)
+    nearby = _odd(_NEARBY_PITCHES * small_pitch_px)
     squares = cv2.boxFilter(average * average, cv2.CV_32F, (nearby, nearby))
     # The mean that weighs busy places by how busy they are: beside the block it is the block's.
     level = squares / np.maximum(cv2.boxFilter(average, cv2.CV_32F, (nearby, nearby)), 1e-3)

@@ -77,8 +77,8 @@ def block_quality(picture: Bytes, contour: Contour, pitch_px: float | None) -> Q
 
     `pitch_px` None takes the place of an unknown pitch by a usual one.
     """
-    pitch = pitch_px or _USUAL_PITCH_PX
-    tiles = _tiles(picture, contour.exterior, pitch)
+    pitch_px = pitch_px or _USUAL_PITCH_PX
+    tiles = _tiles(picture, contour.exterior, pitch_px)
     light = wall_light(np.ascontiguousarray(tiles.reshape(-1, *tiles.shape[2:])))
     light = light.reshape(tiles.shape[:3])
     clipped = float(np.mean(tiles.reshape(*tiles.shape[:3], -1).max(axis=3) >= _FULL))
@@ -91,7 +91,7 @@ def block_quality(picture: Bytes, contour: Contour, pitch_px: float | None) -> Q
         contrast=float(np.median(contrast)),
         noise=noise,
         blur_px=blur,
-        pitch_px=pitch,
+        pitch_px=pitch_px,
         clipped_share=clipped,
     )
 
@@ -134,10 +134,10 @@ def lost_in_noise(quality: Quality, limits: QualityLimits) -> str | None:
     )
 
 
-def _tiles(picture: Bytes, exterior: Ring, pitch: float) -> Bytes:
+def _tiles(picture: Bytes, exterior: Ring, pitch_px: float) -> Bytes:
     """Tiles along and inside the outline, shape (N, S, S) or (N, S, S, 3)."""
     height, width = picture.shape[:2]
-    side = int(min(max(_LEAST_TILE_PX, round(_TILE_PITCHES * pitch)), height, width))
+    side = int(min(max(_LEAST_TILE_PX, round(_TILE_PITCHES * pitch_px)), height, width))
     count = int(np.clip(_SAMPLED_PX // side**2, 6, _MOST_TILES))
     low, high = np.floor(exterior.min(axis=0)), np.ceil(exterior.max(axis=0))
     # A raster of the outline with some 40 samples along its longer side finds places inside it.

@@ -108,15 +108,15 @@ def _unseen(
     way = stop - start
     share = np.clip(((corner - start) * way.conj()).real / np.maximum(np.abs(way) ** 2, 1e-12), 0.0, 1.0)
     area = 0.5 * float(((start - corner).conj() * (stop - corner)).imag.sum())
-    pitch = witnesses.pitch
+    pitch_px = witnesses.pitch_px
     highest = float(height(chain).max())
-    ends_at = height(witnesses.points[between]) > -_NEAR_CHORD * pitch
+    ends_at = height(witnesses.points[between]) > -_NEAR_CHORD * pitch_px
     return _Corner(
-        abs(area) / pitch**2,
-        float(np.abs(corner - start - share * way).min()) / pitch,
-        (depth - highest) / pitch,
-        depth / pitch,
-        anything=highest > _NEAR_CHORD * pitch or bool(ends_at.any()),
+        abs(area) / pitch_px**2,
+        float(np.abs(corner - start - share * way).min()) / pitch_px,
+        (depth - highest) / pitch_px,
+        depth / pitch_px,
+        anything=highest > _NEAR_CHORD * pitch_px or bool(ends_at.any()),
         only_ends=bool(witnesses.clean[between].all()),
     )
 

@@ -75,7 +75,7 @@ def _as_curve(
 def _links(witnesses: Witnesses, segments: Segments, found: Joints) -> Bools:
     """True where a segment may flow into the next: no sharp turn, an arc on either side, no long straight edge."""
     length = np.abs(found.end - np.roll(found.begin, 1))
-    supple = segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch)
+    supple = segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch_px)
     links: Bools = (
         (found.kink < _SHARPEST) & supple & np.roll(supple, -1) & (segments.bend | np.roll(segments.bend, -1))
     )

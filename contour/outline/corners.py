@@ -61,11 +61,11 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Bools) -> Joints:
     gap = np.abs(far - near)
     turn = tangent.conj() * next_tangent
     half = np.tan(0.5 * np.maximum(np.pi - np.abs(np.angle(turn)), 0.2))
-    reach = _REACH * witnesses.pitch * np.maximum(1.0, 0.5 / half) + gap
-    slack = _SLACK * witnesses.pitch
+    reach = _REACH * witnesses.pitch_px * np.maximum(1.0, 0.5 / half) + gap
+    slack = _SLACK * witnesses.pitch_px
     ahead = ((point - near) * tangent.conj()).real
     behind = ((far - point) * next_tangent.conj()).real
-    lone = _LONE * witnesses.pitch
+    lone = _LONE * witnesses.pitch_px
     inner_first, inner_last = ends(witnesses, segments, inlier, but=1)
     lone_last = (ahead > -lone) & (((point - inner_last) * tangent.conj()).real > 0.0)
     lone_first = (behind > -lone) & (((inner_first[after] - point) * next_tangent.conj()).real > 0.0)
@@ -80,12 +80,12 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Bools) -> Joints:
     smooth_turn = np.abs((one_tangent.conj() * other_tangent).imag) < _SMOOTH_SINE
     smooth_turn &= (one_tangent.conj() * other_tangent).real > 0.0
     sigma = float(np.median(witnesses.outer))
-    touching = smooth_turn & (aside < max(4.0 * sigma, 0.05 * witnesses.pitch))
+    touching = smooth_turn & (aside < max(4.0 * sigma, 0.05 * witnesses.pitch_px))
     blend = 0.5 * (one + other)
     end = np.where(corner, point, np.where(touching, blend, near))
     begin = np.where(corner, point, np.where(touching, blend, far))
     kink = np.abs(np.angle(one_tangent.conj() * other_tangent))
-    return Joints(end, begin, np.where(aside < _ASIDE * witnesses.pitch, kink, np.inf))
+    return Joints(end, begin, np.where(aside < _ASIDE * witnesses.pitch_px, kink, np.inf))
 
 
 def _intersections(models: Models, following: Models, near: Complexes, far: Complexes) -> tuple[Complexes, Bools]:
@@ -114,7 +114,7 @@ def without_reversed(witnesses: Witnesses, segments: Segments, inlier: Bools) ->
         begin = np.roll(found.begin, 1)
         _, tangent = feet(segments.models, 0.5 * (begin + found.end))
         run = ((found.end - begin) * tangent.conj()).real
-        sweep = np.abs(segments.models.curvature) * segments.length * witnesses.pitch
+        sweep = np.abs(segments.models.curvature) * segments.length * witnesses.pitch_px
         reversed_ = (run < -1e-9) & (sweep < 3.0)
         if not reversed_.any():
             return segments, found

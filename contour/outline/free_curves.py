@@ -57,7 +57,7 @@ def smooth_curve(
     derivative (a circle costs little); smoothness by generalised cross-validation.
     """
     length = max(length, 1e-6)
-    count = int(np.clip(np.ceil(length / (_KNOT_PITCHES * witnesses.pitch)), 4, _MOST_KNOTS))
+    count = int(np.clip(np.ceil(length / (_KNOT_PITCHES * witnesses.pitch_px)), 4, _MOST_KNOTS))
     knots = count if closed else count + 3
     rough = _roughness(knots, closed)
     column, value, _ = _basis(place, knots, length, closed)

@@ -62,7 +62,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     unary = cost(witnesses, signed, np.arange(count)[:, None])
     foot, tangent = feet(models, points)
     reached = reach(witnesses, models, foot, last=last, following=following)
-    hidden = (reached.back + reached.ahead) / witnesses.pitch
+    hidden = (reached.back + reached.ahead) / witnesses.pitch_px
     unary = unary * np.clip(1.0 + _DEARER_PER_PITCH * (hidden - _UNSEEN_EDGE), 1.0, _DEAREST)
     unary = np.where(here >= 0, unary, _FAR)
     unary = unary + _REFLEX_PER_RADIAN * np.maximum(witnesses.rare * models.curvature, 0.0) * witnesses.gap[:, None]
@@ -123,7 +123,7 @@ def _steps(
         gap=witnesses.gap[:, None, None],
         unseen=reached.back[:, :, None] + after(reached.ahead),
         sigma=np.maximum(witnesses.outer, np.roll(witnesses.outer, -1))[:, None, None],
-        pitch=witnesses.pitch,
+        pitch_px=witnesses.pitch_px,
         rare=witnesses.rare,
     )
     price = np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
@@ -140,7 +140,7 @@ def joint_cost(
     gap: Float64s,
     unseen: Float64s,
     sigma: Float64s,
-    pitch: float,
+    pitch_px: float,
     rare: float,
 ) -> Float64s:
     """Nats of a joint between two models, given their feet and tangents at the last and the next witness (shapes
@@ -159,14 +159,14 @@ def joint_cost(
     safe = np.where(np.abs(sine) > 0.05, sine, 1.0)
     ahead = (way.conj() * next_tangent).imag / safe
     behind = (tangent.conj() * way).imag / safe
-    slack, most = 0.3 * pitch, _REACH * pitch + gap
+    slack, most = 0.3 * pitch_px, _REACH * pitch_px + gap
     excess = (
         np.maximum(np.maximum(-ahead - slack, ahead - most), 0.0) ** 2
         + np.maximum(np.maximum(-behind - slack, behind - most), 0.0) ** 2
     )
-    corner = _CORNER + reflex + _REFLEX * (rare * sine > 0.0) + 8.0 * excess / pitch**2
+    corner = _CORNER + reflex + _REFLEX * (rare * sine > 0.0) + 8.0 * excess / pitch_px**2
     # A cell in a corner touches its edges at a distance that goes with the cotangent of half the angle between them.
-    hidden = (unseen + ahead + behind) / pitch + 1.0 - np.abs(sine) / np.maximum(1.0 + turn.real, 0.2)
+    hidden = (unseen + ahead + behind) / pitch_px + 1.0 - np.abs(sine) / np.maximum(1.0 + turn.real, 0.2)
     corner = corner + _MISSING_CELL * np.clip(hidden - _UNSEEN_CORNER + 2.0, 0.0, 1.0)
     corner = corner + _UNSEEN_PER_PITCH * np.maximum(hidden - _UNSEEN_CORNER, 0.0)
     corner = np.where(np.abs(sine) > 0.05, corner, np.inf)

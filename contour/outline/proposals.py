@@ -187,7 +187,7 @@ def window_fits(witnesses: Witnesses, first: Indices, length: Indices, bend: Boo
 
 def gentle(witnesses: Witnesses, models: Models) -> Bools:
     """True where a model bends no more sharply than witnesses a pitch apart can show."""
-    turn = models.curvature * witnesses.pitch
+    turn = models.curvature * witnesses.pitch_px
     mild: Bools = (turn < 1.0 / _LEAST_RADIUS_CONVEX) & (turn > -1.0 / _LEAST_RADIUS_CONCAVE)
     return mild
 

@@ -38,7 +38,7 @@ def vertex_sigma(
     count = np.maximum(weight.sum(axis=1), 1.0)
     along = _along(segments.models.take((slice(None), None)), witnesses.points[index])
     middle = (weight * along).sum(axis=1) / count
-    scale = np.sqrt((weight * (along - middle[:, None]) ** 2).sum(axis=1) / count) + 0.3 * witnesses.pitch
+    scale = np.sqrt((weight * (along - middle[:, None]) ** 2).sum(axis=1) / count) + 0.3 * witnesses.pitch_px
     design = _powers((along - middle[:, None]) / scale[:, None], segments.bend[:, None])
     normal = np.einsum("kmi,km,kmj->kij", design, weight, design) + 1e-6 * count[:, None, None] * np.eye(3)
     inverse = np.linalg.inv(normal)
@@ -56,7 +56,7 @@ def vertex_sigma(
     sine = np.abs((tangent.conj() * next_tangent).imag)
     corner = (first != second) & (sine > _SHARPEST_SINE)
     ratio = np.where(corner, (one + other) / np.maximum(sine, _SHARPEST_SINE) ** 2, np.maximum(one, other))
-    most = np.where(free[first] | free[second], _MOST_FREE, _MOST) * witnesses.pitch
+    most = np.where(free[first] | free[second], _MOST_FREE, _MOST) * witnesses.pitch_px
     return np.minimum(spread * np.sqrt(ratio), most)
 
 
@@ -67,7 +67,7 @@ def unseen_share(witnesses: Witnesses, inlier: Bools) -> float:
         return 1.0
     place = np.cumsum(witnesses.gap)[inlier]
     gaps = np.diff(place, append=place[0] + total)
-    return float(np.maximum(gaps - 2.0 * witnesses.pitch, 0.0).sum() / total)
+    return float(np.maximum(gaps - 2.0 * witnesses.pitch_px, 0.0).sum() / total)
 
 
 def _along(models: Models, points: Complexes) -> Float64s:

@@ -52,7 +52,7 @@ class Witnesses:
     cap_outside: Float64s
     clean: Bools
     gap: Float64s
-    pitch: float
+    pitch_px: float
     rare: float
 
     def __len__(self) -> int:
@@ -95,7 +95,7 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
     of their odds at the outline itself.
     """
     inner, outer = witnesses.inner * factor, witnesses.outer * factor
-    odds = witnesses.pitch / (np.sqrt(2.0 * np.pi) * np.minimum(inner, outer))
+    odds = witnesses.pitch_px / (np.sqrt(2.0 * np.pi) * np.minimum(inner, outer))
     inside = np.log((1.0 - _SHARE_INSIDE) / _SHARE_INSIDE * odds)
     dearer = _HOLE if witnesses.rare > 0.0 else 1.0
     inside = np.where(witnesses.inner > witnesses.outer * 1.01, 4.0, np.clip(inside, 3.0, 5.5))
@@ -122,12 +122,12 @@ def cost(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(
     outside = signed > 0.0
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
     cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
-    beyond = np.clip(np.where(np.isinf(sigma), 0.0, np.abs(signed)) / witnesses.pitch - _DEEPEST, 0.0, 3.0)
+    beyond = np.clip(np.where(np.isinf(sigma), 0.0, np.abs(signed)) / witnesses.pitch_px - _DEEPEST, 0.0, 3.0)
     square = 0.5 * (signed / sigma) ** 2
     bent: Float64s = cap * square / (cap + square) + 4.0 * beyond**2
     if witnesses.rare > 0.0:
         return bent
-    return bent + _FAR_OUTSIDE * np.clip(signed / witnesses.pitch - _DUST, 0.0, 1.0)
+    return bent + _FAR_OUTSIDE * np.clip(signed / witnesses.pitch_px - _DUST, 0.0, 1.0)
 
 
 def weights(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(None)) -> Float64s:

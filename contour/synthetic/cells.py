@@ -279,8 +279,8 @@ def _hexagons(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s
 
 
 def _holes(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
-    pitch = np.float32(geometry.pitch_mm)
-    xc, yc = x / pitch, y / pitch
+    pitch_mm = np.float32(geometry.pitch_mm)
+    xc, yc = x / pitch_mm, y / pitch_mm
     if geometry.square_grid:
         i, j = np.rint(xc), np.rint(yc)
         dx, dy = xc - i, yc - j
@@ -288,7 +288,7 @@ def _holes(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -
         i, j, dx, dy = _nearest_hex(xc, yc)
     here = lattice.index(i, j)
     radius = np.float32(0.5 * (geometry.pitch_mm - geometry.wall_mm))
-    outside = np.sqrt(dx * dx + dy * dy) * pitch - radius
+    outside = np.sqrt(dx * dx + dy * dy) * pitch_mm - radius
     outside = np.where(lattice.keep[here, 0] < INTACT, np.float32(400.0), outside)  # this hole was never drilled
     one = np.ones_like(outside)
     # a half-plane written as a very wide wall: its near face lies where the hole ends
@@ -296,8 +296,8 @@ def _holes(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -
 
 
 def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
-    pitch = np.float32(geometry.pitch_mm)
-    xc, yc = x / pitch, y / pitch
+    pitch_mm = np.float32(geometry.pitch_mm)
+    xc, yc = x / pitch_mm, y / pitch_mm
     i, j, dx, dy = _nearest_hex(xc, yc)
     here = lattice.index(i, j)
     reach = 1 if geometry.jitter <= 0.2 else 2
@@ -324,7 +324,7 @@ def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s)
             near1, id1 = np.where(first, far2, near1), np.where(first, there, id1)
             at[1] = (np.where(first, ox, at[1][0]), np.where(first, oy, at[1][1]))
     apart = np.sqrt((at[2][0] - at[1][0]) ** 2 + (at[2][1] - at[1][1]) ** 2)
-    distance = (near2 - near1) / (2.0 * np.maximum(apart, np.float32(1e-3))) * pitch
+    distance = (near2 - near1) / (2.0 * np.maximum(apart, np.float32(1e-3))) * pitch_mm
     pair = (id1 + id2) % np.int32(len(lattice.tone))
     keep = lattice.keep[pair, 0]
     distance = np.where(keep < INTACT, np.float32(1e3), distance)

@@ -72,16 +72,16 @@ def _machined(scene: Scene, picture: Float32s) -> None:
     fine = fine[step : step + camera.height, step : step + camera.width]
     per_mm = 1.0 / camera.mm_per_px((float(work[:, 0].mean()), float(work[:, 1].mean())), 0.0)
     if table.perforation_pitch_mm > 0.0:
-        pitch = np.float32(table.perforation_pitch_mm)
-        off = fine / pitch
+        pitch_mm = np.float32(table.perforation_pitch_mm)
+        off = fine / pitch_mm
         off -= np.rint(off)
-        outside = np.sqrt(off[..., 0] ** 2 + off[..., 1] ** 2) * pitch - np.float32(table.perforation_mm / 2.0)
+        outside = np.sqrt(off[..., 0] ** 2 + off[..., 1] ** 2) * pitch_mm - np.float32(table.perforation_mm / 2.0)
         hole = np.clip(np.float32(0.5) - outside * np.float32(per_mm), 0.0, 1.0)
         picture += hole * (np.float32(table.perforation_level) - picture)
     if table.groove_pitch_mm > 0.0:
-        pitch = np.float32(table.groove_pitch_mm)
-        off = fine / pitch
-        near = np.abs(off - np.rint(off)).min(axis=-1) * pitch
+        pitch_mm = np.float32(table.groove_pitch_mm)
+        off = fine / pitch_mm
+        near = np.abs(off - np.rint(off)).min(axis=-1) * pitch_mm
         groove = np.clip(np.float32(0.5) - (near - np.float32(1.5)) * np.float32(per_mm), 0.0, 1.0)
         picture *= 1.0 - np.float32(0.55) * groove
 

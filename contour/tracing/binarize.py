@@ -14,7 +14,7 @@ import numpy as np
 from contour.errors import ParameterError
 from contour.geometry.arrays import Bytes, Float32s
 from contour.image import opencv as _cv
-from contour.tracing.paper_cells import Cells, measure_cells
+from contour.tracing.paper_cells import EnclosedCells, measure_cells
 from contour.tracing.trace import Polarity
 
 _CONTRAST_SHARE = 0.45
@@ -49,17 +49,17 @@ white noise after the 3 x 3 blur these percentiles are 0.88 and 0.62 of the stan
 
 
 @dataclass(frozen=True)
-class WallMask:
+class BinarizedPicture:
     """The wall mask, shape (H, W), 0 or 255, with what it was made for and the cells seen in it (None: too few)."""
 
     mask: Bytes
     polarity: Polarity
-    cells: Cells | None
+    cells: EnclosedCells | None
 
 
 def binarize(
     picture: Bytes, mode: Literal["flat", "otsu"] | int = "flat", polarity: Literal["auto", "bright", "dark"] = "auto"
-) -> WallMask:
+) -> BinarizedPicture:
     """The wall mask of a grey (H, W) or BGR (H, W, 3) picture, uint8. Raises ParameterError.
 
     A fixed `mode` is a grey level 0 … 255: bright walls are above it, dark ones at or below. With polarity `auto`
@@ -78,11 +78,11 @@ def binarize(
     return max(masks, key=_plausibility)
 
 
-def _measured(mask: Bytes, polarity: Polarity) -> WallMask:
-    return WallMask(mask, polarity, measure_cells(mask))
+def _measured(mask: Bytes, polarity: Polarity) -> BinarizedPicture:
+    return BinarizedPicture(mask, polarity, measure_cells(mask))
 
 
-def _plausibility(found: WallMask) -> tuple[float, float]:
+def _plausibility(found: BinarizedPicture) -> tuple[float, float]:
     """How many regular cells, and how much they enclose; where neither polarity has any, how little is at the border.
 
     By area alone the squares between a table's grooves would outweigh a small block's cells, by number alone specks of
@@ -92,7 +92,7 @@ def _plausibility(found: WallMask) -> tuple[float, float]:
     return (found.cells.count**2 * found.cells.area_px2 if found.cells else 0.0, -float(np.mean(border)))
 
 
-def _flat_masks(grey: Bytes, polarities: tuple[Polarity, ...]) -> list[WallMask]:
+def _flat_masks(grey: Bytes, polarities: tuple[Polarity, ...]) -> list[BinarizedPicture]:
     """The better polarity's mask, flattened twice: with a window from the picture's size, then from the cells seen."""
     first, shrink = _first_look(grey, polarities)
     if first.cells is None:
@@ -104,10 +104,10 @@ def _flat_masks(grey: Bytes, polarities: tuple[Polarity, ...]) -> list[WallMask]
     measured = _measured_near(mask, cells)
     if measured is None and shrink == 1:
         return [first]
-    return [WallMask(mask, first.polarity, measured or cells)]
+    return [BinarizedPicture(mask, first.polarity, measured or cells)]
 
 
-def _first_look(grey: Bytes, polarities: tuple[Polarity, ...]) -> tuple[WallMask, int]:
+def _first_look(grey: Bytes, polarities: tuple[Polarity, ...]) -> tuple[BinarizedPicture, int]:
     """The better polarity's mask with the first window, and how much smaller than the picture it is.
 
     Large pictures are looked at small; only where that shows no cells (they may be too fine) as they are.
@@ -125,7 +125,7 @@ def _first_look(grey: Bytes, polarities: tuple[Polarity, ...]) -> tuple[WallMask
     return found, factor
 
 
-def _measured_near(mask: Bytes, cells: Cells) -> Cells | None:
+def _measured_near(mask: Bytes, cells: EnclosedCells) -> EnclosedCells | None:
     """The cells of the mask; in a large one those around the middle of where cells were seen: they are many enough."""
     if mask.size <= _EASY_PX:
         return measure_cells(mask)

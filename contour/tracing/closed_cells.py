@@ -29,7 +29,7 @@ _CELL_AREA = 1.5
 _SIMPLE_PX = 0.25
 
 
-def material_edge(picture: Bytes, pitch: float, walls: Bytes) -> Contour:
+def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> Contour:
     """Boundary of the largest region that differs from the table, with holes wider than 2.2 pitches, in pixels.
 
     `walls` (H, W), 255 where the picture shows cell walls, adds those that differ less than most. Exterior with
@@ -39,7 +39,7 @@ def material_edge(picture: Bytes, pitch: float, walls: Bytes) -> Contour:
     difference, noise = _difference(picture)
     level = _level(difference, noise)
     faint = (walls > 0) & (difference > OUTLIER * noise)
-    region = _region((difference > level) | faint, pitch)
+    region = _region((difference > level) | faint, pitch_px)
     chains, hierarchy = cv2.findContours(region, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     rings = [
         (_sub_pixel(difference, chain[:, 0, :].astype(np.float64)), bool(node[3] >= 0))
@@ -81,9 +81,9 @@ def _level(difference: Bytes, spread: float) -> float:
     return float(split)
 
 
-def _region(apart: Bools, pitch: float) -> Bytes:
+def _region(apart: Bools, pitch_px: float) -> Bytes:
     """The largest piece with its cells filled; inner openings in which a disc of 1.1 pitches' radius fits stay open."""
-    material = _closed(apart.astype(np.uint8), _GAP_PITCHES * pitch)
+    material = _closed(apart.astype(np.uint8), _GAP_PITCHES * pitch_px)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(material, connectivity=8)
     area = (stats[:, cv2.CC_STAT_WIDTH] * stats[:, cv2.CC_STAT_HEIGHT]).astype(np.float64)
     area[0] = 0
@@ -93,12 +93,12 @@ def _region(apart: Bools, pitch: float) -> Bytes:
         )
     piece = (labels == int(np.argmax(area))).astype(np.uint8)
     # Of the piece alone: specks of a table lie as close as walls, and enclose as much.
-    piece |= _leaking_cells(piece, pitch)
+    piece |= _leaking_cells(piece, pitch_px)
     padded = cv2.copyMakeBorder(piece, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     _, inner, _, _ = cv2.connectedComponentsWithStats(1 - padded, connectivity=4)
     room = cv2.distanceTransform(1 - padded, cv2.DIST_L2, 5)
     open_ = np.zeros(int(inner.max()) + 1, np.bool_)
-    open_[inner[room > 1.1 * pitch]] = True
+    open_[inner[room > 1.1 * pitch_px]] = True
     open_[inner[0, 0]] = True
     open_[0] = False
     return np.asarray(1 - open_.astype(np.uint8)[inner][1:-1, 1:-1], np.uint8)
@@ -111,16 +111,16 @@ def _closed(material: Bytes, gap: float) -> Bytes:
     return np.asarray(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, disc)[size:-size, size:-size], np.uint8)
 
 
-def _leaking_cells(material: Bytes, pitch: float) -> Bytes:
+def _leaking_cells(material: Bytes, pitch_px: float) -> Bytes:
     """Cells that only a broken or faint wall opens to the table, up to the line across the gap.
 
     Where walls are grown by half a gap, such cells lie apart from the table; what is nearer to a cell's rest than to
     the table's is the cell.
     """
     away = cv2.distanceTransform(1 - material, cv2.DIST_L2, 5)
-    seeds = (away > 0.5 * _WALL_PITCHES * pitch).astype(np.uint8)
+    seeds = (away > 0.5 * _WALL_PITCHES * pitch_px).astype(np.uint8)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=4)
-    cell = stats[:, cv2.CC_STAT_AREA] < _CELL_AREA * pitch * pitch
+    cell = stats[:, cv2.CC_STAT_AREA] < _CELL_AREA * pitch_px * pitch_px
     cell[0] = False
     if not cell.any():
         return np.zeros_like(material)

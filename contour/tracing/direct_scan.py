@@ -13,7 +13,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes, Float64s, Indices
-from contour.tracing.paper_cells import Cells
+from contour.tracing.paper_cells import EnclosedCells
 
 GAP_PITCHES = 3.0
 """A cell is 1.15 pitches from corner to corner, two that lost the wall between them 2.15. Over 22 rendered blocks
@@ -23,12 +23,12 @@ WIDTH_PITCHES = 2.0
 """Specks, and foil chips of a cell's size, are narrower; a block's corner loses no more than a cell."""
 
 
-def default_gap_px(cells: Cells) -> int:
+def default_gap_px(cells: EnclosedCells) -> int:
     """`max_gap_px` for a cell pitch, px."""
     return math.ceil(GAP_PITCHES * cells.pitch_px)
 
 
-def default_width_px(cells: Cells) -> int:
+def default_width_px(cells: EnclosedCells) -> int:
     """`min_width_px` for a cell pitch, px."""
     return math.ceil(WIDTH_PITCHES * cells.pitch_px)
 

@@ -15,7 +15,7 @@ from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bools, Bytes, Indices
 from contour.geometry.rings import Contour, largest_loop, signed_area
 from contour.image.opencv import above, contours_in_two_levels, either, enclosed_area, integral
-from contour.tracing.paper_cells import Cells
+from contour.tracing.paper_cells import EnclosedCells
 
 CORE_PITCHES = 0.4
 """Over 22 rendered blocks: up to 0.3 cells stay open or the contour comes in pieces, larger cores stick out more."""
@@ -40,7 +40,7 @@ def default_step_px(core_px: int) -> int:
     return max(round(STEP_CORES * core_px), 1)
 
 
-def default_threshold(cells: Cells) -> float:
+def default_threshold(cells: EnclosedCells) -> float:
     """Half of what a window deep inside the block sees, 0 to 255."""
     return 255 * cells.wall_share * WALL_SHARES
 

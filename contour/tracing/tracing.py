@@ -14,7 +14,7 @@ from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, oriented_contour
 from contour.image.picture_check import check_picture
 from contour.tracing import binarize, direct_scan, find_contours, sliding_matrix
-from contour.tracing.paper_cells import FEWEST_CELLS, Cells
+from contour.tracing.paper_cells import FEWEST_CELLS, EnclosedCells
 from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
 from contour.walls.pieces import pieces_beside
@@ -53,7 +53,7 @@ class _MethodCall(Protocol):
     ) -> Trace: ...
 
 
-_FromMask = Callable[[binarize.WallMask, TraceSettings], Contour]
+_FromMask = Callable[[binarize.BinarizedPicture, TraceSettings], Contour]
 
 
 def _on_mask(contour_of: _FromMask) -> _MethodCall:
@@ -71,11 +71,11 @@ def _on_mask(contour_of: _FromMask) -> _MethodCall:
     return call
 
 
-def _find_contours(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
+def _find_contours(walls: binarize.BinarizedPicture, settings: TraceSettings) -> Contour:
     return Contour(find_contours.largest_contour(walls.mask))
 
 
-def _direct_scan(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
+def _direct_scan(walls: binarize.BinarizedPicture, settings: TraceSettings) -> Contour:
     gap, width = settings.max_gap_px, settings.min_width_px
     if gap is None:
         gap = direct_scan.default_gap_px(_cells(walls, "max_gap_px"))
@@ -84,7 +84,7 @@ def _direct_scan(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
     return Contour(direct_scan.direct_scan_ring(walls.mask, gap, width))
 
 
-def _sliding_matrix(walls: binarize.WallMask, settings: TraceSettings) -> Contour:
+def _sliding_matrix(walls: binarize.BinarizedPicture, settings: TraceSettings) -> Contour:
     core, step, threshold = settings.core_px, settings.step_px, settings.threshold
     if core is None:
         core = sliding_matrix.default_core_px(_cells(walls, "core_px").pitch_px)
@@ -97,7 +97,7 @@ def _sliding_matrix(walls: binarize.WallMask, settings: TraceSettings) -> Contou
     return sliding_matrix.sliding_matrix_contour(filled, smallest_hole_px2)
 
 
-def _cells(walls: binarize.WallMask, parameter: str) -> Cells:
+def _cells(walls: binarize.BinarizedPicture, parameter: str) -> EnclosedCells:
     if walls.cells is None:
         share = np.count_nonzero(walls.mask) / walls.mask.size
         raise NoBlockFound(

@@ -96,12 +96,12 @@ def _closed_cells(picture: Bytes, settings: TraceSettings, on_stage: OnStage) ->
     """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
     light = wall_light(picture)
     cells = probe(light, settings.polarity)
-    walls = wall_mask(light, cells.pitch, bright=cells.bright, contrast=cells.contrast).mask
+    walls = wall_mask(light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
     on_stage("mask")
-    contour = material_edge(picture, cells.pitch, walls)
-    others = pieces_beside(walls, contour.exterior, cells.pitch)
+    contour = material_edge(picture, cells.pitch_px, walls)
+    others = pieces_beside(walls, contour.exterior, cells.pitch_px)
     on_stage("trace")
-    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch, contour, others=others)
+    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch_px, contour, others=others)
 
 
 def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:

@@ -30,14 +30,14 @@ _WIDE_WALL = 0.2
 
 
 @dataclass(frozen=True)
-class Cells:
+class CellScale:
     """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
     the part of the tile they fill, the wall contrast in grey levels, the share of the
     walls that hang together, the grey levels of walls and of cells' floors, the share of the cells with neighbours all
     around, and the share of its convex hull that a cell fills."""
 
-    pitch: float
-    wall: float
+    pitch_px: float
+    wall_px: float
     bright: bool
     count: int
     regularity: float
@@ -53,7 +53,7 @@ class Cells:
     def score(self) -> float:
         """Larger for a better comb: many cells, of one size, over most of the tile, with walls no wider than they."""
         # The light gaps of a comb of dark cells look like cells too, but leave less room between them.
-        thin = min(1.0, (_WIDEST_WALL - self.wall / self.pitch) / _WIDE_WALL)
+        thin = min(1.0, (_WIDEST_WALL - self.wall_px / self.pitch_px) / _WIDE_WALL)
         return self.regularity * self.filled * self.connected * thin * min(1.0, self.count / 12)
 
     @property
@@ -61,23 +61,30 @@ class Cells:
         """What tells a comb from other things that have patches side by side."""
         regular = self.regularity * self.filled
         return Comb(
-            self.pitch, self.wall, self.bright, self.count, self.score, regular, order=self.order, solid=self.solid
+            self.pitch_px,
+            self.wall_px,
+            self.bright,
+            self.count,
+            self.score,
+            regular,
+            order=self.order,
+            solid=self.solid,
         )
 
 
-def probe(light: Bytes, polarity: str) -> Cells:
+def probe(light: Bytes, polarity: str) -> CellScale:
     """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound.
 
     The busiest tile at full size is asked first, then the whole picture at a quarter of its size, where large cells are
     many, then further tiles. The first good answer is taken, else the best.
     """
     senses = [bright for bright in (True, False) if polarity != ("dark" if bright else "bright")]
-    best: Cells | None = None
+    best: CellScale | None = None
     for part, shrink in _parts(light):
         found = _part_cells(part, senses, _GUESSES if shrink == 1 else _GUESSES[:2])
         if found is None:
             continue
-        found = replace(found, pitch=found.pitch * shrink, wall=found.wall * shrink)
+        found = replace(found, pitch_px=found.pitch_px * shrink, wall_px=found.wall_px * shrink)
         if best is None or found.score > best.score:
             best = found
         if best.score > _GOOD_SCORE:
@@ -124,11 +131,11 @@ def _busiest_tiles(light: Bytes) -> list[Bytes]:
     return tiles
 
 
-def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> Cells | None:
+def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> CellScale | None:
     """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own
     pitch.
     """
-    best: Cells | None = None
+    best: CellScale | None = None
     for guess in guesses:
         for bright in senses:
             cells = cells_of(part, guess, bright=bright)
@@ -139,15 +146,15 @@ def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> 
             break
     if best is None:
         return None
-    again = cells_of(part, best.pitch, bright=best.bright)
+    again = cells_of(part, best.pitch_px, bright=best.bright)
     # Faint fine cells are seen better through a wide window.
-    same = again is None or abs(again.pitch - best.pitch) < _SAME_PITCH * best.pitch
+    same = again is None or abs(again.pitch_px - best.pitch_px) < _SAME_PITCH * best.pitch_px
     return best if again is None or (same and again.score < best.score) else again
 
 
-def cells_of(light: Bytes, pitch: float, *, bright: bool) -> Cells | None:
-    """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are."""
-    seen = wall_mask(light, pitch, bright=bright)
+def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None:
+    """Cells enclosed by the wall mask of `light` made for `pitch_px`; None where fewer than six are."""
+    seen = wall_mask(light, pitch_px, bright=bright)
     mask = seen.mask
     floor = cv2.bitwise_not(mask)
     _, labels, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
@@ -181,7 +188,7 @@ def cells_of(light: Bytes, pitch: float, *, bright: bool) -> Cells | None:
     filled = len(usual) * size * size * np.sqrt(3) / 2 / float(np.prod(spread))
     _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
     connected = float(pieces[1:, cv2.CC_STAT_AREA].max() / max(1, pieces[1:, cv2.CC_STAT_AREA].sum()))
-    return Cells(
+    return CellScale(
         size,
         wall,
         bright,

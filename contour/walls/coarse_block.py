@@ -125,17 +125,17 @@ class CoarseBlock:
         return (points + 0.5) / self.step - 0.5 + _PAD
 
 
-def coarse_block(mask: Bytes, light: Bytes, pitch: float) -> CoarseBlock:
-    """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch` pixels wide.
+def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
+    """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch_px` pixels wide.
 
     Raises NoBlockFound.
     """
     # A whole number of pixels a sample: averaging is several times faster so.
-    step = max(1, round(pitch / _SAMPLES_PER_PITCH))
+    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
     small = _averaged(mask, step, cv2.BORDER_CONSTANT)
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = _padded(walls, cv2.BORDER_CONSTANT)
-    samples = pitch / step
+    samples = pitch_px / step
     kept = _main_piece(walls, samples)
     filled, kept = _linked(walls, kept, _close(kept, _CLOSING_PITCHES * samples), samples)
     filled = without_threads(_largest(filled | kept), samples)

@@ -43,13 +43,13 @@ def dark_beyond(light: Bytes, place: Float64s, normal: Float64s, *, midway: floa
     return np.asarray(np.where(light_at.any(axis=1), distance, np.inf), np.float64)
 
 
-def dark_edge(light: Bytes, coarse: CoarseBlock, pitch: float, midway: float) -> Float64s:
+def dark_edge(light: Bytes, coarse: CoarseBlock, pitch_px: float, midway: float) -> Float64s:
     """Points along the edge of what is darker than `midway` in `light` (H, W), where that hangs together around the
     block, shape (K, 2), pixels.
     """
-    near = (coarse.depth > -_BEYOND_PITCHES * pitch) & (coarse.depth < _WITHIN_PITCHES * pitch)
+    near = (coarse.depth > -_BEYOND_PITCHES * pitch_px) & (coarse.depth < _WITHIN_PITCHES * pitch_px)
     _, dark = cv2.threshold(light, midway, 255, cv2.THRESH_BINARY_INV)
     dark = cv2.bitwise_and(dark, coarse.enlarged(near.astype(np.uint8) * 255, light.shape))
     chains, _ = cv2.findContours(np.asarray(dark, np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-    long = [chain[:, 0, :].astype(np.float64) for chain in chains if len(chain) > _LONG_PITCHES * pitch]
+    long = [chain[:, 0, :].astype(np.float64) for chain in chains if len(chain) > _LONG_PITCHES * pitch_px]
     return np.concatenate([np.empty((0, 2)), *long])

@@ -15,15 +15,15 @@ _REACH_PITCHES = 0.7
 _STRAND_PITCHES = (0.8, 6.0)
 
 
-def with_faint_links(mask: Bytes, faint: Bytes, pitch: float) -> Bytes:
+def with_faint_links(mask: Bytes, faint: Bytes, pitch_px: float) -> Bytes:
     """The wall mask (H, W), uint8, with the walls of `faint`, a mask by a lower threshold, that lead from its largest
     piece to strands beside it.
 
     Foils differ in brightness by a factor of three, and where a dim one ends at the cut, the bright walls of the
     outermost cells would hang on nothing and be taken for chips.
     """
-    step = max(1, round(pitch / _SAMPLES_PER_PITCH))
-    samples = pitch / step
+    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
+    samples = pitch_px / step
     walls, all_walls = _coarse(mask, step), _coarse(faint, step)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
     if count < 3:

@@ -13,11 +13,11 @@ _NEIGHBOUR_PITCHES = (0.75, 1.35)
 _NEIGHBOURS = 4
 
 
-def lattice_order(places: Float64s, pitch: float) -> float:
+def lattice_order(places: Float64s, pitch_px: float) -> float:
     """Share of cells with four neighbours or more about a pitch away, 0 to 1; centroids of cells (N, 2), pixels."""
     some = places[_spread(len(places))]
     near = np.abs(some[:, None, :] - places[None, :, :])
-    square = (near[:, :, 0] ** 2 + near[:, :, 1] ** 2) / pitch**2
+    square = (near[:, :, 0] ** 2 + near[:, :, 1] ** 2) / pitch_px**2
     low, high = _NEIGHBOUR_PITCHES
     neighbours = ((square > low**2) & (square < high**2)).sum(axis=1)
     return float(np.mean(neighbours >= _NEIGHBOURS))

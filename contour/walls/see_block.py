@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Float64s
-from contour.walls.cell_scale import Cells, probe
+from contour.walls.cell_scale import CellScale, probe
 from contour.walls.coarse_block import CoarseBlock, coarse_block
 from contour.walls.dark_material import dark_beyond, dark_edge, midway_to_table
 from contour.walls.end_profile import EndModel, centred_axes, fit_ends, true_width
@@ -63,34 +63,36 @@ def see_block(picture: Bytes, polarity: str, on_mask: Callable[[], None] = lambd
     light = wall_light(picture)
     cells = probe(light, polarity)
     if picture.ndim == 3:
-        hop = 2 if cells.pitch > _SUBSAMPLED_PITCH else 1
+        hop = 2 if cells.pitch_px > _SUBSAMPLED_PITCH else 1
         sample = np.ascontiguousarray(light[::hop, ::hop])
-        walls = wall_mask(sample, cells.pitch / hop, bright=cells.bright, contrast=cells.contrast).mask
+        walls = wall_mask(sample, cells.pitch_px / hop, bright=cells.bright, contrast=cells.contrast).mask
         coloured = light_from_table(picture, sample, walls, hop)
         if coloured is not None:
             light, cells = coloured, probe(coloured, "bright")
-    scale = 2 if light.size > _HALF_SIZE_ABOVE_PX and cells.pitch > 20 and cells.wall > 2.5 else 1
+    scale = 2 if light.size > _HALF_SIZE_ABOVE_PX and cells.pitch_px > 20 and cells.wall_px > 2.5 else 1
     small = (
         light
         if scale == 1
         else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     )
-    seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast, wall=cells.wall / scale)
-    if cells.pitch < FINE_PITCH and seen.may_be_noise and cells.score < _ORDERLY:
+    seen = wall_mask(
+        small, cells.pitch_px / scale, bright=cells.bright, contrast=cells.contrast, wall=cells.wall_px / scale
+    )
+    if cells.pitch_px < FINE_PITCH and seen.may_be_noise and cells.score < _ORDERLY:
         raise NoBlockFound(
-            f"no block found: cells of {cells.pitch:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
+            f"no block found: cells of {cells.pitch_px:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
             "like noise. Check the light, and that a block lies in view"
         )
-    seen = without_specks(seen, cells.pitch / scale, cells.wall / scale)
+    seen = without_specks(seen, cells.pitch_px / scale, cells.wall_px / scale)
     midway = None if cells.bright else midway_to_table(small, cells.level, seen.contrast)
     if midway is not None:
         # Such a block is told from the table by its darkness: fainter walls would be more of its cells' own shades.
         seen = _darker_than_table(seen, small, midway)
     else:
-        seen = replace(seen, mask=with_faint_links(seen.mask, seen.faint, cells.pitch / scale))
+        seen = replace(seen, mask=with_faint_links(seen.mask, seen.faint, cells.pitch_px / scale))
     on_mask()
-    coarse = coarse_block(seen.mask, small, cells.pitch / scale)
-    others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)
+    coarse = coarse_block(seen.mask, small, cells.pitch_px / scale)
+    others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch_px / scale, scale)
     evidence = _evidence(light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
@@ -110,10 +112,10 @@ def _with_beside(
     evidence: BlockEvidence, light: Bytes, coarse: CoarseBlock, scale: int, midway: float | None
 ) -> BlockEvidence:
     """The evidence with strands that hang on nothing and, where `midway` is given, the edge of dark material."""
-    pitch = evidence.pitch_px / scale
-    beside = coarse.strands_near(_STRANDS_PITCHES * pitch)
+    pitch_px = evidence.pitch_px / scale
+    beside = coarse.strands_near(_STRANDS_PITCHES * pitch_px)
     if midway is not None:
-        edge = dark_edge(light, coarse, pitch, midway)[:: max(1, round(pitch / _DARK_POINTS_PER_PITCH))]
+        edge = dark_edge(light, coarse, pitch_px, midway)[:: max(1, round(pitch_px / _DARK_POINTS_PER_PITCH))]
         beside = np.concatenate([beside, edge])
     ring, points = coarse.feet(beside)[0], (beside + 0.5) * scale - 0.5
     rings = tuple(replace(one, beside=points[ring == number]) for number, one in enumerate(evidence.rings))
@@ -138,45 +140,45 @@ class _Witnesses:
 
 
 def _evidence(
-    light: Bytes, seen: WallMask, coarse: CoarseBlock, cells: Cells, scale: int, midway: float | None
+    light: Bytes, seen: WallMask, coarse: CoarseBlock, cells: CellScale, scale: int, midway: float | None
 ) -> BlockEvidence:
-    pitch, wall = cells.pitch / scale, max(1.0, cells.wall / scale)
-    chains = edge_chains(seen.mask, coarse, pitch)
-    found = find_ends(chains, coarse, pitch, wall)
-    outer = chains.points[outermost(chains, coarse, pitch)]
+    pitch_px, wall = cells.pitch_px / scale, max(1.0, cells.wall_px / scale)
+    chains = edge_chains(seen.mask, coarse, pitch_px)
+    found = find_ends(chains, coarse, pitch_px, wall)
+    outer = chains.points[outermost(chains, coarse, pitch_px)]
     sign = 1.0 if cells.bright else -1.0
     straight = found.straight * scale
     tip, axis = centred_axes(
-        light, (found.tip + 0.5) * scale - 0.5, found.axis, wall=cells.wall, straight=straight, sign=sign
+        light, (found.tip + 0.5) * scale - 0.5, found.axis, wall=cells.wall_px, straight=straight, sign=sign
     )
-    depth = parallax(light, tip, axis, straight=straight, wall=cells.wall, sign=sign)
+    depth = parallax(light, tip, axis, straight=straight, wall=cells.wall_px, sign=sign)
     if depth.width is not None:
         # The top is the half of the band that lies away from the picture's middle.
         across = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
         tip = tip + 0.5 * depth.across(tip, across)[:, None] * across
     ends = _Ends(tip, axis, coarse.feet(found.tip)[2], straight)
-    model = _learnt(light, ends, cells, depth.width or cells.wall, seen)
+    model = _learnt(light, ends, cells, depth.width or cells.wall_px, seen)
     tips = _tips(light, ends, cells, model)
     if midway is not None:
         normal = coarse.feet((tips.points + 0.5) / scale - 0.5)[2]
         # A clean end is where the wall ends; what is dark beyond it is the block's shadow.
         faded = (depth.across(tips.points, normal) >= 0.0) & (tips.kind != WitnessKind.CLEAN)
-        least = np.where(faded, _ENDS_INSIDE_PITCHES * cells.pitch, np.inf)
-        tips = _to_the_table(light, tips, tips.points, normal, least, cells.pitch, midway)
+        least = np.where(faded, _ENDS_INSIDE_PITCHES * cells.pitch_px, np.inf)
+        tips = _to_the_table(light, tips, tips.points, normal, least, cells.pitch_px, midway)
     tips = replace(tips, points=_raised(tips.points, coarse.feet((tips.points + 0.5) / scale - 0.5)[2], depth))
-    outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch]
+    outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch_px]
     normal, place = coarse.feet(outer)[2], (outer + 0.5) * scale - 0.5
-    sides = _sides(light, place, normal, depth.width or cells.wall, model)
+    sides = _sides(light, place, normal, depth.width or cells.wall_px, model)
     if midway is not None:
         faint = (sides.sigma >= _FAINT_SIGMA_PX) & (depth.across(place, normal) >= 0.0)
-        least = np.where(faint, _INSIDE_PITCHES * cells.pitch, np.inf)
-        sides = _to_the_table(light, sides, place, normal, least, cells.pitch, midway)
+        least = np.where(faint, _INSIDE_PITCHES * cells.pitch_px, np.inf)
+        sides = _to_the_table(light, sides, place, normal, least, cells.pitch_px, midway)
     sides = replace(sides, points=_raised(sides.points, normal, depth))
     polarity = "bright" if cells.bright else "dark"
     return BlockEvidence(
-        _rings(coarse, tips, sides, _walls(chains, coarse, pitch), depth, scale),
-        cells.pitch,
-        cells.wall,
+        _rings(coarse, tips, sides, _walls(chains, coarse, pitch_px), depth, scale),
+        cells.pitch_px,
+        cells.wall_px,
         polarity,
         model.blur,
         seen.noise,
@@ -185,15 +187,15 @@ def _evidence(
     )
 
 
-def _learnt(light: Bytes, ends: _Ends, cells: Cells, wall: float, seen: WallMask) -> EndModel:
+def _learnt(light: Bytes, ends: _Ends, cells: CellScale, wall: float, seen: WallMask) -> EndModel:
     """What the straightest ends say of all: blur, usual height, and the true width of walls that measure `wall`."""
     model = EndModel(
         width=true_width(wall, float(np.hypot(_USUAL_BLUR_PX, _MASK_BLUR_PX))),
         blur=_USUAL_BLUR_PX,
         height=None,
         noise=seen.noise,
-        reach=float(np.clip(0.3 * cells.pitch, 2.5, 2 * cells.wall + 4)),
-        out=float(np.clip(0.25 * cells.pitch, 3.0, 6.0)),
+        reach=float(np.clip(0.3 * cells.pitch_px, 2.5, 2 * cells.wall_px + 4)),
+        out=float(np.clip(0.25 * cells.pitch_px, 3.0, 6.0)),
         sign=1.0 if cells.bright else -1.0,
     )
     longest = np.argsort(-ends.straight)[: max(5, min(64, len(ends.tip) // 2))]
@@ -205,11 +207,11 @@ def _learnt(light: Bytes, ends: _Ends, cells: Cells, wall: float, seen: WallMask
     return replace(model, width=width, blur=blur, height=max(float(np.median(free.height)), 1.0))
 
 
-def _tips(light: Bytes, ends: _Ends, cells: Cells, model: EndModel) -> _Witnesses:
+def _tips(light: Bytes, ends: _Ends, cells: CellScale, model: EndModel) -> _Witnesses:
     """Fitted wall ends; those too faint or too unsure are left out."""
     fitted = fit_ends(light, ends.tip, ends.axis, ends.normal, model)
     good = (fitted.sigma < _MOST_SIGMA_PX) & (fitted.height > _LEAST_HEIGHT * (model.height or 1.0))
-    clean = ends.straight > 2 * cells.wall + 2
+    clean = ends.straight > 2 * cells.wall_px + 2
     sigma = np.hypot(np.where(clean, *_MODEL_SIGMA_PX), fitted.sigma)
     kind = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
     return _Witnesses(fitted.point[good], kind[good], sigma[good])
@@ -238,17 +240,17 @@ def _to_the_table(
     place: Float64s,
     normal: Float64s,
     least: Float64s,
-    pitch: float,
+    pitch_px: float,
     midway: float,
 ) -> _Witnesses:
     """Witnesses at `place`, with those that lie inside of dark material by `least` (N,) pixels or more, where its walls
     show no more, moved out to its edge.
     """
-    beyond = dark_beyond(light, place, normal, midway=midway, reach=_DARK_PITCHES * pitch)
+    beyond = dark_beyond(light, place, normal, midway=midway, reach=_DARK_PITCHES * pitch_px)
     moved = (beyond > least) & np.isfinite(beyond)
     edge = place + np.where(moved, beyond, 0.0)[:, None] * normal
     points = np.where(moved[:, None], edge, seen.points)
-    sigma = np.where(moved, max(_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES * pitch), seen.sigma)
+    sigma = np.where(moved, max(_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES * pitch_px), seen.sigma)
     return _Witnesses(points, np.where(moved, np.int8(WitnessKind.OUTERMOST), seen.kind), sigma)
 
 
@@ -267,10 +269,10 @@ def _nearest(points: Float64s, others: Float64s) -> Float64s:
     return np.asarray(np.sqrt(square.min(axis=1)), np.float64)
 
 
-def _walls(chains: Chains, coarse: CoarseBlock, pitch: float) -> Float64s:
+def _walls(chains: Chains, coarse: CoarseBlock, pitch_px: float) -> Float64s:
     """Points of the walls' boundary near the coarse edge, shape (K, 2), mask pixels."""
-    points = chains.points[:: max(1, round(pitch / _WALL_POINTS_PER_PITCH))]
-    return points[coarse.depth_at(points) < _WALLS_INSIDE * pitch]
+    points = chains.points[:: max(1, round(pitch_px / _WALL_POINTS_PER_PITCH))]
+    return points[coarse.depth_at(points) < _WALLS_INSIDE * pitch_px]
 
 
 def _rings(

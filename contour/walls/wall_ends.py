@@ -45,11 +45,11 @@ class Chains:
         return np.stack([(back - ahead)[:, 1], (ahead - back)[:, 0]], axis=1)
 
 
-def edge_chains(mask: Bytes, coarse: CoarseBlock, pitch: float) -> Chains:
+def edge_chains(mask: Bytes, coarse: CoarseBlock, pitch_px: float) -> Chains:
     """Boundary chains of the walls within about a pitch of the coarse edge."""
     # A sample's margin around the block's own walls keeps chips that lie beside it out, and their thin ends in.
     own = cv2.dilate(coarse.walls, np.ones((3, 3), np.uint8))
-    band = ((np.abs(coarse.depth) < _BAND_PITCHES * pitch) & (own > 0)).astype(np.uint8) * 255
+    band = ((np.abs(coarse.depth) < _BAND_PITCHES * pitch_px) & (own > 0)).astype(np.uint8) * 255
     chains, _ = cv2.findContours(
         cv2.bitwise_and(mask, coarse.enlarged(band, mask.shape)), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
     )
@@ -62,9 +62,9 @@ def edge_chains(mask: Bytes, coarse: CoarseBlock, pitch: float) -> Chains:
     return Chains(points, np.repeat(starts, sizes), np.repeat(sizes, sizes))
 
 
-def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) -> WallEnds:
+def find_ends(chains: Chains, coarse: CoarseBlock, pitch_px: float, wall: float) -> WallEnds:
     """Points where the two arms along the chain lie about a wall's width apart and the point sticks out of them."""
-    arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch)))
+    arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch_px)))
     everywhere = np.arange(len(chains.points))
     gap, stick, out = _arms(chains, everywhere, arm)
     # A sharp corner of a small cell has close arms too, but sticks out into the wall. A wall one pixel wide has none
@@ -73,9 +73,9 @@ def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) ->
     candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm) & (free > -0.5)
     peak = _peaks(chains, np.where(candidate, stick - 0.5 * gap, -np.inf), arm)
     depth = coarse.depth_at(chains.points[peak])
-    peak = peak[np.abs(depth) < _DEPTH_PITCHES * pitch]
+    peak = peak[np.abs(depth) < _DEPTH_PITCHES * pitch_px]
     # The arms are let out for as long as they stay a wall's width apart: that much of the wall is straight.
-    longest = max(arm + 1, round(0.55 * pitch))
+    longest = max(arm + 1, round(0.55 * pitch_px))
     straight, axis = np.full(len(peak), float(arm)), _arms(chains, peak, arm)[2]
     still = np.ones(len(peak), np.bool_)
     for length in range(arm + 1, longest + 1):
@@ -106,18 +106,18 @@ def _peaks(chains: Chains, score: Float64s, reach: int) -> Int64s:
     return best
 
 
-def outermost(chains: Chains, coarse: CoarseBlock, pitch: float) -> Int64s:
+def outermost(chains: Chains, coarse: CoarseBlock, pitch_px: float) -> Int64s:
     """Indices of the chain points that reach further out of the block than all within 0.4 pitch along their chain.
 
     The wall must lie behind them, seen from outside, and no other such point within a pitch may reach a third of a
     pitch further out: that one would hide it from the cut.
     """
-    near = np.abs(coarse.depth_at(chains.points)) < 0.5 * pitch
+    near = np.abs(coarse.depth_at(chains.points)) < 0.5 * pitch_px
     height = np.where(near, coarse.height_at(chains.points), -np.inf)
-    peak = _peaks(chains, height, max(2, round(0.4 * pitch)))
+    peak = _peaks(chains, height, max(2, round(0.4 * pitch_px)))
     _, _, normal = coarse.feet(chains.points[peak])
     peak = peak[(chains.free_side(peak, 3) * normal).sum(axis=1) > 0]
     points, level = chains.points[peak], height[peak]
-    close = ((points[:, None, :] - points[None, :, :]) ** 2).sum(axis=2) < pitch * pitch
+    close = ((points[:, None, :] - points[None, :, :]) ** 2).sum(axis=2) < pitch_px * pitch_px
     envelope = np.where(close, level[None, :], -np.inf).max(axis=1) if len(peak) else level
-    return np.asarray(peak[level > envelope - pitch / 3], np.int64)
+    return np.asarray(peak[level > envelope - pitch_px / 3], np.int64)

@@ -70,7 +70,7 @@ def picture(
 @pytest.mark.parametrize("pitch_mm", [3.0, 5.0, 8.0, 14.0, 22.0])
 def test_the_pitch_is_read_from_the_picture(pitch_mm: float) -> None:
     rendered = picture(pitch_mm)
-    assert probe(wall_light(rendered.picture), "auto").pitch == pytest.approx(rendered.pitch_px, rel=0.1)
+    assert probe(wall_light(rendered.picture), "auto").pitch_px == pytest.approx(rendered.pitch_px, rel=0.1)
 
 
 @pytest.mark.parametrize("dark", [False, True])

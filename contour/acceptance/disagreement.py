@@ -18,6 +18,7 @@ import numpy as np
 from contour.acceptance.block_level import told_by_level
 from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s
 from contour.geometry.rings import Contour, Ring
+from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
 _PITCH_PX = 6
 _SHARE_OF_LEVEL = 0.5
@@ -62,7 +63,7 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreem
     finding.
     """
     shrink = max(1, int(pitch_px / _PITCH_PX))
-    small = _reduced(picture, shrink)
+    small = whole_averaged(picture, shrink)
     small_pitch_px = pitch_px / shrink
     busy = _without_small_gaps(_busy(small, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
     ours = _drawn(contour, busy.shape[:2], shrink)
@@ -86,18 +87,9 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreem
         (*_farthest(inside, points, _BLUR_PITCHES * small_pitch_px), False),
     ]
     apart, place, claims = max(farthest, key=lambda one: one[0])
-    x, y = ((value + 0.5) * shrink - 0.5 for value in place)
+    x, y = pixels_of(np.array(place), shrink).tolist()
     on_the_whole = float(np.median(_at(outside, points) - _at(inside, points)))
     return Disagreement(apart / small_pitch_px, (x, y), claims, on_the_whole / small_pitch_px)
-
-
-def _reduced(picture: Bytes, shrink: int) -> Bytes:
-    if shrink == 1:
-        return picture
-    size = (max(1, picture.shape[1] // shrink), max(1, picture.shape[0] // shrink))
-    # A whole number of pixels each: averaging them is several times faster then.
-    whole = picture[: size[1] * shrink, : size[0] * shrink]
-    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _busy(small: Bytes, small_pitch_px: float) -> Bytes:
@@ -130,7 +122,7 @@ def _opened(mask: Bytes, shape: Bytes) -> Bytes:
 
 def _drawn(contour: Contour, shape: tuple[int, int], shrink: int) -> Bytes:
     mask = np.zeros(shape, np.uint8)
-    rings = [_fixed_point((ring + 0.5) / shrink - 0.5) for ring in contour.rings]
+    rings = [_fixed_point(samples_of(ring, shrink)) for ring in contour.rings]
     cv2.fillPoly(mask, rings, 255, cv2.LINE_8, _FRACTION_BITS)
     return mask
 
@@ -172,7 +164,7 @@ def _widest(difference: Bytes) -> tuple[float, tuple[float, float]]:
 def _reduced_points(contour: Contour, spacing_px: float, shrink: int) -> Float64s:
     """Points at equal spacing along all rings, in the reduced picture, shape (N, 2)."""
     rings = [_along(ring, spacing_px) for ring in contour.rings]
-    return np.asarray((np.concatenate(rings) + 0.5) / shrink - 0.5, np.float64)
+    return samples_of(np.concatenate(rings), shrink)
 
 
 def _along(ring: Ring, spacing: float) -> Ring:

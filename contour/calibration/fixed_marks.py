@@ -10,6 +10,7 @@ from contour.errors import CalibrationError
 from contour.geometry.arrays import Bytes, Float64s
 from contour.image.opencv import grey, shrunk
 from contour.image.opencv_boards import find_marks, known_dictionaries, refined_corners
+from contour.image.pixel_grid import pixels_of
 
 REACH_SIDES, REACH_PX = 0.75, 30.0
 """A mark is searched this far around its place, 30 px at least. What was knocked farther is found by a search of the
@@ -132,7 +133,7 @@ def _around(picture: Bytes, mark: Mark, dictionary: str) -> Mark | None:
     same = np.flatnonzero(found.ids == mark.id)
     if len(same) != 1:
         return None
-    corners = (found.corners_px[same[0]] + 0.5) * factor - 0.5
+    corners = pixels_of(found.corners_px[same[0]], factor)
     fine = refined_corners(window, corners, int(np.clip(mark.side_px / 16, 2, 8)))
     return Mark(mark.id, fine + np.array([left, top]))
 

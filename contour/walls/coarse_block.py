@@ -10,6 +10,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, Int64s
 from contour.geometry.rings import Ring
+from contour.image.pixel_grid import averaged, enlarged, pixels_of, samples_of
 from contour.image.pixel_sampling import sample_at
 from contour.walls.coarse_threads import without_threads
 
@@ -88,7 +89,7 @@ class CoarseBlock:
     def strands_near(self, reach: float) -> Float64s:
         """Places of strands within `reach` mask pixels outside of the coarse edge, shape (K, 2), mask pixels."""
         rows, columns = np.nonzero(self.strands & (self.depth > -reach))
-        return np.asarray((np.stack([columns, rows], axis=1) - _PAD + 0.5) * self.step - 0.5, np.float64)
+        return pixels_of(np.stack([columns, rows], axis=1) - _PAD, self.step)
 
     def feet(self, points: Float64s) -> tuple[Int64s, Float64s, Float64s]:
         """Ring number, arc length and outward normal at the foot of each point on its nearest ring."""
@@ -113,8 +114,7 @@ class CoarseBlock:
 
     def enlarged(self, grid: Bytes, shape: tuple[int, ...]) -> Bytes:
         """A map on the coarse grid at the size of the wall mask, whose `shape` is (H, W)."""
-        rows = np.repeat(self.unpadded(grid), self.step, axis=0)
-        return np.repeat(rows, self.step, axis=1)[: shape[0], : shape[1]]
+        return enlarged(self.unpadded(grid), self.step, shape)
 
     def _nearest_at(self, points: Float64s) -> Int32s:
         grid = np.rint(self._grid(points)).astype(np.int64)
@@ -122,7 +122,7 @@ class CoarseBlock:
         return self.nearest[np.clip(grid[:, 1], 0, height - 1), np.clip(grid[:, 0], 0, width - 1)]
 
     def _grid(self, points: Float64s) -> Float64s:
-        return (points + 0.5) / self.step - 0.5 + _PAD
+        return samples_of(points, self.step) + _PAD
 
 
 def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
@@ -132,7 +132,7 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     """
     # A whole number of pixels a sample: averaging is several times faster so.
     step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
-    small = _averaged(mask, step, cv2.BORDER_CONSTANT)
+    small = averaged(mask, step)
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = _padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch_px / step
@@ -140,7 +140,7 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     filled, kept = _linked(walls, kept, _close(kept, _CLOSING_PITCHES * samples), samples)
     filled = without_threads(_largest(filled | kept), samples)
     kept &= filled
-    shade = _padded(_averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
+    shade = _padded(averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
     filled = _fill_missing_cells(filled, kept, shade, _HOLE_RADIUS_PITCHES * samples)
     if len(_sides(filled, samples)) == 4:
         raise NoBlockFound(
@@ -241,14 +241,6 @@ def _padded(grid: Bytes, border: int) -> Bytes:
     return np.asarray(cv2.copyMakeBorder(grid, _PAD, _PAD, _PAD, _PAD, border, value=0), np.uint8)
 
 
-def _averaged(picture: Bytes, step: int, border: int) -> Bytes:
-    """Mean over squares of `step` pixels, the last ones filled up."""
-    wide, high = -picture.shape[1] % step, -picture.shape[0] % step
-    even = cv2.copyMakeBorder(picture, 0, high, 0, wide, border, value=0)
-    size = (even.shape[1] // step, even.shape[0] // step)
-    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
 def _fill_missing_cells(filled: Bytes, walls: Bytes, shade: Bytes, radius: float) -> Bytes:
     """The block with every inner opening filled in which no disc of `radius` fits, or that is as dark as dark walls.
 
@@ -313,10 +305,10 @@ def _ring(chain: Int32s, is_hole: bool, step: int, samples: float) -> CoarseRing
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     # The chain runs through sample centres, half a sample inside the filled block (outside of it along a hole).
-    vertices = (smooth - _PAD + 0.5) * step - 0.5 + (0.5 * step) * normal
+    vertices = pixels_of(smooth - _PAD, step) + (0.5 * step) * normal
     lengths = np.linalg.norm(np.roll(vertices, -1, axis=0) - vertices, axis=1)
     arc = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-    base = (ahead - _PAD + 0.5) * step - 0.5
+    base = pixels_of(ahead - _PAD, step)
     return CoarseRing(vertices, base, arc, normal, float(lengths.sum()), is_hole)
 
 

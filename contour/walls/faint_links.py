@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes
+from contour.image.pixel_grid import averaged, enlarged
 
 _SAMPLES_PER_PITCH = 6.5
 _COVERAGE = 0.12
@@ -44,16 +45,12 @@ def with_faint_links(mask: Bytes, faint: Bytes, pitch_px: float) -> Bytes:
     count, parts = cv2.connectedComponents((strands | links).astype(np.uint8), connectivity=8)
     leads = np.isin(np.arange(count), np.unique(parts[strands]))
     links &= (joined == joined[main][0]) & leads[parts]
-    where = np.repeat(np.repeat(links, step, axis=0), step, axis=1)[: mask.shape[0], : mask.shape[1]]
-    return np.asarray(np.where(where, mask | faint, mask), np.uint8)
+    return np.asarray(np.where(enlarged(links, step, mask.shape), mask | faint, mask), np.uint8)
 
 
 def _coarse(mask: Bytes, step: int) -> Bytes:
     """1 where an eighth of a square of `step` pixels is wall, the last squares filled up."""
-    wide, high = -mask.shape[1] % step, -mask.shape[0] % step
-    even = cv2.copyMakeBorder(mask, 0, high, 0, wide, cv2.BORDER_CONSTANT, value=0)
-    small = cv2.resize(even, (even.shape[1] // step, even.shape[0] // step), interpolation=cv2.INTER_AREA)
-    return np.asarray((small > 255 * _COVERAGE).astype(np.uint8), np.uint8)
+    return (averaged(mask, step) > 255 * _COVERAGE).astype(np.uint8)
 
 
 def _within(places: Bools, radius: float) -> Bools:

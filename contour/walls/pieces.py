@@ -9,6 +9,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes
 from contour.geometry.rings import Ring
+from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 from contour.walls.coarse_block import CoarseBlock
 
 _SAMPLES_PER_PITCH = 6.5
@@ -50,10 +51,8 @@ def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) 
     """
     step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
     samples = pitch_px / step
-    size = (max(1, mask.shape[1] // step), max(1, mask.shape[0] // step))
-    small = cv2.resize(mask[: size[1] * step, : size[0] * step], size, interpolation=cv2.INTER_AREA)
-    walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
-    outline = np.rint((exterior + 0.5) / step - 0.5).astype(np.int32)
+    walls = (whole_averaged(mask, step) > 255 * _WALL_COVERAGE).astype(np.uint8)
+    outline = np.rint(samples_of(exterior, step)).astype(np.int32)
     cv2.fillPoly(walls, [outline], 0)
     cv2.polylines(walls, [outline], True, 0, max(1, round(2 * _MARGIN_PITCHES * samples)))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
@@ -66,7 +65,7 @@ def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) 
         if filled is not None:
             whole = step * scale
             box = (x * whole, y * whole, (x + w) * whole, (y + h) * whole)
-            ring = (_outline(filled) + (x, y) + 0.5) * whole - 0.5
+            ring = pixels_of(_outline(filled) + np.array([x, y]), whole)
             found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring))
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Float64s
+from contour.image.pixel_grid import pixels_of, samples_of
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.coarse_block import CoarseBlock, coarse_block
 from contour.walls.dark_material import dark_beyond, dark_edge, midway_to_table
@@ -117,7 +118,7 @@ def _with_beside(
     if midway is not None:
         edge = dark_edge(light, coarse, pitch_px, midway)[:: max(1, round(pitch_px / _DARK_POINTS_PER_PITCH))]
         beside = np.concatenate([beside, edge])
-    ring, points = coarse.feet(beside)[0], (beside + 0.5) * scale - 0.5
+    ring, points = coarse.feet(beside)[0], pixels_of(beside, scale)
     rings = tuple(replace(one, beside=points[ring == number]) for number, one in enumerate(evidence.rings))
     return replace(evidence, rings=rings)
 
@@ -149,7 +150,7 @@ def _evidence(
     sign = 1.0 if cells.bright else -1.0
     straight = found.straight * scale
     tip, axis = centred_axes(
-        light, (found.tip + 0.5) * scale - 0.5, found.axis, wall=cells.wall_px, straight=straight, sign=sign
+        light, pixels_of(found.tip, scale), found.axis, wall=cells.wall_px, straight=straight, sign=sign
     )
     depth = parallax(light, tip, axis, straight=straight, wall=cells.wall_px, sign=sign)
     if depth.width is not None:
@@ -160,14 +161,14 @@ def _evidence(
     model = _learnt(light, ends, cells, depth.width or cells.wall_px, seen)
     tips = _tips(light, ends, cells, model)
     if midway is not None:
-        normal = coarse.feet((tips.points + 0.5) / scale - 0.5)[2]
+        normal = coarse.feet(samples_of(tips.points, scale))[2]
         # A clean end is where the wall ends; what is dark beyond it is the block's shadow.
         faded = (depth.across(tips.points, normal) >= 0.0) & (tips.kind != WitnessKind.CLEAN)
         least = np.where(faded, _ENDS_INSIDE_PITCHES * cells.pitch_px, np.inf)
         tips = _to_the_table(light, tips, tips.points, normal, least, cells.pitch_px, midway)
-    tips = replace(tips, points=_raised(tips.points, coarse.feet((tips.points + 0.5) / scale - 0.5)[2], depth))
-    outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch_px]
-    normal, place = coarse.feet(outer)[2], (outer + 0.5) * scale - 0.5
+    tips = replace(tips, points=_raised(tips.points, coarse.feet(samples_of(tips.points, scale))[2], depth))
+    outer = outer[_nearest(outer, samples_of(tips.points, scale)) > _LONELY_PITCHES * pitch_px]
+    normal, place = coarse.feet(outer)[2], pixels_of(outer, scale)
     sides = _sides(light, place, normal, depth.width or cells.wall_px, model)
     if midway is not None:
         faint = (sides.sigma >= _FAINT_SIGMA_PX) & (depth.across(place, normal) >= 0.0)
@@ -281,14 +282,14 @@ def _rings(
     """All witnesses, each at its nearest ring, in order along it, and the walls about it."""
     points = np.concatenate([tips.points, sides.points])
     kind, sigma = np.concatenate([tips.kind, sides.kind]), np.concatenate([tips.sigma, sides.sigma])
-    ring, arc, normal = coarse.feet((points + 0.5) / scale - 0.5)
+    ring, arc, normal = coarse.feet(samples_of(points, scale))
     beside, foot, across = coarse.feet(walls)
-    wall_points = WallPoints(_raised((walls + 0.5) * scale - 0.5, across, depth), foot * scale, across)
+    wall_points = WallPoints(_raised(pixels_of(walls, scale), across, depth), foot * scale, across)
     evidence = []
     for number, one in enumerate(coarse.rings):
         mine = np.flatnonzero(ring == number)
         mine = mine[np.argsort(arc[mine], kind="stable")]
-        vertices = (one.vertices + 0.5) * scale - 0.5
+        vertices = pixels_of(one.vertices, scale)
         arcs = arc[mine] * scale
         seen = (points[mine], arcs, normal[mine], sigma[mine], kind[mine], wall_points.take(beside == number))
         evidence.append(RingEvidence(vertices, one.is_hole, *seen))

@@ -11,7 +11,7 @@ from contour.calibration.calibration import CameraCalibration
 from contour.camera_calibration.board import Board
 from contour.camera_calibration.board_detection import BoardView
 from contour.camera_calibration.calibration_spread import noise_px
-from contour.camera_calibration.calibration_verdict import Verdict, judge_calibration
+from contour.camera_calibration.calibration_verdict import Solution, Verdict, judge_calibration
 from contour.camera_calibration.length_check import (
     REFUSE_SHARE,
     KnownLength,
@@ -110,7 +110,7 @@ def calibrate_camera(
     plane = [view.name for view in kept].index(setup.plane)
     calibration = _calibration(solved, plane, size, setup)
     lengths = _lengths(calibration, board, setup)
-    verdict = judge_calibration(observed, size, model, solved, plane, setup, lengths, on_progress)
+    verdict = judge_calibration(observed, Solution(size, model, solved, plane), setup, lengths, on_progress)
     calibration = replace(calibration, uncertainty=verdict.uncertainty)
     misses = tuple(residuals(observed, solved))
     noise = noise_px(observed, solved, model)

@@ -110,24 +110,32 @@ class Verdict:
         return self.judgement is Judgement.GOOD
 
 
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A camera solved from views of `size` (width, height), whose work plane is that of view number `plane`."""
+
+    size: tuple[int, int]
+    model: LensModel
+    solved: cv.Solved
+    plane: int
+
+
 def judge_calibration(
     views: Sequence[Observed],
-    size: tuple[int, int],
-    model: LensModel,
-    solved: cv.Solved,
-    plane: int,
+    solution: Solution,
     demands: Demands,
     lengths: Sequence[LengthCheck],
     on_progress: Progress,
 ) -> Verdict:
-    """The verdict on a solution whose work plane is that of view number `plane`, and on lengths that it gives."""
+    """The verdict on a solution, and on lengths that it gives."""
+    size, model, solved, plane = solution.size, solution.model, solution.solved, solution.plane
     heights = np.array(sorted({0.0, demands.block_mm / 2, demands.block_mm, 2 * demands.block_mm}))
     grid = places(size)
     lifted = heights - demands.board_thickness_mm
     spread = covariance(views, solved, model, plane)
     variances = [position_variances(solved, model, plane, spread, grid, height) for height in lifted]
     propagated = np.stack([np.sqrt(np.trace(one, axis1=1, axis2=2)) for one in variances])
-    halves = _halves(views, size, model, solved, plane, lifted, grid, on_progress)
+    halves = _halves(views, solution, lifted, grid, on_progress)
     zones = covered_zones([view.pixels for view in views], size)
     inside = zones.inside(grid)
     inflation = _inflation(halves[:, inside], propagated[:, inside])
@@ -171,16 +179,10 @@ def finite(values: Float64s) -> Float64s:
 
 
 def _halves(
-    views: Sequence[Observed],
-    size: tuple[int, int],
-    model: LensModel,
-    solved: cv.Solved,
-    plane: int,
-    heights: Float64s,
-    grid: Float64s,
-    on_progress: Progress,
+    views: Sequence[Observed], solution: Solution, heights: Float64s, grid: Float64s, on_progress: Progress
 ) -> Float64s:
     """Distance between the maps of two halves, root mean square over the splits, shape (heights, places), mm."""
+    solved, plane = solution.solved, solution.plane
     rng = np.random.default_rng(len(views))
     others = [index for index in range(len(views)) if index != plane]
     squares, used = np.zeros((len(heights), len(grid))), 0
@@ -191,7 +193,7 @@ def _halves(
         for which in (0, 1):
             # Both halves need the plane view: each takes every other corner of it.
             half = [views[plane].half(which), *(views[index] for index in order[which::2])]
-            found = solve(half, size, model, (solved.camera_matrix, solved.distortion))
+            found = solve(half, solution.size, solution.model, (solved.camera_matrix, solved.distortion))
             if found is None:
                 break
             maps.append([on_plane(found, found.rotations[0], found.translations[0], grid, one) for one in heights])

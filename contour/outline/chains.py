@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.geometry.arrays import Bools, Float64s, Indices
 from contour.outline.corners import Joints
-from contour.outline.free_curves import Curve, smooth_curve
+from contour.outline.free_curves import Curve, Guide, smooth_curve
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE
 from contour.outline.lines_and_arcs import feet
 from contour.outline.runs import Segments
@@ -27,7 +27,7 @@ class Chain:
 
     segments: tuple[int, ...]
     curve: Curve
-    witnesses: np.ndarray[tuple[int], np.dtype[np.intp]]
+    witnesses: Indices
 
 
 def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed: Float64s) -> list[Chain]:
@@ -62,9 +62,9 @@ def _as_curve(
     index = np.concatenate([(segments.first[k] + np.arange(segments.length[k])) % len(witnesses) for k in members])
     if len(index) < 8:
         return None
-    guide, place, length = _guide(witnesses, segments, members, index, closed)
+    guide = _guide(witnesses, segments, members, index, closed)
     sound = np.abs(signed[index]) < 4.0 * witnesses.outer[index]
-    curve = smooth_curve(witnesses, index, guide, place, length=length, sound=sound, closed=closed)
+    curve = smooth_curve(witnesses, index, guide, sound)
     price = sum(PRICE_ARC if segments.bend[k] else PRICE_LINE for k in members)
     present = float(cost(witnesses, signed[index], index).sum()) + price
     if curve.nats + _PRICE_OF_FREEDOM * curve.freedom < present:
@@ -97,15 +97,12 @@ def _runs(segments: Segments, linked: Bools) -> list[tuple[list[int], bool]]:
     return found
 
 
-def _guide(
-    witnesses: Witnesses, segments: Segments, members: list[int], index: Indices, closed: bool
-) -> tuple[Complexes, Float64s, float]:
-    """Feet of the witnesses at `index` on their own members, their arc length along them (rising), and the whole
-    length."""
+def _guide(witnesses: Witnesses, segments: Segments, members: list[int], index: Indices, closed: bool) -> Guide:
+    """Feet of the witnesses at `index` on their own members."""
     owner = np.repeat(members, segments.length[members])
     foot, tangent = feet(segments.models.take(owner), witnesses.points[index])
     way = np.roll(foot, -1) - foot
     middle = tangent + np.roll(tangent, -1)
     forward = np.maximum((way * middle.conj()).real / np.maximum(np.abs(middle), 1e-9), 0.0)
     place = np.concatenate([[0.0], np.cumsum(forward[:-1])])
-    return foot, place, float(place[-1] + (forward[-1] if closed else 0.0))
+    return Guide(foot, place, float(place[-1] + (forward[-1] if closed else 0.0)), closed)

@@ -19,7 +19,7 @@ from contour.outline.lines_and_arcs import distance
 from contour.outline.missed_walls import overlooked, with_bounds
 from contour.outline.proposals import FEW, gather, propose
 from contour.outline.runs import Segments, around, fitted, runs
-from contour.outline.spread import unseen_share, vertex_sigma
+from contour.outline.spread import Vertices, unseen_share, vertex_sigma
 from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
 from contour.walls.wall_evidence import RingEvidence
 
@@ -94,15 +94,15 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
     found = bevelled(witnesses, segments, found, inlier, _material(evidence, rectifier))
-    ring, owners = polygon(witnesses, segments, found, chains)
+    vertices = _vertices(witnesses, segments, found, chains)
     spread = _spread(residual[inlier], wall_px)
     free = np.isin(np.arange(len(segments)), [k for chain in chains for k in chain.segments])
-    sigma = vertex_sigma(witnesses, segments, inlier, ring=ring, owners=owners, free=free, spread=spread)
-    vertices = np.column_stack([ring.real, ring.imag])
+    sigma = vertex_sigma(witnesses, segments, inlier, vertices, free=free, spread=spread)
+    ring = np.column_stack([vertices.ring.real, vertices.ring.imag])
     if rectifier is not None:
-        vertices = rectifier.unrectify(vertices)
+        ring = rectifier.unrectify(ring)
     pieces = len(segments) - sum(len(chain.segments) - 1 for chain in chains)
-    return FittedRing(vertices, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces)
+    return FittedRing(ring, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces)
 
 
 def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complexes:
@@ -168,11 +168,8 @@ def _spread(residual: Float64s, wall_px: float) -> float:
     return float(1.4826 * np.median(np.abs(residual))) if len(residual) >= _FEWEST else max(wall_px, 1.0)
 
 
-def polygon(witnesses: Witnesses, segments: Segments, found: Joints, chains: list[Chain]) -> tuple[Complexes, Indices]:
-    """Vertices of the ring, complex, and the two segments that meet in each, shape (M, 2).
-
-    Joints, and between them the chords of arcs and curves.
-    """
+def _vertices(witnesses: Witnesses, segments: Segments, found: Joints, chains: list[Chain]) -> Vertices:
+    """The ring's vertices: joints, and between them the chords of arcs and curves."""
     if len(segments) == 1:
         return _alone(witnesses, segments)
     total = len(segments)
@@ -190,7 +187,7 @@ def polygon(witnesses: Witnesses, segments: Segments, found: Joints, chains: lis
             start, stop = within(chain.curve, complex(begin[k]), complex(found.end[last]))
             inner = curve_points(chain.curve, _CHORD_PX, start, stop)
             if chain.curve.closed:
-                return inner, _members(chain, len(inner))
+                return Vertices(inner, _members(chain, len(inner)))
         elif segments.bend[k]:
             stops = complex(begin[k]), complex(found.end[k])
             inner = arc_points(
@@ -204,7 +201,7 @@ def polygon(witnesses: Witnesses, segments: Segments, found: Joints, chains: lis
         owners += [(last, (last + 1) % total)]
     ring = np.concatenate(parts)
     keep = thinned(ring, _FLAT_PX)
-    return ring[keep], np.array(owners, dtype=np.intp)[keep]
+    return Vertices(ring[keep], np.array(owners, dtype=np.intp)[keep])
 
 
 def _members(chain: Chain, count: int) -> Indices:
@@ -219,8 +216,8 @@ def _run(witnesses: Witnesses, segments: Segments, k: int) -> float:
     return float(witnesses.gap[inner].sum())
 
 
-def _alone(witnesses: Witnesses, segments: Segments) -> tuple[Complexes, Indices]:
+def _alone(witnesses: Witnesses, segments: Segments) -> Vertices:
     """The ring of a single circle."""
     start = complex(witnesses.points[0])
     ring = arc_points(segments.models.take((0,)), start, start, run=0.0, tolerance=_CHORD_PX, whole=True)
-    return ring, np.zeros((len(ring), 2), dtype=np.intp)
+    return Vertices(ring, np.zeros((len(ring), 2), dtype=np.intp))

@@ -40,23 +40,26 @@ class Curve:
         return (value * near).sum(axis=1), (slope * near).sum(axis=1)
 
 
-def smooth_curve(
-    witnesses: Witnesses,
-    index: np.ndarray[tuple[int], np.dtype[np.intp]],
-    guide: Complexes,
-    place: Float64s,
-    *,
-    length: float,
-    sound: Bools,
-    closed: bool,
-) -> Curve:
-    """The spline through the witnesses at `index`, starting from `guide`: a first guess of each one's foot.
+@dataclass(frozen=True)
+class Guide:
+    """A first guess of a curve: each witness's foot, its arc length along the curve (rising), the whole length, pixels,
+    and whether it closes.
+    """
 
-    place: arc length of each foot, of `length` pixels. sound: the feet to start from. Each round moves the feet along
+    foot: Complexes
+    place: Float64s
+    length: float
+    closed: bool
+
+
+def smooth_curve(witnesses: Witnesses, index: Indices, guide: Guide, sound: Bools) -> Curve:
+    """The spline through the witnesses at `index`, starting from a guide.
+
+    sound: the feet to start from. Each round moves the feet along
     the curve and solves the robust penalised least squares of the distances across it, penalising the third
     derivative (a circle costs little); smoothness by generalised cross-validation.
     """
-    length = max(length, 1e-6)
+    closed, place, length = guide.closed, guide.place, max(guide.length, 1e-6)
     count = int(np.clip(np.ceil(length / (_KNOT_PITCHES * witnesses.pitch_px)), 4, _MOST_KNOTS))
     knots = count if closed else count + 3
     rough = _roughness(knots, closed)
@@ -65,7 +68,7 @@ def smooth_curve(
     hold = np.where(sound, 1.0, 1e-3)
     control = np.linalg.solve(
         _gathered(column, value, value * hold[:, None], knots) + 1e-2 * bent + 1e-9 * np.eye(knots),
-        _summed(column, value * (hold * guide)[:, None], knots),
+        _summed(column, value * (hold * guide.foot)[:, None], knots),
     )
     points = witnesses.points[index]
     freedom = float(knots)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
@@ -15,24 +17,27 @@ _MOST = 1.0
 _MOST_FREE = 0.25
 
 
+@dataclass(frozen=True)
+class Vertices:
+    """Vertices of a ring, complex, shape (M,), and the two segments that meet in each, twice the same inside one, shape
+    (M, 2).
+    """
+
+    ring: Complexes
+    owners: Indices
+
+
 def vertex_sigma(
-    witnesses: Witnesses,
-    segments: Segments,
-    inlier: Bools,
-    *,
-    ring: Complexes,
-    owners: Indices,
-    free: Bools,
-    spread: float,
+    witnesses: Witnesses, segments: Segments, inlier: Bools, vertices: Vertices, *, free: Bools, spread: float
 ) -> Float64s:
     """Standard deviation of each vertex, shape (M,), pixels: of its place across its segment, or of a corner's place.
 
-    owners: the two segments that meet in each vertex (twice the same inside one), shape (M, 2). A segment's own
-    deviation at a place is the residual spread times the root of the fit's leverage there; a corner's is both of its
-    edges', over the sine of the angle between them. A segment of one witness says nothing of its own direction, so no
-    vertex counts with more than `_MOST`: an outline farther off leaves walls out, and that is told apart. free:
-    segments of a curve that is drawn through all their witnesses together, shape (K,).
+    A segment's own deviation at a place is the residual spread times the root of the fit's leverage there; a corner's
+    is both of its edges', over the sine of the angle between them. A segment of one witness says nothing of its own
+    direction, so no vertex counts with more than `_MOST`: an outline farther off leaves walls out, and that is told
+    apart. free: segments of a curve that is drawn through all their witnesses together, shape (K,).
     """
+    ring, owners = vertices.ring, vertices.owners
     index, multiplicity = stretch(len(witnesses), segments.first, segments.length)
     weight = multiplicity * inlier[index]
     count = np.maximum(weight.sum(axis=1), 1.0)

@@ -89,9 +89,9 @@ def cutting_polygon(
         polygon = _in_pixels(contour_px, finish)
     else:
         traced_mm = convert(contour_px, calibration, height_mm)
-        mm_per_px = float(scales(calibration, contour_px.exterior, height_mm).max())
+        plane = _Plane(calibration, height_mm, float(scales(calibration, contour_px.exterior, height_mm).max()))
         on_stage("convert")
-        polygon = _in_millimetres(contour_px, traced_mm, calibration, height_mm, mm_per_px, tolerance_mm, finish)
+        polygon = _in_millimetres(contour_px, traced_mm, plane, tolerance_mm, finish)
     on_stage("simplify")
     return polygon
 
@@ -106,14 +106,17 @@ def _in_pixels(contour_px: Contour, finish: Finish) -> Polygon:
     return Polygon(pixels, None, area(pixels), None, None, _shift(contour_px, pixels))
 
 
+@dataclass(frozen=True)
+class _Plane:
+    """The traced plane's height above the table, and its coarsest scale along the contour."""
+
+    calibration: Calibration
+    height_mm: float
+    mm_per_px: float
+
+
 def _in_millimetres(
-    contour_px: Contour,
-    traced_mm: Contour,
-    calibration: Calibration,
-    height_mm: float,
-    mm_per_px: float,
-    tolerance_mm: float,
-    finish: Finish,
+    contour_px: Contour, traced_mm: Contour, plane: _Plane, tolerance_mm: float, finish: Finish
 ) -> Polygon:
     kept = _kept_vertices(traced_mm, tolerance_mm)
     pixels, millimetres = _subset(contour_px, kept), _subset(traced_mm, kept)
@@ -125,17 +128,16 @@ def _in_millimetres(
         moved = _with_margin(before, finish.margin_mm)
     except MarginImpossible as error:
         moved, defect = before, f"{error}. Correct margin_mm, or use a recipe for a block of this size"
-    shift_px = 0.0 if given_up_mm else _shift(traced_mm, millimetres) / mm_per_px
+    shift_px = 0.0 if given_up_mm else _shift(traced_mm, millimetres) / plane.mm_per_px
     if moved is not millimetres:
         millimetres = moved
-        rings = [calibration.to_pixels(ring, height_mm) for ring in moved.rings]
+        rings = [plane.calibration.to_pixels(ring, plane.height_mm) for ring in moved.rings]
         pixels = Contour(rings[0], tuple(rings[1:]))
     if finish.start is not None:
         first = first_vertices(millimetres, finish.start, _START_TIE_MM)
         pixels, millimetres = begun_at(pixels, first), begun_at(millimetres, first)
-    return Polygon(
-        pixels, millimetres, area(pixels), area(millimetres), mm_per_px, shift_px, given_up_mm / mm_per_px, defect
-    )
+    given_up_px = given_up_mm / plane.mm_per_px
+    return Polygon(pixels, millimetres, area(pixels), area(millimetres), plane.mm_per_px, shift_px, given_up_px, defect)
 
 
 def _budgeted(traced_mm: Contour, simplified_mm: Contour, most: int, budget_mm: float) -> tuple[Contour, float]:

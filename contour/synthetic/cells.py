@@ -147,14 +147,17 @@ def _add_waves(
         moved[axis][...] += size * np.sin(wave)
 
 
+@dataclass(frozen=True)
+class WallTones:
+    """How walls differ in tone: share of glints, relative spread, and what more walls return that face the light."""
+
+    glints: float = 0.05
+    spread: float = 0.22
+    sheen: float = 0.0
+
+
 def draw_lattice(
-    geometry: CellGeometry,
-    x: Float64s,
-    y: Float64s,
-    seed: int,
-    glints: float = 0.05,
-    spread: float = 0.22,
-    sheen: float = 0.0,
+    geometry: CellGeometry, x: Float64s, y: Float64s, seed: int, tones: WallTones = WallTones()
 ) -> Lattice:
     """The tables for all cells between the extremes of lattice coordinates x, y (mm)."""
     step_x, step_y = _steps(geometry)
@@ -170,11 +173,11 @@ def draw_lattice(
         hit = rng.random((cells, 3)) < geometry.broken
         part = rng.uniform(-1.6, 0.7, (cells, 3))
         keep[hit] = np.where(part[hit] < -0.9, GONE, part[hit])
-    tone = np.clip(1.0 + spread * rng.standard_normal((cells, 3)), 0.35, 1.7)
-    tone[rng.random((cells, 3)) < glints] *= 1.9
+    tone = np.clip(1.0 + tones.spread * rng.standard_normal((cells, 3)), 0.35, 1.7)
+    tone[rng.random((cells, 3)) < tones.glints] *= 1.9
     if geometry.kind == "honeycomb":
         normals = np.radians([90.0, 150.0, 210.0]) + math.radians(geometry.ribbon_deg)
-        tone *= 1.0 + sheen * np.cos(2.0 * (normals - 1.0))
+        tone *= 1.0 + tones.sheen * np.cos(2.0 * (normals - 1.0))
     shift = (rng.random((cells, 2)) - 0.5) * 2.0 * geometry.jitter
     lattice = Lattice(
         (i0, j0), counts, keep, tone.astype(np.float32), shift.astype(np.float32), rng.random(cells).astype(np.float32)

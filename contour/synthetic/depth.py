@@ -47,7 +47,7 @@ def relief(scene: Scene, cover: Float32s, light: Float32s) -> Relief:
     first, last = max(0, int(rows[0]) - margin), min(height, int(rows[-1]) + margin)
     for top in range(first, last, _BAND):  # bands stay in the processor's cache
         part = (slice(top, min(last, top + _BAND)), slice(left, right))
-        _march(scene, pair, fine[part], (left, top), steps, total[part], radiance[part])
+        _march(scene, pair, fine[part], (left, top), steps, Relief(total[part], radiance[part]))
     return Relief(total, radiance)
 
 
@@ -57,10 +57,10 @@ def _march(
     step: Float32s,
     origin: tuple[int, int],
     steps: int,
-    total: Float32s,
-    radiance: Float32s,
+    seen: Relief,
 ) -> None:
-    """Follow each pixel's ray down to the table, adding what it meets first to `total` and `radiance`, in place."""
+    """Follow each pixel's ray down to the table, adding what it meets first to what is seen, in place."""
+    total, radiance = seen.cover, seen.light
     reach = 1.1 * scene.cells.pitch_mm
     x = np.arange(origin[0], origin[0] + step.shape[1], dtype=np.float32)
     y = np.arange(origin[1], origin[1] + step.shape[0], dtype=np.float32)

@@ -9,6 +9,7 @@ import numpy as np
 
 from contour.geometry.arrays import Float32s, Float64s
 from contour.geometry.rings import Contour
+from contour.image.pixel_grid import pixels_of
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import moved, signed_distance
 from contour.synthetic.scene import Scene
@@ -64,8 +65,8 @@ def _machined(scene: Scene, picture: Float32s) -> None:
     camera, table = scene.camera, scene.table
     step = 16
     columns, rows = math.ceil(camera.width / step), math.ceil(camera.height / step)
-    u = (np.arange(-1, columns + 1) + 0.5) * step - 0.5
-    v = (np.arange(-1, rows + 1) + 0.5) * step - 0.5
+    u = pixels_of(np.arange(-1, columns + 1), step)
+    v = pixels_of(np.arange(-1, rows + 1), step)
     work = camera.back_project(np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2), 0.0)
     nodes = work.reshape(rows + 2, columns + 2, 2).astype(np.float32)
     fine = cv2.resize(nodes, ((columns + 2) * step, (rows + 2) * step), interpolation=cv2.INTER_LINEAR)

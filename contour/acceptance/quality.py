@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float32s
+from contour.geometry.arrays import Bytes, Float32s, Int64s
 from contour.geometry.rings import Contour, Ring
-from contour.walls.lightness import wall_light
 
 # So many pixels tell enough, and cost about a millisecond.
 _SAMPLED_PX = 60_000
@@ -72,20 +71,20 @@ class QualityLimits:
     min_contrast_to_noise: float = 4.0
 
 
-def block_quality(picture: Bytes, contour: Contour, pitch_px: float | None) -> Quality:
+def block_quality(picture: Bytes, light: Bytes, contour: Contour, pitch_px: float | None) -> Quality:
     """The quality of the walls within `contour` (pixels) in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `pitch_px` None takes the place of an unknown pitch by a usual one.
+    `light` (H, W), uint8, is the channel of it that shows the walls. `pitch_px` None takes the place of an unknown pitch
+    by a usual one.
     """
     pitch_px = pitch_px or _USUAL_PITCH_PX
-    tiles = _tiles(picture, contour.exterior, pitch_px)
-    light = wall_light(np.ascontiguousarray(tiles.reshape(-1, *tiles.shape[2:])))
-    light = light.reshape(tiles.shape[:3])
-    clipped = float(np.mean(tiles.reshape(*tiles.shape[:3], -1).max(axis=3) >= _FULL))
-    low, high = _tails(light)
-    noise = _noise(light)
+    places = _tile_places(light.shape, contour.exterior, pitch_px)
+    colours, tiles = _tiles(picture, places), _tiles(light, places)
+    clipped = float(np.mean(colours.reshape(*tiles.shape, -1).max(axis=3) >= _FULL))
+    low, high = _tails(tiles)
+    noise = _noise(tiles)
     contrast = np.maximum(high - low - _TAILS_OF_NOISE * noise, 0.0)
-    blur = _blur_px(light, contrast, noise)
+    blur = _blur_px(tiles, contrast, noise)
     return Quality(
         level=float(np.median(high)),
         contrast=float(np.median(contrast)),
@@ -134,9 +133,18 @@ def lost_in_noise(quality: Quality, limits: QualityLimits) -> str | None:
     )
 
 
-def _tiles(picture: Bytes, exterior: Ring, pitch_px: float) -> Bytes:
-    """Tiles along and inside the outline, shape (N, S, S) or (N, S, S, 3)."""
-    height, width = picture.shape[:2]
+@dataclass(frozen=True)
+class _TilePlaces:
+    """Left and top pixels of square tiles, (N,) each, and their side, pixels."""
+
+    left: Int64s
+    top: Int64s
+    side: int
+
+
+def _tile_places(shape: tuple[int, ...], exterior: Ring, pitch_px: float) -> _TilePlaces:
+    """Places of tiles along and inside the outline, in a picture of `shape` (H, W)."""
+    height, width = shape
     side = int(min(max(_LEAST_TILE_PX, round(_TILE_PITCHES * pitch_px)), height, width))
     count = int(np.clip(_SAMPLED_PX // side**2, 6, _MOST_TILES))
     low, high = np.floor(exterior.min(axis=0)), np.ceil(exterior.max(axis=0))
@@ -150,7 +158,12 @@ def _tiles(picture: Bytes, exterior: Ring, pitch_px: float) -> Bytes:
     centres = low + step * np.column_stack([columns[chosen], rows[chosen]])
     left = np.clip(np.rint(centres[:, 0] - side / 2), 0, width - side).astype(int)
     top = np.clip(np.rint(centres[:, 1] - side / 2), 0, height - side).astype(int)
-    return np.stack([picture[y : y + side, x : x + side] for x, y in zip(left, top, strict=True)])
+    return _TilePlaces(left, top, side)
+
+
+def _tiles(picture: Bytes, at: _TilePlaces) -> Bytes:
+    """The picture's tiles, shape (N, S, S) or (N, S, S, 3)."""
+    return np.stack([picture[y : y + at.side, x : x + at.side] for x, y in zip(at.left, at.top, strict=True)])
 
 
 def _tails(light: Bytes) -> tuple[Float32s, Float32s]:

@@ -39,7 +39,7 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
 
     `picture` and `rectifier` are those it was traced with.
     """
-    quality = block_quality(picture, traced.contour, traced.pitch_px)
+    quality = block_quality(picture, traced.light, traced.contour, traced.pitch_px)
     apart = None
     if traced.pitch_px is not None:
         apart = disagreement(picture, _bent(traced, traced.pitch_px, rectifier), traced.pitch_px)

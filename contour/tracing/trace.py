@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from contour.geometry.arrays import Float64s
+from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rings import Contour
 from contour.image.region import shifted
 from contour.walls.comb_likeness import Comb
@@ -36,7 +36,8 @@ class TraceSettings:
 class Trace:
     """A traced contour in pixels: exterior counter-clockwise as seen in the work frame, so negative by the shoelace.
 
-    `others` are pieces of comb beside it, `comb` what a cut block's cells look like (None where no method looked).
+    `light` is the channel in which its walls were seen, (H, W), uint8, of what was looked at. `others` are pieces of
+    comb beside it, `comb` what a cut block's cells look like (None where no method looked).
     `reaches_frame`: its walls go on to the last pixels of what was looked at.
     """
 
@@ -44,6 +45,7 @@ class Trace:
     polarity: Polarity
     pitch_px: float | None
     contour: Contour
+    light: Bytes = field(compare=False, repr=False)
     uncertainty_px: float | None = None
     others: tuple[Piece, ...] = ()
     comb: Comb | None = None

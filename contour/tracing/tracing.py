@@ -12,6 +12,7 @@ from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, oriented_contour
+from contour.image.opencv import grey
 from contour.image.picture_check import check_picture
 from contour.tracing import binarize, direct_scan, find_contours, sliding_matrix
 from contour.tracing.paper_cells import FEWEST_CELLS, EnclosedCells
@@ -60,13 +61,14 @@ def _on_mask(contour_of: _FromMask) -> _MethodCall:
     """A method that works on the wall mask's pixel centres alone."""
 
     def call(picture: Bytes, settings: TraceSettings, *, rectifier: Rectifier | None, on_stage: OnStage) -> Trace:
-        walls = binarize.binarize(picture, settings.binarize, settings.polarity)
+        light = grey(picture)
+        walls = binarize.binarize(light, settings.binarize, settings.polarity)
         on_stage("mask")
         contour = contour_of(walls, settings)
         pitch_px = walls.cells.pitch_px if walls.cells else None
         others = pieces_beside(walls.mask, contour.exterior, pitch_px) if pitch_px else ()
         on_stage("trace")
-        return Trace(settings.method, walls.polarity, pitch_px, contour, others=others)
+        return Trace(settings.method, walls.polarity, pitch_px, contour, light, others=others)
 
     return call
 

@@ -17,7 +17,7 @@ from contour.walls.coarse_block import CoarseBlock, coarse_block
 from contour.walls.dark_material import dark_beyond, dark_edge, midway_to_table
 from contour.walls.end_profile import EndModel, centred_axes, fit_ends, true_width
 from contour.walls.faint_links import with_faint_links
-from contour.walls.lightness import light_from_table, wall_light
+from contour.walls.lightness import light_from_table
 from contour.walls.pieces import pieces_beside, reaches_frame
 from contour.walls.wall_ends import Chains, edge_chains, find_ends, outermost
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WallPoints, WitnessKind
@@ -56,12 +56,11 @@ _STRANDS_PITCHES = 5.0
 _WALLS_INSIDE = 1.1
 
 
-def see_block(picture: Bytes, polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
+def see_block(picture: Bytes, light: Bytes, polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
     """Witnesses of the largest block in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `on_mask` is called when the wall mask is made. Raises PictureError, NoBlockFound.
+    `light` is its `wall_light`. `on_mask` is called when the wall mask is made. Raises NoBlockFound.
     """
-    light = wall_light(picture)
     cells = probe(light, polarity)
     if picture.ndim == 3:
         hop = 2 if cells.pitch_px > _SUBSAMPLED_PITCH else 1

@@ -152,7 +152,9 @@ def test_an_uncertainty_that_nobody_knows_is_not_within_a_limit() -> None:
 
 def traced(quality: Quality | None = None, **changes: object) -> CheckedTrace:
     """A good trace of the good polygon."""
-    return CheckedTrace(replace(Trace("wall-tips", "bright", 24.0, GOOD.pixels), **changes), quality)
+    return CheckedTrace(
+        replace(Trace("wall-tips", "bright", 24.0, GOOD.pixels, np.zeros((480, 640), np.uint8)), **changes), quality
+    )
 
 
 def test_a_contour_that_is_not_sure_within_two_cells_is_refused_whatever_the_recipe_allows() -> None:

@@ -30,7 +30,7 @@ def test_a_trace_is_checked_by_quality_and_disagreement_of_its_own_picture() -> 
     traced = trace(picture, TraceSettings())
     checked = check_trace(picture, traced, None)
     assert checked.trace is traced
-    assert checked.quality == block_quality(picture, traced.contour, traced.pitch_px)
+    assert checked.quality == block_quality(picture, picture, traced.contour, traced.pitch_px)
     assert traced.pitch_px is not None
     assert checked.disagreement == disagreement(picture, traced.contour, traced.pitch_px)
 

@@ -13,7 +13,7 @@ from unittest.mock import patch
 from contour.acceptance import trace_check
 from contour.synthetic import render
 from contour.tracing import wall_tips
-from contour.walls import see_block as wall_witnesses
+from contour.walls import see_block
 from service.config.config import Recipe
 from service.measuring import measure
 from service.measuring.measure import Measurer
@@ -28,7 +28,7 @@ _CHECKS: dict[str, tuple[tuple[ModuleType, str], ...]] = {
     "quality of the picture": ((trace_check, "block_quality"),),
     "second account of the block": ((trace_check, "_bent"), (trace_check, "disagreement")),
     "uncertainty": ((wall_tips, "uncertainty"),),
-    "other pieces, reach to the frame": ((wall_witnesses, "pieces_beside"), (wall_witnesses, "reaches_frame")),
+    "other pieces, reach to the frame": ((see_block, "pieces_beside"), (see_block, "reaches_frame")),
     "limits, comb likeness, budget": ((measure, "judge"), (measure, "error_budget")),
 }
 

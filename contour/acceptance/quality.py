@@ -74,8 +74,8 @@ class QualityLimits:
 def block_quality(picture: Bytes, light: Bytes, contour: Contour, pitch_px: float | None) -> Quality:
     """The quality of the walls within `contour` (pixels) in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `light` (H, W), uint8, is the channel of it that shows the walls. `pitch_px` None takes the place of an unknown pitch
-    by a usual one.
+    `light` (H, W), uint8, is the channel of it that shows the walls. `pitch_px` None takes the place of an unknown
+    pitch by a usual one.
     """
     pitch_px = pitch_px or _USUAL_PITCH_PX
     places = _tile_places(light.shape, contour.exterior, pitch_px)

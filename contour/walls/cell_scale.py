@@ -10,8 +10,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s
-from contour.walls.comb_likeness import Comb, surely_comb
-from contour.walls.lattice_order import lattice_order, solidity
+from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
 from contour.walls.wall_mask import wall_mask
 
 _TILE_PX = 512
@@ -173,11 +172,7 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
     if len(usual) < _LEAST_CELLS:
         return None
     inner = float(np.sqrt(2 / np.sqrt(3) * np.median(usual)))
-    # A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
-    side = max(3, round(0.7 * inner))
-    sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
-    walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
-    walls = walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
+    walls = _without_sheets(mask, max(3, round(0.7 * inner)))
     wall = wall_width(walls)
     size = inner + wall
     if wall > _WIDEST_WALL * size:
@@ -203,6 +198,16 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
         lattice_order(places[regular], size),
         solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
     )
+
+
+def _without_sheets(mask: Bytes, side: int) -> Bytes:
+    """The mask without what squares of `side` pixels fit into, unless that is most of it.
+
+    A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
+    """
+    sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
+    return walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
 
 
 def _enclosed(stats: Int32s, centroids: Float64s, shape: tuple[int, ...]) -> tuple[Float64s, Float64s, Indices]:

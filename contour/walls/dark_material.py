@@ -7,7 +7,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s
 from contour.image.pixel_sampling import sample_at
-from contour.walls.coarse_block import CoarseBlock
+from contour.walls.coarse_rings import CoarseBlock
 
 _STEP_PX = 0.5
 # How far beyond the coarse edge and inside of it the edge of dark material is looked for, and how long it is where it

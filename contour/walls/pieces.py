@@ -10,7 +10,7 @@ import numpy as np
 from contour.geometry.arrays import Bools, Bytes
 from contour.geometry.rings import Ring
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
-from contour.walls.coarse_block import CoarseBlock
+from contour.walls.coarse_rings import CoarseBlock
 
 _SAMPLES_PER_PITCH = 6.5
 _WALL_COVERAGE = 0.12

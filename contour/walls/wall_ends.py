@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s, Int64s
-from contour.walls.coarse_block import CoarseBlock
+from contour.walls.coarse_rings import CoarseBlock
 
 _BAND_PITCHES = 1.25
 _DEPTH_PITCHES = 0.9

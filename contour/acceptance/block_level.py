@@ -16,7 +16,7 @@ _FEW = 50
 _HOP = 3
 
 
-def told_by_level(level: Bytes, block: Bytes, table: Bytes) -> tuple[Bytes, Bytes]:
+def exclusive_levels(level: Bytes, block: Bytes, table: Bytes) -> tuple[Bytes, Bytes]:
     """Pixels (0 or 255) whose level only the block has, and those whose level only the table has.
 
     level: the picture's mean over a cell, grey (H, W) or BGR (H, W, 3). block, table: samples of both (not 0). Where

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from contour.acceptance.block_level import told_by_level
+from contour.acceptance.block_level import exclusive_levels
 from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s
 from contour.geometry.rings import Contour, Ring
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
@@ -71,9 +71,9 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreem
     level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)
     # Glare hides walls, and scratches crowd; but the one stays as light as the block, the other as the table.
-    told = told_by_level(level, np.asarray(cv2.bitwise_and(ours, busy), np.uint8), quiet_table)
+    exclusive = exclusive_levels(level, np.asarray(cv2.bitwise_and(ours, busy), np.uint8), quiet_table)
     # Squares cost a tenth of discs.
-    only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * small_pitch_px)) for mask in told)
+    only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * small_pitch_px)) for mask in exclusive)
     theirs = _touched(_opened(_but(busy, only_table), _disc(_SCRATCH_PITCHES * small_pitch_px)), ours)
     busy = np.asarray(cv2.bitwise_or(busy, only_block), np.uint8)
     # The picture's border is no block, and block ends there.

@@ -99,7 +99,7 @@ class Calibration(Protocol):
         ...
 
 
-class Frames:
+class CalibrationBase:
     """What both forms share: the alignment and the picture's size."""
 
     image_width: int
@@ -141,7 +141,7 @@ class Frames:
 
 
 @dataclass(frozen=True)
-class SimpleCalibration(Frames):
+class SimpleCalibration(CalibrationBase):
     """One scale for the whole picture: a camera that looks straight down through a lens without distortion.
 
     `mm_per_pixel` holds on the plane z = `plane_height_mm`. How the scale changes with height depends on the
@@ -192,7 +192,7 @@ class SimpleCalibration(Frames):
 
 
 @dataclass(frozen=True, eq=False)
-class CameraCalibration(Frames):
+class CameraCalibration(CalibrationBase):
     """A pinhole camera with lens distortion, and where the work frame lies before it (OpenCV's conventions).
 
     `camera_matrix` is (3, 3); `distortion_coefficients` hold 4, 5, 8, 12 or 14 numbers (plumb_bob: k1 k2 p1 p2 k3);

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.calibration.calibration import HEIGHT_BOUND_MM, Alignment, Frames, scales
+from contour.calibration.calibration import HEIGHT_BOUND_MM, Alignment, CalibrationBase, scales
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import CalibrationError
 from contour.geometry.arrays import Float64s
@@ -17,7 +17,7 @@ _HORIZON = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneCalibration(Frames):
+class PlaneCalibration(CalibrationBase):
     """Pixels to the plane z = `plane_height_mm` by a homography: a tilted camera, but no lens distortion.
 
     `homography`, shape (3, 3), takes pixels to work millimetres. At other heights the same map is applied, and
@@ -68,7 +68,7 @@ class PlaneCalibration(Frames):
 
     def rectifier(self, height_mm: float) -> Rectifier:
         """The plane, y turned down as in the picture, scaled to the pixels at the picture's middle."""
-        return _PlaneRectifier(self, float(scales(self, self._middle(), height_mm)[0]))
+        return _HomographyRectifier(self, float(scales(self, self._middle(), height_mm)[0]))
 
     def _middle(self) -> Float64s:
         return np.array([[(self.image_width - 1) / 2, (self.image_height - 1) / 2]])
@@ -85,7 +85,7 @@ class PlaneCalibration(Frames):
 
 
 @dataclass(frozen=True)
-class _PlaneRectifier:
+class _HomographyRectifier:
     calibration: PlaneCalibration
     mm_per_unit: float
 

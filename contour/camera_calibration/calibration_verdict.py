@@ -228,10 +228,10 @@ def _scale(solved: cv.Solved, plane: int, size: tuple[int, int]) -> float:
 
 
 def _contradictions(lengths: Sequence[LengthCheck], demands: Demands) -> list[_Fault]:
-    told = [(check, check.fault(demands.accept_apart)) for check in lengths]
+    faults = [(check, check.fault(demands.accept_apart)) for check in lengths]
     return [
         _Fault(Judgement.CONTRADICTED, text, "--accept-apart-percent", check.needed_percent)
-        for check, text in told
+        for check, text in faults
         if text is not None
     ]
 
@@ -257,7 +257,7 @@ def _uncovered(zones: Zones, demands: Demands) -> list[_Fault]:
         return []
     places = ", ".join(f"({x:g}, {y:g})" for x, y in missing)
     text = (
-        f"corners enclose {zones.told}; of --area-px {places} px {'lies' if len(missing) == 1 else 'lie'} outside. "
+        f"corners enclose {zones.text}; of --area-px {places} px {'lies' if len(missing) == 1 else 'lie'} outside. "
         "Bring the board's corners beyond there, or give the smaller area that blocks lie in"
     )
     return [_Fault(Judgement.MORE_COVERAGE, text, "--accept-uncovered")]

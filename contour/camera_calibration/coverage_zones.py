@@ -22,7 +22,7 @@ class Zones:
     covered_share: float
 
     @property
-    def told(self) -> str:
+    def text(self) -> str:
         """How much of the picture the corners enclose, and between which columns and rows."""
         (left, top), (right, bottom) = self.hull_px.min(axis=0), self.hull_px.max(axis=0)
         return (

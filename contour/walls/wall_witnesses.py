@@ -1,4 +1,4 @@
-"""Witnesses of a block's outline: from a picture to where its material ends, wall by wall."""
+"""Witnesses of a block's outline: where its material ends, wall by wall, to a fraction of a pixel."""
 
 from __future__ import annotations
 

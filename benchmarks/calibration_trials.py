@@ -16,7 +16,8 @@ from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import CameraModel, CellGeometry, Scene, Sensor, camera_above, l_shape, rectangle, render
 from contour.synthetic.board_poses import board_poses
 from contour.synthetic.board_view import board_camera, render_board
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 
 SIZE = (1600, 1200)
 BOARDS = {

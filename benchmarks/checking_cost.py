@@ -10,9 +10,10 @@ from types import ModuleType
 from typing import Any
 from unittest.mock import patch
 
+from contour.acceptance import trace_check
 from contour.synthetic import render
-from contour.tracing import tracing, wall_tips
-from contour.walls import see_block as wall_witnesses
+from contour.tracing import wall_tips
+from contour.walls import see_block
 from service.config.recipes import Recipe
 from service.measuring import measure
 from service.measuring.measure import Measurer
@@ -24,10 +25,10 @@ SCENE = "12mp"
 _ROUNDS = 9
 # All that tracing would not need; what a comb looks like falls off while cells are counted.
 _CHECKS: dict[str, tuple[tuple[ModuleType, str], ...]] = {
-    "quality of the picture": ((tracing, "block_quality"),),
-    "second account of the block": ((tracing, "_bent"), (tracing, "disagreement")),
+    "quality of the picture": ((trace_check, "block_quality"),),
+    "second account of the block": ((trace_check, "_bent"), (trace_check, "disagreement")),
     "uncertainty": ((wall_tips, "uncertainty"),),
-    "other pieces, reach to the frame": ((wall_witnesses, "pieces_beside"), (wall_witnesses, "reaches_frame")),
+    "other pieces, reach to the frame": ((see_block, "pieces_beside"), (see_block, "reaches_frame")),
     "limits, comb likeness, budget": ((measure, "judge"), (measure, "error_budget")),
 }
 

@@ -16,14 +16,17 @@ import numpy as np
 
 from benchmarks.page_section import put_section
 from benchmarks.report import table
-from contour.acceptance.acceptance import Limits, Refusal, judge
+from contour.acceptance.acceptance import View, judge
 from contour.acceptance.disagreement import disagreement
+from contour.acceptance.findings import Limits, Refusal
+from contour.acceptance.trace_check import CheckedTrace
 from contour.errors import ContourError
 from contour.geometry.offset import offset_contour
 from contour.geometry.rings import Contour, Ring, densified, oriented_contour, signed_area
 from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import render
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from service.config.recipes import Recipe
 from tests.support.scenes.random_scenes import random_scene
 from tests.support.scenes.trials import calibration_for
@@ -82,7 +85,7 @@ def seen_in(seed: int) -> tuple[bool | None, ...]:
     whole = Contour(rings[0], tuple(rings[1:]))
     polygon = cutting_polygon(found.contour, None, height_mm=0.0, tolerance_mm=0.1)
     limits = Limits(max_disagreement_pitches=Recipe(number=1, name="default").max_disagreement_pitches)
-    size = (rendered.picture.shape[1], rendered.picture.shape[0])
+    view = View((rendered.picture.shape[1], rendered.picture.shape[0]))
     seen: list[bool | None] = []
     for way in WAYS.values():
         try:
@@ -90,8 +93,8 @@ def seen_in(seed: int) -> tuple[bool | None, ...]:
         except ContourError:
             seen.append(None)
             continue
-        told = replace(found, disagreement=disagreement(rendered.picture, false, pitch))
-        findings = judge(polygon, size, limits, traced=told)
+        told = CheckedTrace(found, disagreement=disagreement(rendered.picture, false, pitch))
+        findings = judge(polygon, view, limits, traced=told)
         seen.append(any(finding.refusal is Refusal.METHODS_DISAGREE for finding in findings))
     return tuple(seen)
 

@@ -22,9 +22,10 @@ from contour.synthetic import (
     u_shape,
     with_holes,
 )
-from contour.tracing.binarize import WallMask, binarize
-from contour.tracing.paper_cells import Cells
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.binarize import BinarizedPicture, binarize
+from contour.tracing.paper_cells import EnclosedCells
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from tests.support.scenes.metrics import agreement
 
 WIDTH, HEIGHT, MM_PER_PX = 500, 430, 0.6
@@ -66,12 +67,12 @@ def block(name: str, specks: int = 0, chips: int = 0) -> Rendered:
 
 
 @cache
-def walls(name: str, specks: int = 0, chips: int = 0) -> WallMask:
+def walls(name: str, specks: int = 0, chips: int = 0) -> BinarizedPicture:
     """The block's wall mask."""
     return binarize(block(name, specks, chips).picture)
 
 
-def cells(name: str, specks: int = 0, chips: int = 0) -> Cells:
+def cells(name: str, specks: int = 0, chips: int = 0) -> EnclosedCells:
     """The block's cells."""
     found = walls(name, specks, chips).cells
     if found is None:

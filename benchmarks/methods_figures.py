@@ -15,7 +15,7 @@ from contour.image.opencv import enclosed_area
 from contour.image.overlay import draw_overlay
 from contour.tracing.direct_scan import default_gap_px, default_width_px, scan_pairs
 from contour.tracing.sliding_matrix import default_core_px, default_threshold, fill_windows
-from contour.tracing.tracing import TraceSettings
+from contour.tracing.trace import TraceSettings
 
 Picture = NDArray[np.uint8]
 Colour = tuple[int, int, int]

@@ -7,7 +7,7 @@ from benchmarks.report import table
 from contour.image.opencv import outer_contours
 from contour.tracing.direct_scan import default_gap_px, default_width_px, scan_pairs
 from contour.tracing.sliding_matrix import default_core_px, default_threshold, fill_windows
-from contour.tracing.tracing import TraceSettings
+from contour.tracing.trace import TraceSettings
 
 CLUTTER = ((0, 0), (20, 4), (80, 12))
 

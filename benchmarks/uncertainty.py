@@ -25,7 +25,9 @@ from contour.errors import ContourError
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import LEAST_PX, Coefficients, Stretches, bound, ring_stretches
 from contour.synthetic import Rendered, render
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
+from contour.walls.lightness import wall_light
 from contour.walls.see_block import see_block
 from contour.walls.wall_evidence import BlockEvidence
 from tests.support.scenes.bench_scenes import BenchScene, measured_scenes
@@ -106,7 +108,7 @@ def case_of(scene: BenchScene, rendered: Rendered) -> Case | str:
         return scene.name
     if traced.uncertainty_px is None:
         return scene.name
-    seen = see_block(rendered.picture, "auto")
+    seen = see_block(rendered.picture, wall_light(rendered.picture), "auto")
     rings = [fit_ring(ring, pitch_px=seen.pitch_px, wall_px=seen.wall_px, rectifier=rectifier) for ring in seen.rings]
     off = distances(samples(rendered.truth_px, 1.0), rectified_edges(traced.contour, rectifier))
     return Case(

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
-Mask = NDArray[np.uint8]
-Levels = NDArray[np.float64]
+from contour.geometry.arrays import Bytes, Float64s
 
 # What is usual for one, and what the other one ever has: lowest, highest, percent.
 _USUAL = (4.0, 96.0)
@@ -19,7 +16,7 @@ _FEW = 50
 _HOP = 3
 
 
-def told_by_level(level: Picture, block: Mask, table: Mask) -> tuple[Mask, Mask]:
+def exclusive_levels(level: Bytes, block: Bytes, table: Bytes) -> tuple[Bytes, Bytes]:
     """Pixels (0 or 255) whose level only the block has, and those whose level only the table has.
 
     level: the picture's mean over a cell, grey (H, W) or BGR (H, W, 3). block, table: samples of both (not 0). Where
@@ -31,7 +28,7 @@ def told_by_level(level: Picture, block: Mask, table: Mask) -> tuple[Mask, Mask]
     return _only(level, of_block, of_table), _only(level, of_table, of_block)
 
 
-def _only(level: Picture, own: Picture, others: Picture) -> Mask:
+def _only(level: Bytes, own: Bytes, others: Bytes) -> Bytes:
     """Where the level is usual for `own`, or near to that, and no other has it; samples, shape (N,) or (N, 3)."""
     (low, high), (least, most) = _percentiles(own, _USUAL), _percentiles(others, _EVER)
     slack = _NEAR * np.maximum(np.maximum(low - most, least - high), 0.0)
@@ -39,7 +36,7 @@ def _only(level: Picture, own: Picture, others: Picture) -> Mask:
     return np.asarray(cv2.bitwise_and(usual, cv2.bitwise_not(cv2.inRange(level, least, most))), np.uint8)
 
 
-def _percentiles(samples: Picture, percent: tuple[float, float]) -> tuple[Levels, Levels]:
+def _percentiles(samples: Bytes, percent: tuple[float, float]) -> tuple[Float64s, Float64s]:
     """Two percentiles of the samples, one figure a channel each."""
     low, high = np.percentile(samples.reshape(len(samples), -1), percent, axis=0)
     return low, high

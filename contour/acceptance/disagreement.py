@@ -14,14 +14,11 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from contour.acceptance.block_level import told_by_level
+from contour.acceptance.block_level import exclusive_levels
+from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s
 from contour.geometry.rings import Contour, Ring
-
-Picture = NDArray[np.uint8]
-Mask = NDArray[np.uint8]
-Floats = NDArray[np.float32]
+from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
 _PITCH_PX = 6
 _SHARE_OF_LEVEL = 0.5
@@ -58,7 +55,7 @@ class Disagreement:
         return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
 
 
-def disagreement(picture: Picture, contour: Contour, pitch_px: float) -> Disagreement:
+def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreement:
     """The widest disagreement between the contour, in pixels, and the busy part of `picture`, grey or BGR, uint8.
 
     Width is that of the largest disc that fits into the difference; a spike or a notch has little, but its tip lies far
@@ -66,18 +63,18 @@ def disagreement(picture: Picture, contour: Contour, pitch_px: float) -> Disagre
     finding.
     """
     shrink = max(1, int(pitch_px / _PITCH_PX))
-    small = _reduced(picture, shrink)
-    pitch = pitch_px / shrink
-    busy = _without_small_gaps(_busy(small, pitch), (_OPENING_PITCHES * pitch) ** 2)
+    small = whole_averaged(picture, shrink)
+    small_pitch_px = pitch_px / shrink
+    busy = _without_small_gaps(_busy(small, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
     ours = _drawn(contour, busy.shape[:2], shrink)
-    around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * pitch)), np.uint8)
-    level = np.asarray(cv2.blur(small, (_odd(pitch), _odd(pitch))), np.uint8)
+    around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * small_pitch_px)), np.uint8)
+    level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)
     # Glare hides walls, and scratches crowd; but the one stays as light as the block, the other as the table.
-    told = told_by_level(level, np.asarray(cv2.bitwise_and(ours, busy), np.uint8), quiet_table)
+    exclusive = exclusive_levels(level, np.asarray(cv2.bitwise_and(ours, busy), np.uint8), quiet_table)
     # Squares cost a tenth of discs.
-    only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * pitch)) for mask in told)
-    theirs = _touched(_opened(_but(busy, only_table), _disc(_SCRATCH_PITCHES * pitch)), ours)
+    only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * small_pitch_px)) for mask in exclusive)
+    theirs = _touched(_opened(_but(busy, only_table), _disc(_SCRATCH_PITCHES * small_pitch_px)), ours)
     busy = np.asarray(cv2.bitwise_or(busy, only_block), np.uint8)
     # The picture's border is no block, and block ends there.
     outside = np.asarray(cv2.distanceTransform(_inverted(busy), cv2.DIST_L2, 3), np.float32)
@@ -87,31 +84,22 @@ def disagreement(picture: Picture, contour: Contour, pitch_px: float) -> Disagre
         (*_widest(_but(ours, busy)), True),
         (*_widest(_but(theirs, around)), False),
         (*_farthest(outside, points, 0.0), True),
-        (*_farthest(inside, points, _BLUR_PITCHES * pitch), False),
+        (*_farthest(inside, points, _BLUR_PITCHES * small_pitch_px), False),
     ]
     apart, place, claims = max(farthest, key=lambda one: one[0])
-    x, y = ((value + 0.5) * shrink - 0.5 for value in place)
+    x, y = pixels_of(np.array(place), shrink).tolist()
     on_the_whole = float(np.median(_at(outside, points) - _at(inside, points)))
-    return Disagreement(apart / pitch, (x, y), claims, on_the_whole / pitch)
+    return Disagreement(apart / small_pitch_px, (x, y), claims, on_the_whole / small_pitch_px)
 
 
-def _reduced(picture: Picture, shrink: int) -> Picture:
-    if shrink == 1:
-        return picture
-    size = (max(1, picture.shape[1] // shrink), max(1, picture.shape[0] // shrink))
-    # A whole number of pixels each: averaging them is several times faster then.
-    whole = picture[: size[1] * shrink, : size[0] * shrink]
-    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-def _busy(small: Picture, pitch: float) -> Mask:
+def _busy(small: Bytes, small_pitch_px: float) -> Bytes:
     """Where the picture differs from its mean over a pitch as it does in comb, 0 or 255."""
-    window = _odd(pitch)
+    window = _odd(small_pitch_px)
     off = cv2.absdiff(small, cv2.blur(small, (window, window)))
     if off.ndim == 3:
         off = off.max(axis=2)
     average = cv2.boxFilter(off, cv2.CV_32F, (window, window))
-    nearby = _odd(_NEARBY_PITCHES * pitch)
+    nearby = _odd(_NEARBY_PITCHES * small_pitch_px)
     squares = cv2.boxFilter(average * average, cv2.CV_32F, (nearby, nearby))
     # The mean that weighs busy places by how busy they are: beside the block it is the block's.
     level = squares / np.maximum(cv2.boxFilter(average, cv2.CV_32F, (nearby, nearby)), 1e-3)
@@ -120,30 +108,30 @@ def _busy(small: Picture, pitch: float) -> Mask:
     return np.asarray(busy, np.uint8) * np.uint8(255)
 
 
-def _without_small_gaps(mask: Mask, area_px2: float) -> Mask:
+def _without_small_gaps(mask: Bytes, area_px2: float) -> Bytes:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(cv2.bitwise_not(mask), connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] < area_px2
     small[0] = False
     return np.asarray(np.where(small[labels], np.uint8(255), mask), np.uint8)
 
 
-def _opened(mask: Mask, shape: Mask) -> Mask:
+def _opened(mask: Bytes, shape: Bytes) -> Bytes:
     """The mask without what is narrower than the shape."""
     return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, shape), np.uint8)
 
 
-def _drawn(contour: Contour, shape: tuple[int, int], shrink: int) -> Mask:
+def _drawn(contour: Contour, shape: tuple[int, int], shrink: int) -> Bytes:
     mask = np.zeros(shape, np.uint8)
-    rings = [_fixed_point((ring + 0.5) / shrink - 0.5) for ring in contour.rings]
+    rings = [_fixed_point(samples_of(ring, shrink)) for ring in contour.rings]
     cv2.fillPoly(mask, rings, 255, cv2.LINE_8, _FRACTION_BITS)
     return mask
 
 
-def _fixed_point(ring: Ring) -> NDArray[np.int32]:
+def _fixed_point(ring: Ring) -> Int32s:
     return np.asarray(np.rint(ring * (1 << _FRACTION_BITS)), np.int32)
 
 
-def _touched(mask: Mask, ours: Mask) -> Mask:
+def _touched(mask: Bytes, ours: Bytes) -> Bytes:
     """The parts of `mask` that meet `ours`."""
     count, labels, _, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
     meets = np.bincount(labels[ours > 0], minlength=count) > 0
@@ -151,32 +139,32 @@ def _touched(mask: Mask, ours: Mask) -> Mask:
     return np.asarray(np.where(meets[labels], np.uint8(255), np.uint8(0)), np.uint8)
 
 
-def _but(mask: Mask, other: Mask) -> Mask:
+def _but(mask: Bytes, other: Bytes) -> Bytes:
     """What is in `mask` and not in `other`."""
     return np.asarray(cv2.bitwise_and(mask, cv2.bitwise_not(other)), np.uint8)
 
 
-def _inverted(mask: Mask) -> Mask:
+def _inverted(mask: Bytes) -> Bytes:
     return np.asarray(cv2.bitwise_not(mask), np.uint8)
 
 
-def _distances(mask: Mask) -> Floats:
+def _distances(mask: Bytes) -> Float32s:
     """Of each pixel in `mask` from what is not, pixels; 0 elsewhere. The picture's border ends a mask too."""
     framed = cv2.copyMakeBorder(mask, 1, 1, 1, 1, cv2.BORDER_CONSTANT)
     return np.asarray(cv2.distanceTransform(framed, cv2.DIST_L2, 3)[1:-1, 1:-1], np.float32)
 
 
-def _widest(difference: Mask) -> tuple[float, tuple[float, float]]:
+def _widest(difference: Bytes) -> tuple[float, tuple[float, float]]:
     """Diameter of the largest disc inside, in pixels, and its middle (x, y)."""
     depth = _distances(difference)
     y, x = np.unravel_index(int(depth.argmax()), depth.shape)
     return 2.0 * float(depth[y, x]), (float(x), float(y))
 
 
-def _reduced_points(contour: Contour, spacing_px: float, shrink: int) -> NDArray[np.float64]:
+def _reduced_points(contour: Contour, spacing_px: float, shrink: int) -> Float64s:
     """Points at equal spacing along all rings, in the reduced picture, shape (N, 2)."""
     rings = [_along(ring, spacing_px) for ring in contour.rings]
-    return np.asarray((np.concatenate(rings) + 0.5) / shrink - 0.5, np.float64)
+    return samples_of(np.concatenate(rings), shrink)
 
 
 def _along(ring: Ring, spacing: float) -> Ring:
@@ -188,14 +176,14 @@ def _along(ring: Ring, spacing: float) -> Ring:
     return np.concatenate((between, ring))
 
 
-def _at(values: Floats, points: NDArray[np.float64]) -> Floats:
+def _at(values: Float32s, points: Float64s) -> Float32s:
     """The values at the pixels that the points lie in, shape (N,)."""
     last = np.array(values.shape[::-1]) - 1
     x, y = np.clip(np.rint(points), 0, last).astype(np.intp).T
     return np.asarray(values[y, x], np.float32)
 
 
-def _farthest(values: Floats, points: NDArray[np.float64], less: float) -> tuple[float, tuple[float, float]]:
+def _farthest(values: Float32s, points: Float64s, less: float) -> tuple[float, tuple[float, float]]:
     """The largest value at a point, less so much, and that point (x, y)."""
     there = _at(values, points)
     k = int(there.argmax())
@@ -203,12 +191,12 @@ def _farthest(values: Floats, points: NDArray[np.float64], less: float) -> tuple
     return float(there[k]) - less, (x, y)
 
 
-def _disc(diameter: float) -> Mask:
+def _disc(diameter: float) -> Bytes:
     size = _odd(diameter)
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
 
 
-def _square(side: float) -> Mask:
+def _square(side: float) -> Bytes:
     return np.ones((_odd(side), _odd(side)), np.uint8)
 
 

@@ -10,13 +10,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Float32s, Int64s
 from contour.geometry.rings import Contour, Ring
-from contour.walls.lightness import wall_light
-
-Picture = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 
 # So many pixels tell enough, and cost about a millisecond.
 _SAMPLED_PX = 60_000
@@ -75,26 +71,26 @@ class QualityLimits:
     min_contrast_to_noise: float = 4.0
 
 
-def block_quality(picture: Picture, contour: Contour, pitch_px: float | None) -> Quality:
+def block_quality(picture: Bytes, light: Bytes, contour: Contour, pitch_px: float | None) -> Quality:
     """The quality of the walls within `contour` (pixels) in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `pitch_px` None takes the place of an unknown pitch by a usual one.
+    `light` (H, W), uint8, is the channel of it that shows the walls. `pitch_px` None takes the place of an unknown
+    pitch by a usual one.
     """
-    pitch = pitch_px or _USUAL_PITCH_PX
-    tiles = _tiles(picture, contour.exterior, pitch)
-    light = wall_light(np.ascontiguousarray(tiles.reshape(-1, *tiles.shape[2:])))
-    light = light.reshape(tiles.shape[:3])
-    clipped = float(np.mean(tiles.reshape(*tiles.shape[:3], -1).max(axis=3) >= _FULL))
-    low, high = _tails(light)
-    noise = _noise(light)
+    pitch_px = pitch_px or _USUAL_PITCH_PX
+    places = _tile_places(light.shape, contour.exterior, pitch_px)
+    colours, tiles = _tiles(picture, places), _tiles(light, places)
+    clipped = float(np.mean(colours.reshape(*tiles.shape, -1).max(axis=3) >= _FULL))
+    low, high = _tails(tiles)
+    noise = _noise(tiles)
     contrast = np.maximum(high - low - _TAILS_OF_NOISE * noise, 0.0)
-    blur = _blur_px(light, contrast, noise)
+    blur = _blur_px(tiles, contrast, noise)
     return Quality(
         level=float(np.median(high)),
         contrast=float(np.median(contrast)),
         noise=noise,
         blur_px=blur,
-        pitch_px=pitch,
+        pitch_px=pitch_px,
         clipped_share=clipped,
     )
 
@@ -137,10 +133,19 @@ def lost_in_noise(quality: Quality, limits: QualityLimits) -> str | None:
     )
 
 
-def _tiles(picture: Picture, exterior: Ring, pitch: float) -> Picture:
-    """Tiles along and inside the outline, shape (N, S, S) or (N, S, S, 3)."""
-    height, width = picture.shape[:2]
-    side = int(min(max(_LEAST_TILE_PX, round(_TILE_PITCHES * pitch)), height, width))
+@dataclass(frozen=True)
+class _TilePlaces:
+    """Left and top pixels of square tiles, (N,) each, and their side, pixels."""
+
+    left: Int64s
+    top: Int64s
+    side: int
+
+
+def _tile_places(shape: tuple[int, ...], exterior: Ring, pitch_px: float) -> _TilePlaces:
+    """Places of tiles along and inside the outline, in a picture of `shape` (H, W)."""
+    height, width = shape
+    side = int(min(max(_LEAST_TILE_PX, round(_TILE_PITCHES * pitch_px)), height, width))
     count = int(np.clip(_SAMPLED_PX // side**2, 6, _MOST_TILES))
     low, high = np.floor(exterior.min(axis=0)), np.ceil(exterior.max(axis=0))
     # A raster of the outline with some 40 samples along its longer side finds places inside it.
@@ -153,10 +158,15 @@ def _tiles(picture: Picture, exterior: Ring, pitch: float) -> Picture:
     centres = low + step * np.column_stack([columns[chosen], rows[chosen]])
     left = np.clip(np.rint(centres[:, 0] - side / 2), 0, width - side).astype(int)
     top = np.clip(np.rint(centres[:, 1] - side / 2), 0, height - side).astype(int)
-    return np.stack([picture[y : y + side, x : x + side] for x, y in zip(left, top, strict=True)])
+    return _TilePlaces(left, top, side)
 
 
-def _tails(light: Picture) -> tuple[Floats, Floats]:
+def _tiles(picture: Bytes, at: _TilePlaces) -> Bytes:
+    """The picture's tiles, shape (N, S, S) or (N, S, S, 3)."""
+    return np.stack([picture[y : y + at.side, x : x + at.side] for x, y in zip(at.left, at.top, strict=True)])
+
+
+def _tails(light: Bytes) -> tuple[Float32s, Float32s]:
     """Grey levels that _TAIL of each tile lies below and above, shape (N,) each."""
     flat = light.reshape(len(light), -1)
     cut = max(1, round(_TAIL * flat.shape[1]))
@@ -164,7 +174,7 @@ def _tails(light: Picture) -> tuple[Floats, Floats]:
     return ordered[:, cut].astype(np.float32), ordered[:, -1 - cut].astype(np.float32)
 
 
-def _noise(light: Picture) -> float:
+def _noise(light: Bytes) -> float:
     """Standard deviation of a pixel's noise: what second differences both ways see where they see least else."""
     part = light.astype(np.int16)
     bent = part[:, :, :-2] - 2 * part[:, :, 1:-1] + part[:, :, 2:]
@@ -174,7 +184,7 @@ def _noise(light: Picture) -> float:
     return float((fifth + 0.5) / _SECOND_OF_NOISE)
 
 
-def _blur_px(light: Picture, contrast: Floats, noise: float) -> float:
+def _blur_px(light: Bytes, contrast: Float32s, noise: float) -> float:
     """Blur in the direction in which it is worst: contrast over the steepest rise, median over the tiles.
 
     A honeycomb has walls in three directions: none leaves a direction without rises, unless the block moved along it.
@@ -194,7 +204,7 @@ def _blur_px(light: Picture, contrast: Floats, noise: float) -> float:
     return float(np.sqrt(max(worst**2 - 0.5, 0.0)))
 
 
-def picture_faults(picture: Picture) -> tuple[str, ...]:
+def picture_faults(picture: Bytes) -> tuple[str, ...]:
     """What is wrong with a picture as a whole, in which nothing was traced: too dark, overexposed, nothing sharp.
 
     Only what no table and no thing on it can look like: black all over, white over most of it, or things that stand out
@@ -223,7 +233,7 @@ def picture_faults(picture: Picture) -> tuple[str, ...]:
     return ()
 
 
-def _edge_width_px(light: Picture) -> float | None:
+def _edge_width_px(light: Bytes) -> float | None:
     """Blur of the sharpest edges in a picture, pixels; None where nothing stands out of the noise.
 
     The sharpest are those with the steepest rise for their height within a few pixels; a step blurred by sigma rises by

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import CalibrationError
+from contour.geometry.arrays import Float64s
+from contour.geometry.rectifier import Rectifier
 from contour.image.opencv import camera_rays, project, rotation_matrix
-from contour.tracing.tracing import Rectifier
-
-Floats = NDArray[np.float64]
 
 HEIGHT_BOUND_MM = 0.5
 """A plane within this of the simple form's own counts as known: under a camera 1 m up, 0.5 mm changes the scale by
@@ -45,11 +43,11 @@ class Alignment:
                 "expected finite numbers. Run the alignment again."
             )
 
-    def apply(self, points_mm: Floats) -> Floats:
+    def apply(self, points_mm: Float64s) -> Float64s:
         """Machine points of work points, shape (N, 2)."""
         return np.asarray(points_mm @ _turn(self.rotation_deg).T + np.asarray(self.translation_mm))
 
-    def undo(self, points_mm: Floats) -> Floats:
+    def undo(self, points_mm: Float64s) -> Float64s:
         """Work points of machine points, shape (N, 2)."""
         return np.asarray((points_mm - np.asarray(self.translation_mm)) @ _turn(self.rotation_deg))
 
@@ -84,15 +82,15 @@ class Calibration(Protocol):
         """True where the scale at this height is known, not merely carried over from another height."""
         ...
 
-    def to_work(self, points_px: Floats, height_mm: float) -> Floats:
+    def to_work(self, points_px: Float64s, height_mm: float) -> Float64s:
         """Work points on the plane z = `height_mm`; CalibrationError where a pixel does not look at it."""
         ...
 
-    def to_machine(self, points_work: Floats) -> Floats:
+    def to_machine(self, points_work: Float64s) -> Float64s:
         """Machine points of work points."""
         ...
 
-    def to_pixels(self, points_machine: Floats, height_mm: float) -> Floats:
+    def to_pixels(self, points_machine: Float64s, height_mm: float) -> Float64s:
         """Pixels of machine points on the plane z = `height_mm`; CalibrationError for points behind the camera."""
         ...
 
@@ -101,7 +99,7 @@ class Calibration(Protocol):
         ...
 
 
-class Frames:
+class CalibrationBase:
     """What both forms share: the alignment and the picture's size."""
 
     image_width: int
@@ -122,11 +120,11 @@ class Frames:
                 f"{self.image_width} x {self.image_height} px. Set the camera to that size, or calibrate again."
             )
 
-    def to_machine(self, points_work: Floats) -> Floats:
+    def to_machine(self, points_work: Float64s) -> Float64s:
         """Machine points of work points."""
         return self.alignment.apply(points_work) if self.alignment else points_work
 
-    def _to_work_frame(self, points_machine: Floats) -> Floats:
+    def _to_work_frame(self, points_machine: Float64s) -> Float64s:
         return self.alignment.undo(points_machine) if self.alignment else points_machine
 
     def _check_size(self) -> None:
@@ -143,7 +141,7 @@ class Frames:
 
 
 @dataclass(frozen=True)
-class SimpleCalibration(Frames):
+class SimpleCalibration(CalibrationBase):
     """One scale for the whole picture: a camera that looks straight down through a lens without distortion.
 
     `mm_per_pixel` holds on the plane z = `plane_height_mm`. How the scale changes with height depends on the
@@ -175,11 +173,11 @@ class SimpleCalibration(Frames):
         """True within HEIGHT_BOUND_MM of the plane that the scale was measured on."""
         return abs(height_mm - self.plane_height_mm) <= HEIGHT_BOUND_MM
 
-    def to_work(self, points_px: Floats, height_mm: float) -> Floats:
+    def to_work(self, points_px: Float64s, height_mm: float) -> Float64s:
         """Work points of pixels; `height_mm` has no influence (see the class)."""
         return np.asarray((points_px - np.asarray(self.origin_px)) @ self._axes().T * self.mm_per_pixel)
 
-    def to_pixels(self, points_machine: Floats, height_mm: float) -> Floats:
+    def to_pixels(self, points_machine: Float64s, height_mm: float) -> Float64s:
         """Pixels of machine points; `height_mm` has no influence (see the class)."""
         work = self._to_work_frame(points_machine)
         return np.asarray(work @ self._axes() / self.mm_per_pixel + np.asarray(self.origin_px))
@@ -188,13 +186,13 @@ class SimpleCalibration(Frames):
         """Identity: this form's pixels are a plane without distortion already."""
         return _Identity()
 
-    def _axes(self) -> Floats:
+    def _axes(self) -> Float64s:
         """The work axes x and y as rows, in pixel directions (y down)."""
         return np.asarray(_turn(self.rotation_deg).T * np.array([1.0, -1.0]))
 
 
 @dataclass(frozen=True, eq=False)
-class CameraCalibration(Frames):
+class CameraCalibration(CalibrationBase):
     """A pinhole camera with lens distortion, and where the work frame lies before it (OpenCV's conventions).
 
     `camera_matrix` is (3, 3); `distortion_coefficients` hold 4, 5, 8, 12 or 14 numbers (plumb_bob: k1 k2 p1 p2 k3);
@@ -203,10 +201,10 @@ class CameraCalibration(Frames):
 
     image_width: int
     image_height: int
-    camera_matrix: Floats
-    distortion_coefficients: Floats
-    rotation_vector: Floats
-    translation_mm: Floats
+    camera_matrix: Float64s
+    distortion_coefficients: Float64s
+    rotation_vector: Float64s
+    translation_mm: Float64s
     camera_name: str = ""
     alignment: Alignment | None = None
     uncertainty: PositionUncertainty | None = None
@@ -243,7 +241,7 @@ class CameraCalibration(Frames):
         object.__setattr__(self, name, values)
 
     @property
-    def camera_position(self) -> Floats:
+    def camera_position(self) -> Float64s:
         """The camera's centre in the work frame, shape (3,), mm."""
         return np.asarray(-rotation_matrix(self.rotation_vector).T @ self.translation_mm)
 
@@ -251,7 +249,7 @@ class CameraCalibration(Frames):
         """True: the camera model holds at any height."""
         return True
 
-    def to_work(self, points_px: Floats, height_mm: float) -> Floats:
+    def to_work(self, points_px: Float64s, height_mm: float) -> Float64s:
         """Work points where the pixels' rays meet the plane z = `height_mm`.
 
         Raises CalibrationError where the camera is not above the plane, or a ray misses or only grazes it, or the
@@ -277,7 +275,7 @@ class CameraCalibration(Frames):
         reach = (height_mm - position[2]) / rays[:, 2]
         return np.asarray(position[:2] + rays[:, :2] * reach[:, None])
 
-    def _check_rays(self, rays: Floats, points_px: Floats) -> None:
+    def _check_rays(self, rays: Float64s, points_px: Float64s) -> None:
         again = project(rays, np.zeros(3), np.zeros(3), self.camera_matrix, self.distortion_coefficients)
         error = np.abs(again - points_px).max(axis=1, initial=0)
         if not (error <= _ROUND_TRIP_PX).all():
@@ -287,7 +285,7 @@ class CameraCalibration(Frames):
                 f"{_ROUND_TRIP_PX} px. Calibrate again with views that reach the picture's corners."
             )
 
-    def to_pixels(self, points_machine: Floats, height_mm: float) -> Floats:
+    def to_pixels(self, points_machine: Float64s, height_mm: float) -> Float64s:
         """Pixels of machine points on the plane z = `height_mm`; CalibrationError for points behind the camera."""
         work = self._to_work_frame(np.asarray(points_machine, dtype=np.float64))
         points = np.column_stack([work, np.full(len(work), float(height_mm))])
@@ -308,10 +306,10 @@ class CameraCalibration(Frames):
 
 
 class _Identity:
-    def rectify(self, points_px: Floats) -> Floats:
+    def rectify(self, points_px: Float64s) -> Float64s:
         return points_px
 
-    def unrectify(self, points: Floats) -> Floats:
+    def unrectify(self, points: Float64s) -> Float64s:
         return points
 
 
@@ -321,16 +319,16 @@ class _PlaneRectifier:
     height_mm: float
     mm_per_unit: float
 
-    def rectify(self, points_px: Floats) -> Floats:
+    def rectify(self, points_px: Float64s) -> Float64s:
         work = self.calibration.to_work(points_px, self.height_mm)
         return np.asarray(work * np.array([1, -1]) / self.mm_per_unit)
 
-    def unrectify(self, points: Floats) -> Floats:
+    def unrectify(self, points: Float64s) -> Float64s:
         work = points * np.array([1, -1]) * self.mm_per_unit
         return self.calibration.to_pixels(self.calibration.to_machine(work), self.height_mm)
 
 
-def scales(calibration: Calibration, points_px: Floats, height_mm: float) -> Floats:
+def scales(calibration: Calibration, points_px: Float64s, height_mm: float) -> Float64s:
     """Millimetres a pixel at each point, shape (N,): the larger of the two where a tilted view has two.
 
     An uncertainty in pixels times this is one in millimetres that holds in every direction.
@@ -343,7 +341,7 @@ def scales(calibration: Calibration, points_px: Floats, height_mm: float) -> Flo
     return np.asarray(np.linalg.norm(jacobian, ord=2, axis=(1, 2)))
 
 
-def _turn(degrees: float) -> Floats:
+def _turn(degrees: float) -> Float64s:
     """Rotation matrix by an angle, counter-clockwise for axes x right, y up."""
     cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([[cosine, -sine], [sine, cosine]])

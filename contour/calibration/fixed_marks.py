@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import CalibrationError
+from contour.geometry.arrays import Bytes, Float64s
 from contour.image.opencv import grey, shrunk
 from contour.image.opencv_boards import find_marks, known_dictionaries, refined_corners
-
-Floats = NDArray[np.float64]
-Picture = NDArray[np.uint8]
+from contour.image.pixel_grid import pixels_of
 
 REACH_SIDES, REACH_PX = 0.75, 30.0
 """A mark is searched this far around its place, 30 px at least. What was knocked farther is found by a search of the
@@ -28,7 +26,7 @@ class Mark:
     """An ArUco mark: its id, and the pixels of its corners as its dictionary orders them, shape (4, 2)."""
 
     id: int
-    corners_px: Floats
+    corners_px: Float64s
 
     def __post_init__(self) -> None:
         corners = np.array(self.corners_px, dtype=np.float64)
@@ -38,7 +36,7 @@ class Mark:
         object.__setattr__(self, "corners_px", corners)
 
     @property
-    def middle_px(self) -> Floats:
+    def middle_px(self) -> Float64s:
         """The mean of its corners, shape (2,)."""
         return np.asarray(self.corners_px.mean(axis=0))
 
@@ -96,7 +94,7 @@ class SentinelCheck:
         return ", ".join(parts)
 
 
-def see_sentinels(picture: Picture, dictionary: str, *, without: range = range(0)) -> Sentinels | None:
+def see_sentinels(picture: Bytes, dictionary: str, *, without: range = range(0)) -> Sentinels | None:
     """The marks of a dictionary in a picture, or None; without a board's own ids (`without`) and any seen twice."""
     found = find_marks(grey(picture), dictionary)
     numbers, counts = np.unique(found.ids, return_counts=True)
@@ -107,7 +105,7 @@ def see_sentinels(picture: Picture, dictionary: str, *, without: range = range(0
     return Sentinels(dictionary, tuple(sorted(marks, key=lambda mark: mark.id))) if marks else None
 
 
-def check_sentinels(picture: Picture, sentinels: Sentinels) -> SentinelCheck:
+def check_sentinels(picture: Bytes, sentinels: Sentinels) -> SentinelCheck:
     """Where the marks are now, (H, W) grey or (H, W, 3) BGR: searched around their places, a few milliseconds.
 
     Where none is found there, the whole picture is searched: a camera that was knocked far shows them elsewhere.
@@ -120,7 +118,7 @@ def check_sentinels(picture: Picture, sentinels: Sentinels) -> SentinelCheck:
     return SentinelCheck(offsets, tuple(mark.id for mark in sentinels.marks if mark.id not in found))
 
 
-def _around(picture: Picture, mark: Mark, dictionary: str) -> Mark | None:
+def _around(picture: Bytes, mark: Mark, dictionary: str) -> Mark | None:
     """The mark in the window around its place, or None."""
     reach = max(REACH_SIDES * mark.side_px, REACH_PX)
     height, width = picture.shape[:2]
@@ -135,7 +133,7 @@ def _around(picture: Picture, mark: Mark, dictionary: str) -> Mark | None:
     same = np.flatnonzero(found.ids == mark.id)
     if len(same) != 1:
         return None
-    corners = (found.corners_px[same[0]] + 0.5) * factor - 0.5
+    corners = pixels_of(found.corners_px[same[0]], factor)
     fine = refined_corners(window, corners, int(np.clip(mark.side_px / 16, 2, 8)))
     return Mark(mark.id, fine + np.array([left, top]))
 

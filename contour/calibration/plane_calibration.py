@@ -5,21 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from contour.calibration.calibration import HEIGHT_BOUND_MM, Alignment, Frames, scales
+from contour.calibration.calibration import HEIGHT_BOUND_MM, Alignment, CalibrationBase, scales
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import CalibrationError
-from contour.tracing.tracing import Rectifier
-
-Floats = NDArray[np.float64]
+from contour.geometry.arrays import Float64s
+from contour.geometry.rectifier import Rectifier
 
 _HORIZON = 1e-3
 """A point whose homogeneous coordinate is under this share of the picture's middle lies at the plane's horizon."""
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneCalibration(Frames):
+class PlaneCalibration(CalibrationBase):
     """Pixels to the plane z = `plane_height_mm` by a homography: a tilted camera, but no lens distortion.
 
     `homography`, shape (3, 3), takes pixels to work millimetres. At other heights the same map is applied, and
@@ -28,7 +26,7 @@ class PlaneCalibration(Frames):
 
     image_width: int
     image_height: int
-    homography: Floats
+    homography: Float64s
     plane_height_mm: float = 0.0
     alignment: Alignment | None = None
     uncertainty: PositionUncertainty | None = None
@@ -57,11 +55,11 @@ class PlaneCalibration(Frames):
         """True within HEIGHT_BOUND_MM of the plane that the points lay on."""
         return abs(height_mm - self.plane_height_mm) <= HEIGHT_BOUND_MM
 
-    def to_work(self, points_px: Floats, height_mm: float) -> Floats:
+    def to_work(self, points_px: Float64s, height_mm: float) -> Float64s:
         """Work points of pixels; `height_mm` has no influence; CalibrationError at and beyond the plane's horizon."""
         return self._mapped(self.homography, np.asarray(points_px, dtype=np.float64), "Pixel")
 
-    def to_pixels(self, points_machine: Floats, height_mm: float) -> Floats:
+    def to_pixels(self, points_machine: Float64s, height_mm: float) -> Float64s:
         """Pixels of machine points; `height_mm` has no influence."""
         work = self._to_work_frame(np.asarray(points_machine, dtype=np.float64))
         inverse = np.linalg.inv(self.homography)
@@ -70,13 +68,13 @@ class PlaneCalibration(Frames):
 
     def rectifier(self, height_mm: float) -> Rectifier:
         """The plane, y turned down as in the picture, scaled to the pixels at the picture's middle."""
-        return _PlaneRectifier(self, float(scales(self, self._middle(), height_mm)[0]))
+        return _HomographyRectifier(self, float(scales(self, self._middle(), height_mm)[0]))
 
-    def _middle(self) -> Floats:
+    def _middle(self) -> Float64s:
         return np.array([[(self.image_width - 1) / 2, (self.image_height - 1) / 2]])
 
     @staticmethod
-    def _mapped(matrix: Floats, points: Floats, kind: str) -> Floats:
+    def _mapped(matrix: Float64s, points: Float64s, kind: str) -> Float64s:
         third = points @ matrix[2, :2] + matrix[2, 2]
         if len(points) and not third.min() >= _HORIZON:
             x, y = points[int(np.argmin(third))]
@@ -87,13 +85,13 @@ class PlaneCalibration(Frames):
 
 
 @dataclass(frozen=True)
-class _PlaneRectifier:
+class _HomographyRectifier:
     calibration: PlaneCalibration
     mm_per_unit: float
 
-    def rectify(self, points_px: Floats) -> Floats:
+    def rectify(self, points_px: Float64s) -> Float64s:
         return np.asarray(self.calibration.to_work(points_px, 0.0) * np.array([1, -1]) / self.mm_per_unit)
 
-    def unrectify(self, points: Floats) -> Floats:
+    def unrectify(self, points: Float64s) -> Float64s:
         work = points * np.array([1, -1]) * self.mm_per_unit
         return self.calibration.to_pixels(self.calibration.to_machine(work), 0.0)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import CalibrationError
+from contour.geometry.arrays import Float64s
 from contour.image.opencv_boards import inside_ring
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +22,10 @@ class PositionUncertainty:
 
     image_width: int
     image_height: int
-    heights_mm: Floats
-    figures_mm: Floats
-    map_mm: Floats
-    covered_px: Floats | None = None
+    heights_mm: Float64s
+    figures_mm: Float64s
+    map_mm: Float64s
+    covered_px: Float64s | None = None
 
     def __post_init__(self) -> None:
         for name in ("heights_mm", "figures_mm", "map_mm"):
@@ -60,7 +58,7 @@ class PositionUncertainty:
         ring.flags.writeable = False
         object.__setattr__(self, "covered_px", ring)
 
-    def uncovered(self, points_px: Floats) -> Floats:
+    def uncovered(self, points_px: Float64s) -> Float64s:
         """The pixels that lie outside the covered part, shape (M, 2): none where it is not stated."""
         if self.covered_px is None:
             return np.empty((0, 2))
@@ -72,7 +70,7 @@ class PositionUncertainty:
         flat = np.full((1, 2, 2), bound_mm)
         return cls(image_width, image_height, np.zeros(1), np.array([bound_mm]), flat)
 
-    def at(self, points_px: Floats, height_mm: float) -> Floats:
+    def at(self, points_px: Float64s, height_mm: float) -> Float64s:
         """The 95 % bound at each pixel on the plane z = `height_mm`, shape (N,), mm; linear between the map's places.
 
         Pixels beside the picture get its border's value; beyond the map's heights the last two go on in a line.
@@ -96,7 +94,7 @@ class PositionUncertainty:
             return float(self.figures_mm[0])
         return max(float(self.figures_mm[low] * (1 - share) + self.figures_mm[low + 1] * share), 0.0)
 
-    def _plane(self, height_mm: float) -> Floats:
+    def _plane(self, height_mm: float) -> Float64s:
         low, share = self._between(height_mm)
         if len(self.heights_mm) == 1:
             return np.asarray(self.map_mm[0])

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.calibration import Alignment
 from contour.camera_calibration.length_check import rounded_up
 from contour.camera_calibration.point_calibration import FLAT_SHARE, flatness
 from contour.camera_calibration.student_t import two_sided_95
 from contour.errors import CalibrationFailed
-
-Floats = NDArray[np.float64]
+from contour.geometry.arrays import Float64s, Int64s
 
 FEWEST_POINTS = 3
 JOG_SPREAD_MM = 0.15
@@ -62,10 +60,10 @@ class AlignmentFit:
     """
 
     alignment: Alignment
-    residuals_mm: Floats
-    place_misses_mm: Floats
-    allowed_mm: Floats
-    first_points: NDArray[np.int64]
+    residuals_mm: Float64s
+    place_misses_mm: Float64s
+    allowed_mm: Float64s
+    first_points: Int64s
     spread_mm: float
     repeats: int
     scale: float
@@ -73,7 +71,7 @@ class AlignmentFit:
     refusal: AlignmentRefusal | None
 
 
-def fit_alignment(work_mm: Floats, machine_mm: Floats, limits: AlignmentLimits = AlignmentLimits()) -> AlignmentFit:
+def fit_alignment(work_mm: Float64s, machine_mm: Float64s, limits: AlignmentLimits = AlignmentLimits()) -> AlignmentFit:
     """The turn and shift of least squares that take work points (N, 2) to machine points (N, 2) (Kabsch, 1976).
 
     Points at the same work place are repeats of it. Raises CalibrationFailed for fewer than three points, and points on
@@ -123,7 +121,7 @@ def explained(spread_mm: float, freedom: int, places: int) -> float:
     return float(spread_mm * np.sqrt(freedom * (share ** (-2 / freedom) - 1)))
 
 
-def _spread(misses: Floats, place: NDArray[np.int64], counts: NDArray[np.int64], told_mm: float) -> tuple[float, int]:
+def _spread(misses: Float64s, place: Int64s, counts: Int64s, told_mm: float) -> tuple[float, int]:
     """Standard deviation of a coordinate and its degrees of freedom: pooled over repeats, as told (0) without any."""
     freedom = 2 * int((counts - 1).sum())
     if not freedom:
@@ -132,7 +130,7 @@ def _spread(misses: Floats, place: NDArray[np.int64], counts: NDArray[np.int64],
     return max(float(np.sqrt((rest**2).sum() / freedom)), FINEST_SPREAD_MM), freedom
 
 
-def _scale_95(one: Floats, place_misses: Floats, counts: NDArray[np.int64]) -> float:
+def _scale_95(one: Float64s, place_misses: Float64s, counts: Int64s) -> float:
     """Half the 95 % interval of the scale.
 
     A turn with a scale is linear in its four numbers (the plane conformal, or Helmert's, transformation; Ghilani,
@@ -144,7 +142,7 @@ def _scale_95(one: Floats, place_misses: Floats, counts: NDArray[np.int64]) -> f
     return float(two_sided_95(freedom) * np.sqrt(variance / (one**2).sum()))
 
 
-def _means(values: Floats, place: NDArray[np.int64], counts: NDArray[np.int64]) -> Floats:
+def _means(values: Float64s, place: Int64s, counts: Int64s) -> Float64s:
     """The mean of the values (N, 2) at each place, shape (P, 2)."""
     sums = np.zeros((len(counts), 2))
     np.add.at(sums, place, values)
@@ -152,7 +150,7 @@ def _means(values: Floats, place: NDArray[np.int64], counts: NDArray[np.int64]) 
 
 
 def _refusal(
-    fit: AlignmentFit, one: Floats, other: Floats, scaled_mm: Floats, limits: AlignmentLimits
+    fit: AlignmentFit, one: Float64s, other: Float64s, scaled_mm: Float64s, limits: AlignmentLimits
 ) -> AlignmentRefusal | None:
     """What speaks against a fit; `scaled_mm` are the places' distances from the fit that scales, too."""
     allowed = fit.allowed_mm if limits.accept_mm is None else np.full(len(fit.allowed_mm), limits.accept_mm)
@@ -178,7 +176,7 @@ def _refusal(
     )
 
 
-def _far(fit: AlignmentFit, allowed: Floats, limits: AlignmentLimits) -> str:
+def _far(fit: AlignmentFit, allowed: Float64s, limits: AlignmentLimits) -> str:
     worst = int(np.argmax(fit.place_misses_mm / allowed))
     why = "" if limits.accept_mm is not None else f" by a jogging spread of {fit.spread_mm:.3g} mm"
     return (
@@ -198,7 +196,7 @@ def _scaled(fit: AlignmentFit, limits: AlignmentLimits) -> str:
     return f"{text}. Check --square-mm of the calibration{squares}, units, and the machine's own steps per millimetre"
 
 
-def _check(work_mm: Floats, machine_mm: Floats) -> None:
+def _check(work_mm: Float64s, machine_mm: Float64s) -> None:
     if len(work_mm) < FEWEST_POINTS:
         raise CalibrationFailed(
             f"{len(work_mm)} points, expected {FEWEST_POINTS} or more: two leave no residual to check by. Jog to more"
@@ -213,9 +211,9 @@ def _check(work_mm: Floats, machine_mm: Floats) -> None:
             )
 
 
-def _dot(one: Floats, other: Floats) -> float:
+def _dot(one: Float64s, other: Float64s) -> float:
     return float((one * other).sum())
 
 
-def _cross(one: Floats, other: Floats) -> float:
+def _cross(one: Float64s, other: Float64s) -> float:
     return float((one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]).sum())

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Float64s
 from contour.image.opencv_boards import dictionary_size, known_dictionaries, marker_bits
 
-Floats = NDArray[np.float64]
 Kind = Literal["charuco", "chessboard"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
@@ -104,7 +103,7 @@ class Board:
         """Rows of inner corners."""
         return self.squares_y - 1
 
-    def corners_mm(self) -> Floats:
+    def corners_mm(self) -> Float64s:
         """Inner corners in the board frame, shape (columns * rows, 2), row by row from the top left."""
         across, down = np.meshgrid(np.arange(1, self.squares_x), np.arange(1, self.squares_y))
         return np.column_stack([across.ravel(), self.squares_y - down.ravel()]).astype(np.float64) * self.square_mm
@@ -118,14 +117,14 @@ class Board:
         places = [(column, row) for row in range(self.squares_y) for column in range(self.squares_x)]
         return [place for place in places if not self.is_black(*place)] if self.kind == "charuco" else []
 
-    def marker_corners_mm(self) -> Floats:
+    def marker_corners_mm(self) -> Float64s:
         """Corners of each marker as OpenCV orders them (from the top left, clockwise as seen), (markers, 4, 2)."""
         half = 0.5 * self.marker_mm
         middles = (np.array(self.marker_squares(), dtype=np.float64).reshape(-1, 2) + 0.5) * self.square_mm
         middles[:, 1] = self.size_mm[1] - middles[:, 1]
         return np.asarray(middles[:, None] + half * np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]))
 
-    def black_boxes(self) -> Floats:
+    def black_boxes(self) -> Float64s:
         """Everything black as boxes that do not overlap: left, bottom, right, top, board frame, shape (N, 4), mm."""
         boxes = []
         for row in range(self.squares_y):
@@ -135,14 +134,14 @@ class Board:
         squares = np.array(boxes, dtype=np.float64) * self.square_mm
         return np.concatenate([squares, *self._marker_boxes()])
 
-    def _marker_boxes(self) -> list[Floats]:
+    def _marker_boxes(self) -> list[Float64s]:
         return [
             mark_boxes(self.dictionary, number, corners[3], self.marker_mm)
             for number, corners in enumerate(self.marker_corners_mm())
         ]
 
 
-def mark_boxes(dictionary: str, number: int, lower_left_mm: Floats, side_mm: float) -> Floats:
+def mark_boxes(dictionary: str, number: int, lower_left_mm: Float64s, side_mm: float) -> Float64s:
     """The black runs of an ArUco mark as boxes left, bottom, right, top, shape (N, 4), mm."""
     black = ~marker_bits(dictionary, number)
     count = len(black)

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.camera_calibration.board import Board
 from contour.camera_calibration.board_sharpness import edge_sigma_px
 from contour.errors import BoardNotSeen
+from contour.geometry.arrays import Bools, Bytes, Float64s, Int64s
 from contour.image import opencv_boards as cv
 from contour.image.opencv import grey, shrunk
-
-Floats = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 
 FEWEST_CORNERS = 12
 """A pose takes 6 numbers of these 24; with fewer corners a wrong one is not told from a right one."""
@@ -38,16 +35,16 @@ class BoardView:
     """
 
     name: str
-    ids: NDArray[np.int64]
-    pixels: Floats
+    ids: Int64s
+    pixels: Float64s
     edge_sigma_px: float
 
-    def corners_mm(self, board: Board) -> Floats:
+    def corners_mm(self, board: Board) -> Float64s:
         """The corners in the board frame, z = 0, shape (N, 3)."""
         return np.column_stack([board.corners_mm()[self.ids], np.zeros(len(self.ids))])
 
 
-def find_board(picture: Picture, board: Board, name: str = "") -> BoardView:
+def find_board(picture: Bytes, board: Board, name: str = "") -> BoardView:
     """The view of the board in a picture, (H, W) grey or (H, W, 3) BGR; raise BoardNotSeen with the reason."""
     levels = grey(picture)
     ids, rough = _charuco(levels, board) if board.kind == "charuco" else _chessboard(levels, board)
@@ -70,7 +67,7 @@ def _check_count(board: Board, seen: int) -> None:
 # --- ChArUco ----------------------------------------------------------------------------------------------------------
 
 
-def _charuco(levels: Picture, board: Board) -> tuple[NDArray[np.int64], Floats]:
+def _charuco(levels: Bytes, board: Board) -> tuple[Int64s, Float64s]:
     squares = (board.squares_x, board.squares_y)
     found = cv.find_charuco(levels, squares, board.square_mm, board.marker_mm, board.dictionary)
     marks = found.marks
@@ -99,7 +96,7 @@ def _charuco(levels: Picture, board: Board) -> tuple[NDArray[np.int64], Floats]:
     return ids, corners
 
 
-def _why_no_mark(levels: Picture, board: Board) -> str:
+def _why_no_mark(levels: Bytes, board: Board) -> str:
     mirrored = cv.find_marks(np.ascontiguousarray(levels[:, ::-1]), board.dictionary)
     if len(mirrored.ids) >= 3:
         return (
@@ -112,7 +109,7 @@ def _why_no_mark(levels: Picture, board: Board) -> str:
     )
 
 
-def _marker_plane(board: Board, ids: NDArray[np.int64], corners_px: Floats) -> Floats:
+def _marker_plane(board: Board, ids: Int64s, corners_px: Float64s) -> Float64s:
     """The homography from board millimetres to pixels by the markers; raise where they do not lie as on the board."""
     if len(ids) < 4:
         raise BoardNotSeen(f"only {len(ids)} of the board's {board.marker_count} markers are seen, expected 4 or more")
@@ -128,9 +125,7 @@ def _marker_plane(board: Board, ids: NDArray[np.int64], corners_px: Floats) -> F
     return fitted[0]
 
 
-def _check_marker_ratio(
-    board: Board, ids: NDArray[np.int64], corners_px: Floats, marks: cv.FoundMarks, own: NDArray[np.bool_]
-) -> None:
+def _check_marker_ratio(board: Board, ids: Int64s, corners_px: Float64s, marks: cv.FoundMarks, own: Bools) -> None:
     """Raise where markers are larger or smaller, against the squares, than the board's."""
     fitted = cv.homography(corners_px, board.corners_mm()[ids])
     if fitted is None:
@@ -150,7 +145,7 @@ def _check_marker_ratio(
 # --- chessboard -------------------------------------------------------------------------------------------------------
 
 
-def _chessboard(levels: Picture, board: Board) -> tuple[NDArray[np.int64], Floats]:
+def _chessboard(levels: Bytes, board: Board) -> tuple[Int64s, Float64s]:
     corners = cv.find_chessboard(levels, board.columns, board.rows)
     if corners is None:
         raise BoardNotSeen(_why_no_chessboard(levels, board))
@@ -159,7 +154,7 @@ def _chessboard(levels: Picture, board: Board) -> tuple[NDArray[np.int64], Float
     return np.arange(len(corners)), corners
 
 
-def _why_no_chessboard(levels: Picture, board: Board) -> str:
+def _why_no_chessboard(levels: Bytes, board: Board) -> str:
     seen = cv.chessboard_in_view(levels)
     if seen is None:
         return "no chessboard is seen: none in view, only part of it, or too dark, too small, blurred"
@@ -170,7 +165,7 @@ def _why_no_chessboard(levels: Picture, board: Board) -> str:
     )
 
 
-def _oriented(levels: Picture, board: Board, corners: Floats) -> Floats:
+def _oriented(levels: Bytes, board: Board, corners: Float64s) -> Float64s:
     """The corners in the board's order: not mirrored, and the right way up by the squares' colours."""
     grid = corners.reshape(board.rows, board.columns, 2)
     orders = [grid, grid[::-1, ::-1]]
@@ -183,13 +178,13 @@ def _oriented(levels: Picture, board: Board, corners: Floats) -> Floats:
     return orders[best].reshape(-1, 2)
 
 
-def _turns_left(grid: Floats) -> bool:
+def _turns_left(grid: Float64s) -> bool:
     """True where columns to the right and rows downwards make a left turn in the picture, whose y runs down."""
     right, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
     return bool(right[0] * down[1] - right[1] * down[0] < 0)
 
 
-def _contrast(levels: Picture, board: Board, corners: Floats) -> float:
+def _contrast(levels: Bytes, board: Board, corners: Float64s) -> float:
     """Mean level of the white squares less that of the black ones, were the corners in the board's order."""
     grid = corners.reshape(board.rows, board.columns, 2)
     middles = (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:]) / 4
@@ -199,7 +194,7 @@ def _contrast(levels: Picture, board: Board, corners: Floats) -> float:
     return float(seen[~black].mean() - seen[black].mean())
 
 
-def _refuse_second(levels: Picture, board: Board, corners: Floats) -> None:
+def _refuse_second(levels: Bytes, board: Board, corners: Float64s) -> None:
     """Raise where another chessboard is in view beside the one that was found."""
     grid = corners.reshape(board.rows, board.columns, 2)
     outline = np.concatenate([grid[0], grid[1:, -1], grid[-1, ::-1], grid[::-1, 0]])
@@ -219,14 +214,14 @@ def _refuse_second(levels: Picture, board: Board, corners: Floats) -> None:
 # --- sub-pixel --------------------------------------------------------------------------------------------------------
 
 
-def _window_px(board: Board, ids: NDArray[np.int64], corners: Floats) -> int:
+def _window_px(board: Board, ids: Int64s, corners: Float64s) -> int:
     """Half the window that refines a corner: all of it white and black squares, no marker, no other corner."""
     spacing = _spacing_px(board, ids, corners)
     margin = 0.5 * (1 - board.marker_mm / board.square_mm) if board.kind == "charuco" else 0.4
     return int(np.clip(0.85 * margin * spacing, 2, 15))
 
 
-def _spacing_px(board: Board, ids: NDArray[np.int64], corners: Floats) -> float:
+def _spacing_px(board: Board, ids: Int64s, corners: Float64s) -> float:
     """Least distance between neighbouring corners, from the plane through all of them."""
     fitted = cv.homography(board.corners_mm()[ids], corners)
     if fitted is None:
@@ -239,7 +234,7 @@ def _spacing_px(board: Board, ids: NDArray[np.int64], corners: Floats) -> float:
     return float(min(steps))
 
 
-def _steady(ids: NDArray[np.int64], rough: Floats, fine: Floats) -> tuple[NDArray[np.int64], Floats]:
+def _steady(ids: Int64s, rough: Float64s, fine: Float64s) -> tuple[Int64s, Float64s]:
     """The corners that refining moved by 2 px at most: others ran off to an edge nearby."""
     kept = np.linalg.norm(fine - rough, axis=1) <= 2.0
     return ids[kept], fine[kept]

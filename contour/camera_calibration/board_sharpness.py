@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.camera_calibration.board import Board
+from contour.geometry.arrays import Bytes, Float64s, Int64s
 from contour.image.opencv_boards import sampled
-
-Floats = NDArray[np.float64]
 
 _STEPS_A_PIXEL = 4
 
 
-def edge_sigma_px(levels: NDArray[np.uint8], board: Board, ids: NDArray[np.int64], pixels: Floats) -> float:
+def edge_sigma_px(levels: Bytes, board: Board, ids: Int64s, pixels: Float64s) -> float:
     """Median spread of the edges between neighbouring corners, as the sigma of a Gaussian blur, pixels.
 
     An edge's steepest slope s between levels that differ by c gives c / (sqrt(2 pi) s). NaN where no two seen corners

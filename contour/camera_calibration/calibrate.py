@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.calibration import CameraCalibration
 from contour.camera_calibration.board import Board
 from contour.camera_calibration.board_detection import BoardView
 from contour.camera_calibration.calibration_spread import noise_px
-from contour.camera_calibration.calibration_verdict import Verdict, judge_calibration
+from contour.camera_calibration.calibration_verdict import Solution, Verdict, judge_calibration
 from contour.camera_calibration.length_check import (
     REFUSE_SHARE,
     KnownLength,
@@ -32,10 +31,9 @@ from contour.camera_calibration.view_selection import (
     without_outliers,
 )
 from contour.errors import CalibrationError, CalibrationFailed
+from contour.geometry.arrays import Float64s
 from contour.image import opencv_boards as cv
 from contour.image.opencv import rotation_matrix
-
-Floats = NDArray[np.float64]
 
 FOLDS = 5
 WIDEST_VIEW_DEG, NARROWEST_VIEW_DEG = 150.0, 2.0
@@ -73,7 +71,7 @@ class CameraResult:
     model: LensModel
     trials: tuple[Trial, ...]
     views: tuple[BoardView, ...]
-    residuals_px: tuple[Floats, ...]
+    residuals_px: tuple[Float64s, ...]
     """Seen less expected, of each view's corners."""
     dropped: tuple[Dropped, ...]
     noise_px: float
@@ -112,7 +110,7 @@ def calibrate_camera(
     plane = [view.name for view in kept].index(setup.plane)
     calibration = _calibration(solved, plane, size, setup)
     lengths = _lengths(calibration, board, setup)
-    verdict = judge_calibration(observed, size, model, solved, plane, setup, lengths, on_progress)
+    verdict = judge_calibration(observed, Solution(size, model, solved, plane), setup, lengths, on_progress)
     calibration = replace(calibration, uncertainty=verdict.uncertainty)
     misses = tuple(residuals(observed, solved))
     noise = noise_px(observed, solved, model)
@@ -147,7 +145,7 @@ def _calibration(solved: cv.Solved, plane: int, size: tuple[int, int], setup: Se
         raise CalibrationFailed(f"the views give no usable camera: {error}") from error
 
 
-def table_translation(rotation: Floats, translation_mm: Floats, board_thickness_mm: float) -> Floats:
+def table_translation(rotation: Float64s, translation_mm: Float64s, board_thickness_mm: float) -> Float64s:
     """The translation of the table's frame, whose z = 0 lies under a board that thick, shape (3,)."""
     return np.asarray(translation_mm - rotation_matrix(rotation)[:, 2] * board_thickness_mm)
 

@@ -5,32 +5,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.camera_calibration.lens_models import LensModel, Observed, residuals
+from contour.geometry.arrays import Float64s
 from contour.image import opencv_boards as cv
 from contour.image.opencv import camera_rays, rotation_matrix
-
-Floats = NDArray[np.float64]
 
 _STEP = 0.05
 """Steps of the derivatives, in standard deviations: small against any bend, large against rounding."""
 
 
-def covariance(views: Sequence[Observed], solved: cv.Solved, model: LensModel, plane: int) -> Floats:
+def covariance(views: Sequence[Observed], solved: cv.Solved, model: LensModel, plane: int) -> Float64s:
     """Covariance of the model's free numbers and of the pose of view `plane`, shape (P + 6, P + 6).
 
     Order: fy (or fx, fy), cx, cy, free distortion coefficients; rotation vector, translation. Least squares with the
     poses of the other views eliminated (Schur); the noise is that of the residuals, degrees of freedom taken off.
     """
     count = model.parameter_count
-    normal: Floats = np.zeros((count, count))
-    pose_part: Floats = np.zeros((6, 6))
-    link: Floats = np.zeros((6, count))
+    normal: Float64s = np.zeros((count, count))
+    pose_part: Float64s = np.zeros((6, 6))
+    link: Float64s = np.zeros((6, count))
     for index, view in enumerate(views):
         pose, camera = _jacobians(view, solved, index, model)
-        inner: Floats = np.asarray(np.linalg.inv(pose.T @ pose), np.float64)
-        share: Floats = inner @ pose.T @ camera
+        inner: Float64s = np.asarray(np.linalg.inv(pose.T @ pose), np.float64)
+        share: Float64s = inner @ pose.T @ camera
         normal += camera.T @ camera - camera.T @ pose @ share
         if index == plane:
             pose_part, link = inner, share
@@ -47,7 +45,7 @@ def noise_px(views: Sequence[Observed], solved: cv.Solved, model: LensModel) -> 
     return float(np.sqrt((rest**2).sum() / freedom))
 
 
-def _jacobians(view: Observed, solved: cv.Solved, index: int, model: LensModel) -> tuple[Floats, Floats]:
+def _jacobians(view: Observed, solved: cv.Solved, index: int, model: LensModel) -> tuple[Float64s, Float64s]:
     rotation, translation = solved.rotations[index], solved.translations[index]
     _, whole = cv.projection_jacobian(view.points_mm, rotation, translation, solved.camera_matrix, solved.distortion)
     focal = whole[:, 6:8]
@@ -57,7 +55,9 @@ def _jacobians(view: Observed, solved: cv.Solved, index: int, model: LensModel) 
     return whole[:, :6], np.hstack([focal, whole[:, 8:10], lens])
 
 
-def on_plane(solved: cv.Solved, rotation: Floats, translation: Floats, pixels: Floats, height_mm: float) -> Floats:
+def on_plane(
+    solved: cv.Solved, rotation: Float64s, translation: Float64s, pixels: Float64s, height_mm: float
+) -> Float64s:
     """Work points, shape (N, 2), of pixels on the plane z = `height_mm`; no check that a ray meets it."""
     turn = rotation_matrix(rotation)
     position = -turn.T @ translation
@@ -66,8 +66,8 @@ def on_plane(solved: cv.Solved, rotation: Floats, translation: Floats, pixels: F
 
 
 def position_variances(
-    solved: cv.Solved, model: LensModel, plane: int, spread: Floats, pixels: Floats, height_mm: float
-) -> Floats:
+    solved: cv.Solved, model: LensModel, plane: int, spread: Float64s, pixels: Float64s, height_mm: float
+) -> Float64s:
     """Covariance of the work position of each pixel, shape (N, 2, 2), mm², from that of the parameters."""
     steps = _STEP * np.sqrt(np.maximum(np.diag(spread), 0))
     columns = []
@@ -83,7 +83,7 @@ def position_variances(
 
 def _moved(
     solved: cv.Solved, model: LensModel, plane: int, index: int, step: float
-) -> tuple[cv.Solved, Floats, Floats]:
+) -> tuple[cv.Solved, Float64s, Float64s]:
     """The solution with one of the covariance's parameters moved."""
     matrix, distortion = solved.camera_matrix.copy(), solved.distortion.copy()
     rotation, translation = solved.rotations[plane].copy(), solved.translations[plane].copy()

@@ -8,7 +8,6 @@ from enum import Enum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.camera_calibration.calibration_spread import covariance, on_plane, position_variances
@@ -17,9 +16,8 @@ from contour.camera_calibration.length_check import LengthCheck, rounded_up
 from contour.camera_calibration.lens_models import LensModel, Observed, Progress, residuals, solve
 from contour.camera_calibration.residual_structure import structure_px
 from contour.camera_calibration.student_t import two_sided_95
+from contour.geometry.arrays import Float64s
 from contour.image import opencv_boards as cv
-
-Floats = NDArray[np.float64]
 
 SPLITS = 5
 ROWS, COLUMNS = 13, 17
@@ -100,7 +98,7 @@ class Verdict:
     sentence: str
     overrides: tuple[str, ...]
     uncertainty: PositionUncertainty
-    halves_mm: Floats
+    halves_mm: Float64s
     inflation: float
     zones: Zones
     structure_px: float
@@ -112,24 +110,32 @@ class Verdict:
         return self.judgement is Judgement.GOOD
 
 
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A camera solved from views of `size` (width, height), whose work plane is that of view number `plane`."""
+
+    size: tuple[int, int]
+    model: LensModel
+    solved: cv.Solved
+    plane: int
+
+
 def judge_calibration(
     views: Sequence[Observed],
-    size: tuple[int, int],
-    model: LensModel,
-    solved: cv.Solved,
-    plane: int,
+    solution: Solution,
     demands: Demands,
     lengths: Sequence[LengthCheck],
     on_progress: Progress,
 ) -> Verdict:
-    """The verdict on a solution whose work plane is that of view number `plane`, and on lengths that it gives."""
+    """The verdict on a solution, and on lengths that it gives."""
+    size, model, solved, plane = solution.size, solution.model, solution.solved, solution.plane
     heights = np.array(sorted({0.0, demands.block_mm / 2, demands.block_mm, 2 * demands.block_mm}))
     grid = places(size)
     lifted = heights - demands.board_thickness_mm
     spread = covariance(views, solved, model, plane)
     variances = [position_variances(solved, model, plane, spread, grid, height) for height in lifted]
     propagated = np.stack([np.sqrt(np.trace(one, axis1=1, axis2=2)) for one in variances])
-    halves = _halves(views, size, model, solved, plane, lifted, grid, on_progress)
+    halves = _halves(views, solution, lifted, grid, on_progress)
     zones = covered_zones([view.pixels for view in views], size)
     inside = zones.inside(grid)
     inflation = _inflation(halves[:, inside], propagated[:, inside])
@@ -160,29 +166,23 @@ def judge_calibration(
     )
 
 
-def places(size: tuple[int, int]) -> Floats:
+def places(size: tuple[int, int]) -> Float64s:
     """The pixels of the maps' places, row by row, shape (ROWS * COLUMNS, 2)."""
     across, down = np.meshgrid(np.linspace(0, size[0] - 1, COLUMNS), np.linspace(0, size[1] - 1, ROWS))
     return np.column_stack([across.ravel(), down.ravel()])
 
 
-def finite(values: Floats) -> Floats:
+def finite(values: Float64s) -> Float64s:
     """The values, those that are no numbers (a lens model folds over there) as the largest of the others."""
     bad = ~np.isfinite(values)
     return np.where(bad, values[~bad].max(initial=0.0), values) if bad.any() else values
 
 
 def _halves(
-    views: Sequence[Observed],
-    size: tuple[int, int],
-    model: LensModel,
-    solved: cv.Solved,
-    plane: int,
-    heights: Floats,
-    grid: Floats,
-    on_progress: Progress,
-) -> Floats:
+    views: Sequence[Observed], solution: Solution, heights: Float64s, grid: Float64s, on_progress: Progress
+) -> Float64s:
     """Distance between the maps of two halves, root mean square over the splits, shape (heights, places), mm."""
+    solved, plane = solution.solved, solution.plane
     rng = np.random.default_rng(len(views))
     others = [index for index in range(len(views)) if index != plane]
     squares, used = np.zeros((len(heights), len(grid))), 0
@@ -193,7 +193,7 @@ def _halves(
         for which in (0, 1):
             # Both halves need the plane view: each takes every other corner of it.
             half = [views[plane].half(which), *(views[index] for index in order[which::2])]
-            found = solve(half, size, model, (solved.camera_matrix, solved.distortion))
+            found = solve(half, solution.size, solution.model, (solved.camera_matrix, solved.distortion))
             if found is None:
                 break
             maps.append([on_plane(found, found.rotations[0], found.translations[0], grid, one) for one in heights])
@@ -205,7 +205,7 @@ def _halves(
     return np.asarray(np.sqrt(squares / used))
 
 
-def _inflation(halves: Floats, propagated: Floats) -> float:
+def _inflation(halves: Float64s, propagated: Float64s) -> float:
     """How much farther apart two halves lie than propagated noise says, at least 1.
 
     Half the views have twice the variance, and the difference of two halves twice that again: half their distance is to
@@ -228,10 +228,10 @@ def _scale(solved: cv.Solved, plane: int, size: tuple[int, int]) -> float:
 
 
 def _contradictions(lengths: Sequence[LengthCheck], demands: Demands) -> list[_Fault]:
-    told = [(check, check.fault(demands.accept_apart)) for check in lengths]
+    faults = [(check, check.fault(demands.accept_apart)) for check in lengths]
     return [
         _Fault(Judgement.CONTRADICTED, text, "--accept-apart-percent", check.needed_percent)
-        for check, text in told
+        for check, text in faults
         if text is not None
     ]
 
@@ -257,7 +257,7 @@ def _uncovered(zones: Zones, demands: Demands) -> list[_Fault]:
         return []
     places = ", ".join(f"({x:g}, {y:g})" for x, y in missing)
     text = (
-        f"corners enclose {zones.told}; of --area-px {places} px {'lies' if len(missing) == 1 else 'lie'} outside. "
+        f"corners enclose {zones.text}; of --area-px {places} px {'lies' if len(missing) == 1 else 'lie'} outside. "
         "Bring the board's corners beyond there, or give the smaller area that blocks lie in"
     )
     return [_Fault(Judgement.MORE_COVERAGE, text, "--accept-uncovered")]

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bools, Float64s, Int64s
 from contour.image.opencv_boards import convex_hull, inside_ring
-
-Floats = NDArray[np.float64]
 
 COLUMNS, ROWS = 16, 12
 
@@ -19,12 +17,12 @@ COLUMNS, ROWS = 16, 12
 class Zones:
     """The picture in COLUMNS x ROWS zones: corners seen in each, shape (ROWS, COLUMNS), and the hull of all, (N, 2)."""
 
-    counts: NDArray[np.int64]
-    hull_px: Floats
+    counts: Int64s
+    hull_px: Float64s
     covered_share: float
 
     @property
-    def told(self) -> str:
+    def text(self) -> str:
         """How much of the picture the corners enclose, and between which columns and rows."""
         (left, top), (right, bottom) = self.hull_px.min(axis=0), self.hull_px.max(axis=0)
         return (
@@ -32,12 +30,12 @@ class Zones:
             f"{bottom:.0f} px"
         )
 
-    def inside(self, points_px: Floats) -> NDArray[np.bool_]:
+    def inside(self, points_px: Float64s) -> Bools:
         """True for each pixel within the hull of all corners."""
         return inside_ring(self.hull_px, points_px)
 
 
-def covered_zones(pixels: Sequence[Floats], size: tuple[int, int]) -> Zones:
+def covered_zones(pixels: Sequence[Float64s], size: tuple[int, int]) -> Zones:
     """The zones of a picture of (width, height) px in which the corners lie; the share is the hull's of the picture."""
     corners = np.concatenate(pixels)
     column = np.clip((corners[:, 0] + 0.5) * COLUMNS / size[0], 0, COLUMNS - 1).astype(np.int64)

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from math import ceil, floor, log10
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationFailed
-
-Floats = NDArray[np.float64]
+from contour.geometry.arrays import Float64s
 
 WARN_SHARE = 0.03
 """A tape is read to the front of the lens, the camera's centre lies 10 to 50 mm off it: up to 3 % from 1.2 m on."""
@@ -32,7 +30,7 @@ class KnownLength:
     """A length on the calibrated plane, measured by hand, and the pixels of its two ends, shape (2, 2)."""
 
     length_mm: float
-    ends_px: Floats
+    ends_px: Float64s
 
     def check(self, size: tuple[int, int]) -> None:
         """Raise CalibrationFailed where an end lies outside a picture of (width, height) px, or both too near."""

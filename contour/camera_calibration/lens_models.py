@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float64s
 from contour.image import opencv_boards as cv
 from contour.image.opencv import project
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 
@@ -73,8 +72,8 @@ _CLEARLY = 3.0
 class Observed:
     """One view as numbers: corners on the board (N, 3), mm, and their pixels (N, 2)."""
 
-    points_mm: Floats
-    pixels: Floats
+    points_mm: Float64s
+    pixels: Float64s
 
     def half(self, which: int) -> Observed:
         """Every other corner: 0 or 1."""
@@ -82,7 +81,7 @@ class Observed:
 
 
 def solve(
-    views: Sequence[Observed], size: tuple[int, int], model: LensModel, guess: tuple[Floats, Floats] | None = None
+    views: Sequence[Observed], size: tuple[int, int], model: LensModel, guess: tuple[Float64s, Float64s] | None = None
 ) -> cv.Solved | None:
     """The camera that fits the views best under the model, or None where there is no solution."""
     if guess is not None:
@@ -116,7 +115,7 @@ def choose_model(
     Views are left out in `folds` turns. The standard error is that of the paired difference over views (the rule of one
     standard error, Breiman et al., 1984). Last, pixels that are not square are tried for the chosen order.
     """
-    errors: list[tuple[LensModel, Floats]] = []
+    errors: list[tuple[LensModel, Float64s]] = []
     trials: list[Trial] = []
     for model in MODELS:
         on_progress(f"cross-validating the lens model '{model.name}'")
@@ -133,7 +132,7 @@ def choose_model(
     return (free if clearly else chosen), trials
 
 
-def _simplest(errors: list[tuple[LensModel, Floats]]) -> LensModel:
+def _simplest(errors: list[tuple[LensModel, Float64s]]) -> LensModel:
     finite = [(model, squares) for model, squares in errors if np.isfinite(squares).all()]
     if not finite:
         return errors[0][0]
@@ -145,7 +144,7 @@ def _simplest(errors: list[tuple[LensModel, Floats]]) -> LensModel:
     return finite[-1][0]
 
 
-def _try(views: Sequence[Observed], size: tuple[int, int], model: LensModel, folds: int) -> tuple[Trial, Floats]:
+def _try(views: Sequence[Observed], size: tuple[int, int], model: LensModel, folds: int) -> tuple[Trial, Float64s]:
     """The trial, and the mean square error of each view when it was left out."""
     squares = np.full(len(views), np.inf)
     whole = solve(views, size, model)
@@ -174,7 +173,7 @@ def _unseen(view: Observed, solved: cv.Solved) -> float:
     return total / len(view.pixels)
 
 
-def residuals(views: Sequence[Observed], solved: cv.Solved) -> list[Floats]:
+def residuals(views: Sequence[Observed], solved: cv.Solved) -> list[Float64s]:
     """Seen less expected pixels of each view, shape (N, 2)."""
     return [
         view.pixels - project(view.points_mm, rotation, translation, solved.camera_matrix, solved.distortion)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.plane_calibration import PlaneCalibration
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.camera_calibration.calibration_verdict import COLUMNS, ROWS, places
 from contour.camera_calibration.student_t import two_sided_95
 from contour.errors import CalibrationError, CalibrationFailed
-
-Floats = NDArray[np.float64]
+from contour.geometry.arrays import Float64s
 
 FEWEST_POINTS = 4
 FLAT_SHARE = 0.05
@@ -25,11 +23,11 @@ class PointsResult:
     """A calibration from points, and how far each lies from where it puts it, shape (N,), mm."""
 
     calibration: PlaneCalibration
-    residuals_mm: Floats
+    residuals_mm: Float64s
 
 
 def calibrate_points(
-    pixels: Floats, points_mm: Floats, size: tuple[int, int], plane_height_mm: float = 0.0
+    pixels: Float64s, points_mm: Float64s, size: tuple[int, int], plane_height_mm: float = 0.0
 ) -> PointsResult:
     """The homography through 4 or more points, pixels (N, 2) and work millimetres (N, 2), of least squares in mm.
 
@@ -46,13 +44,13 @@ def calibrate_points(
         raise CalibrationFailed(f"the points give no usable map: {error}") from error
 
 
-def flatness(points: Floats) -> float:
+def flatness(points: Float64s) -> float:
     """Spread of points across their main direction as a share of that along it: 0 on one line, 1 all ways alike."""
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return float(spread[1] / spread[0]) if spread[0] > 0 else 0.0
 
 
-def _check(pixels: Floats, points_mm: Floats, size: tuple[int, int]) -> None:
+def _check(pixels: Float64s, points_mm: Float64s, size: tuple[int, int]) -> None:
     if len(pixels) < FEWEST_POINTS:
         raise CalibrationFailed(
             f"{len(pixels)} points, expected {FEWEST_POINTS} or more, better 8. Measure more points"
@@ -73,14 +71,14 @@ def _check(pixels: Floats, points_mm: Floats, size: tuple[int, int]) -> None:
             )
 
 
-def _three_on_a_line(points: Floats) -> bool:
+def _three_on_a_line(points: Float64s) -> bool:
     """True where no four of the points span a plane's map: all, or all but one, on one line."""
     if flatness(points) < FLAT_SHARE:
         return True
     return any(flatness(np.delete(points, index, axis=0)) < FLAT_SHARE for index in range(len(points)))
 
 
-def _homography(pixels: Floats, points_mm: Floats) -> Floats:
+def _homography(pixels: Float64s, points_mm: Float64s) -> Float64s:
     """Direct linear transform on normalised points (Hartley, 1997), then Gauss-Newton on the distances in mm."""
     to_unit, unit = _normalised(pixels)
     from_unit, target = _normalised(points_mm)
@@ -98,7 +96,7 @@ def _homography(pixels: Floats, points_mm: Floats) -> Floats:
     return np.asarray(np.linalg.inv(from_unit) @ matrix @ to_unit)
 
 
-def _normalised(points: Floats) -> tuple[Floats, Floats]:
+def _normalised(points: Float64s) -> tuple[Float64s, Float64s]:
     """The map that puts points around 0 with mean distance 1, and the points through it."""
     middle = points.mean(axis=0)
     scale = 1.0 / max(float(np.linalg.norm(points - middle, axis=1).mean()), 1e-12)
@@ -106,7 +104,7 @@ def _normalised(points: Floats) -> tuple[Floats, Floats]:
     return matrix, np.asarray((points - middle) * scale)
 
 
-def _mapped(matrix: Floats, points: Floats) -> tuple[Floats, Floats]:
+def _mapped(matrix: Float64s, points: Float64s) -> tuple[Float64s, Float64s]:
     """Points through a homography, (N, 2), and their derivatives by its nine numbers, (2 N, 9)."""
     lifted = np.column_stack([points, np.ones(len(points))])
     x, y, w = (lifted @ matrix.T).T
@@ -118,7 +116,7 @@ def _mapped(matrix: Floats, points: Floats) -> tuple[Floats, Floats]:
 
 
 def _uncertainty(
-    calibration: PlaneCalibration, pixels: Floats, misses: Floats, size: tuple[int, int]
+    calibration: PlaneCalibration, pixels: Float64s, misses: Float64s, size: tuple[int, int]
 ) -> PositionUncertainty | None:
     """95 % bounds by the residuals' spread, propagated; None where no residual tells it."""
     freedom = misses.size - 8

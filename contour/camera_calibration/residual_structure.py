@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from contour.geometry.arrays import Float64s
 
 COLUMNS, ROWS = 8, 6
 _FEWEST = 6
 
 
-def structure_px(pixels: Sequence[Floats], misses: Sequence[Floats], size: tuple[int, int]) -> float:
+def structure_px(pixels: Sequence[Float64s], misses: Sequence[Float64s], size: tuple[int, int]) -> float:
     """Root mean square over zones of the mean residual, what noise alone would give taken off, pixels.
 
     Independent noise of variance v leaves v / n in the mean of n; what is more has one cause throughout its zone.

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.camera_calibration.board import Board
 from contour.camera_calibration.board_detection import BoardView
 from contour.camera_calibration.lens_models import BROAD, Observed, residuals, solve
 from contour.errors import CalibrationFailed
+from contour.geometry.arrays import Float64s
 from contour.image.opencv import rotation_matrix
 from contour.image.opencv_boards import Solved
-
-Floats = NDArray[np.float64]
 
 FEWEST_VIEWS = 8
 """Two halves of four views each, the fewest that give a camera of their own."""
@@ -96,7 +94,7 @@ def without_outliers(
         dropped.append(Dropped(kept.pop(worst).name, reason))
 
 
-def _errors_px(views: Sequence[BoardView], board: Board, size: tuple[int, int]) -> Floats:
+def _errors_px(views: Sequence[BoardView], board: Board, size: tuple[int, int]) -> Float64s:
     observed = observe(views, board)
     solved = solve(observed, size, BROAD)
     if solved is None:

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour, Ring, densified
-
-Floats = NDArray[np.float64]
 
 SPACING_MM = 1.0
 MOST_SAMPLES = 4000
@@ -57,7 +55,7 @@ def compare(seen: Contour, master: Contour, *, fit: bool) -> Deviation:
     )
 
 
-def scatter_mm(outlines: Sequence[Contour]) -> Floats:
+def scatter_mm(outlines: Sequence[Contour]) -> Float64s:
     """Standard deviation, at places 1 mm apart along the first outline, of where all outlines cross there, (N,), mm."""
     places = _samples(outlines[0])
     if any(len(outline.holes) != len(outlines[0].holes) for outline in outlines):
@@ -66,7 +64,7 @@ def scatter_mm(outlines: Sequence[Contour]) -> Floats:
     return np.asarray(offsets.std(axis=0, ddof=1))
 
 
-def rigid_fit(seen: Contour, master: Contour) -> tuple[float, Floats]:
+def rigid_fit(seen: Contour, master: Contour) -> tuple[float, Float64s]:
     """Turn in radians and shift (2,) that lay the seen outline onto the master; any turn is tried.
 
     Point to line (Chen and Medioni, 1992): each point's distance to its nearest edge, least squares, again and again.
@@ -80,8 +78,8 @@ def rigid_fit(seen: Contour, master: Contour) -> tuple[float, Floats]:
 
 
 def _settled(
-    points: Floats, master: Contour, angle: float, steps: int, shift: Floats | None = None
-) -> tuple[float, Floats, float]:
+    points: Float64s, master: Contour, angle: float, steps: int, shift: Float64s | None = None
+) -> tuple[float, Float64s, float]:
     """The fit from a start, and its mean square distance."""
     if shift is None:
         shift = _samples(master).mean(axis=0) - _rotated(points, angle).mean(axis=0)
@@ -99,7 +97,7 @@ def _settled(
     return angle, np.asarray(shift), float((rest**2).mean())
 
 
-def _nearest(points: Floats, outline: Contour) -> tuple[Floats, Floats]:
+def _nearest(points: Float64s, outline: Contour) -> tuple[Float64s, Float64s]:
     """The nearest point of any ring to each point, and the outward normal of its edge, (N, 2) both."""
     start = np.concatenate(outline.rings)
     end = np.concatenate([np.roll(ring, -1, axis=0) for ring in outline.rings])
@@ -119,24 +117,24 @@ def _nearest(points: Floats, outline: Contour) -> tuple[Floats, Floats]:
     return nearest, normal[edge]
 
 
-def _signed(points: Floats, outline: Contour) -> Floats:
+def _signed(points: Float64s, outline: Contour) -> Float64s:
     """Distance of each point to the outline, positive where it lies outside, (N,)."""
     nearest, normal = _nearest(points, outline)
     rest = points - nearest
     return np.asarray(np.hypot(*rest.T) * np.where((rest * normal).sum(axis=1) < 0, -1.0, 1.0))
 
 
-def _samples(outline: Contour) -> Floats:
+def _samples(outline: Contour) -> Float64s:
     length = sum(float(np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1).sum()) for ring in outline.rings)
     spacing = max(SPACING_MM, length / MOST_SAMPLES)
     return np.concatenate([densified(ring, spacing) for ring in outline.rings])
 
 
-def _rotated(points: Floats, angle: float) -> Floats:
+def _rotated(points: Float64s, angle: float) -> Float64s:
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.asarray(points @ np.array([[cosine, sine], [-sine, cosine]]))
 
 
-def _moved_rings(outline: Contour, angle: float, shift: Floats) -> tuple[Ring, tuple[Ring, ...]]:
+def _moved_rings(outline: Contour, angle: float, shift: Float64s) -> tuple[Ring, tuple[Ring, ...]]:
     rings = [_rotated(ring, angle) + shift for ring in outline.rings]
     return rings[0], tuple(rings[1:])

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float64s
 from contour.geometry.segments import BoxTree, contains, distances_to_ring, first_meeting, self_meetings
 from contour.geometry.simplification import simplify_indices
 
@@ -33,7 +33,7 @@ __all__ = [
     "simplify_indices",
 ]
 
-Ring = NDArray[np.float64]
+Ring = Float64s
 """Vertices of a closed polygon, shape (N, 2), N >= 3, first vertex not repeated."""
 
 

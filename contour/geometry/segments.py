@@ -13,8 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from contour.geometry.arrays import Bools, Float64s, Indices
 
 _MOST_PAIRS = 1 << 18
 """Pairs handled at once: 256 Ki pairs of boxes are about 20 MB, whatever the ring."""
@@ -32,18 +31,18 @@ _SPLITTER = 134217729.0
 class BoxTree:
     """Boxes over runs of consecutive segments; `levels[0]` holds one box a segment, each further level half as many."""
 
-    start: Floats
-    end: Floats
-    levels: tuple[tuple[Floats, Floats], ...]
+    start: Float64s
+    end: Float64s
+    levels: tuple[tuple[Float64s, Float64s], ...]
 
     @classmethod
-    def of_ring(cls, ring: Floats) -> BoxTree:
+    def of_ring(cls, ring: Float64s) -> BoxTree:
         """The tree over the ring's N segments; segment i runs from vertex i to vertex i + 1 (cyclic)."""
         start = np.ascontiguousarray(ring, dtype=np.float64)
         return cls.of_segments(start, np.roll(start, -1, axis=0))
 
     @classmethod
-    def of_segments(cls, start: Floats, end: Floats) -> BoxTree:
+    def of_segments(cls, start: Float64s, end: Float64s) -> BoxTree:
         """The tree over N segments, the better the nearer neighbours lie to each other."""
         levels = [(np.minimum(start, end), np.maximum(start, end))]
         while len(levels[-1][0]) > 1:
@@ -52,7 +51,7 @@ class BoxTree:
             levels.append((np.minimum.reduceat(low, cuts), np.maximum.reduceat(high, cuts)))
         return cls(start, end, tuple(levels))
 
-    def at(self, level: int) -> tuple[Floats, Floats]:
+    def at(self, level: int) -> tuple[Float64s, Float64s]:
         """Low and high corners at a level; above the root the root again, so that trees of two heights go together."""
         return self.levels[min(level, len(self.levels) - 1)]
 
@@ -65,7 +64,7 @@ def _children(nodes: Indices, tree: BoxTree, level: int) -> tuple[Indices, Indic
     return first, np.minimum(first + 1, len(tree.levels[level - 1][0]) - 1)
 
 
-def _boxes_meet(a: BoxTree, b: BoxTree, level: int, i: Indices, j: Indices) -> NDArray[np.bool_]:
+def _boxes_meet(a: BoxTree, b: BoxTree, level: int, i: Indices, j: Indices) -> Bools:
     low_a, high_a = a.at(level)
     low_b, high_b = b.at(level)
     meets = (low_a[i] <= high_b[j]) & (low_b[j] <= high_a[i])
@@ -103,7 +102,7 @@ def near_pairs(a: BoxTree, b: BoxTree | None = None) -> Iterator[tuple[Indices, 
         stack.append((level - 1, i[keep], j[keep]))
 
 
-def _product_is_exact(a: Floats, b: Floats, product: Floats) -> NDArray[np.bool_]:
+def _product_is_exact(a: Float64s, b: Float64s, product: Float64s) -> Bools:
     """True where `product` = fl(a·b) lost nothing (Dekker's two-product)."""
     big = _SPLITTER * a
     a_high = big - (big - a)
@@ -115,19 +114,19 @@ def _product_is_exact(a: Floats, b: Floats, product: Floats) -> NDArray[np.bool_
     return np.asarray((tail == 0) & ~underflows)
 
 
-def _difference_is_exact(a: Floats, b: Floats, difference: Floats) -> NDArray[np.bool_]:
+def _difference_is_exact(a: Float64s, b: Float64s, difference: Float64s) -> Bools:
     """True where `difference` = fl(a - b) lost nothing (Knuth's two-sum)."""
     virtual_b = a - difference
     return np.asarray(((a - (difference + virtual_b)) + (virtual_b - b)) == 0)
 
 
-def _exact_turn(a: Floats, b: Floats, c: Floats) -> int:
+def _exact_turn(a: Float64s, b: Float64s, c: Float64s) -> int:
     ax, ay, bx, by, cx, cy = (Fraction(float(value)) for value in (*a, *b, *c))
     turn = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     return (turn > 0) - (turn < 0)
 
 
-def turns(a: Floats, b: Floats, c: Floats) -> NDArray[np.int8]:
+def turns(a: Float64s, b: Float64s, c: Float64s) -> NDArray[np.int8]:
     """Exact sign of the turn a → b → c, shape (N,): 1 to the left (axes x right, y up), 0 straight, -1 to the right."""
     bx, by, cx, cy = b[:, 0] - a[:, 0], b[:, 1] - a[:, 1], c[:, 0] - a[:, 0], c[:, 1] - a[:, 1]
     left, right = bx * cy, by * cx
@@ -147,7 +146,7 @@ def turns(a: Floats, b: Floats, c: Floats) -> NDArray[np.int8]:
     return signs
 
 
-def segments_meet(p0: Floats, p1: Floats, q0: Floats, q1: Floats) -> NDArray[np.bool_]:
+def segments_meet(p0: Float64s, p1: Float64s, q0: Float64s, q1: Float64s) -> Bools:
     """True where the closed segments p0 p1 and q0 q1 share a point, shape (N,); exact, touching included.
 
     Expects that the segments' boxes meet (`near_pairs`): collinear segments with meeting boxes share a point.
@@ -167,7 +166,7 @@ def first_meeting(a: BoxTree, b: BoxTree) -> tuple[int, int] | None:
     return None
 
 
-def self_meetings(tree: BoxTree) -> Iterator[NDArray[np.intp]]:
+def self_meetings(tree: BoxTree) -> Iterator[Indices]:
     """Chunks of pairs, shape (M, 2), of a ring's segments that share a point they should not.
 
     Neighbours share their common vertex and no more: a spike that folds back on itself counts, and so does a
@@ -186,13 +185,13 @@ def self_meetings(tree: BoxTree) -> Iterator[NDArray[np.intp]]:
             yield np.stack([i[meets], j[meets]], axis=1)
 
 
-def _folds_back(a: Floats, b: Floats, c: Floats) -> NDArray[np.bool_]:
+def _folds_back(a: Float64s, b: Float64s, c: Float64s) -> Bools:
     """True where the path a → b → c returns on itself; standing still counts as that."""
     onward = ((b - a) * (c - b)).sum(axis=1)
     return np.asarray((onward <= 0) & (turns(a, b, c) == 0))
 
 
-def contains(ring: Floats, points: Floats) -> NDArray[np.bool_]:
+def contains(ring: Float64s, points: Float64s) -> Bools:
     """True where a point lies inside the ring by the even-odd rule, shape (P,); a point on the ring is either."""
     start, end = ring, np.roll(ring, -1, axis=0)
     inside = np.zeros(len(points), np.bool_)
@@ -205,7 +204,7 @@ def contains(ring: Floats, points: Floats) -> NDArray[np.bool_]:
     return inside
 
 
-def distances_to_segments(points: Floats, start: Floats, end: Floats) -> Floats:
+def distances_to_segments(points: Float64s, start: Float64s, end: Float64s) -> Float64s:
     """Distance of each point to its own closed segment, shape (N,)."""
     along = end - start
     offset = points - start
@@ -215,14 +214,14 @@ def distances_to_segments(points: Floats, start: Floats, end: Floats) -> Floats:
     return np.asarray(np.hypot(rest[:, 0], rest[:, 1]))
 
 
-def distances_to_ring(points: Floats, ring: Floats) -> Floats:
+def distances_to_ring(points: Float64s, ring: Float64s) -> Float64s:
     """Distance of each point to the nearest point of the closed ring, shape (P,)."""
     tree = BoxTree.of_ring(ring)
     parts = [_distances(points[k : k + _POINTS_AT_ONCE], tree) for k in range(0, len(points), _POINTS_AT_ONCE)]
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
-def _distances(points: Floats, tree: BoxTree) -> Floats:
+def _distances(points: Float64s, tree: BoxTree) -> Float64s:
     nearest = np.full(len(points), np.inf)
     point = np.arange(len(points), dtype=np.intp)
     node = np.zeros(len(points), np.intp)

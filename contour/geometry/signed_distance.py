@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Ring
 
 
-def depth_inside(ring: Ring, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def depth_inside(ring: Ring, points: Float64s) -> Float64s:
     """Distance of points (N, 2) from the ring, shape (N,), positive inside, negative outside, in the ring's unit."""
     start, following = ring, np.roll(ring, -1, axis=0)
     along = following - start

@@ -12,13 +12,9 @@ tolerance, the fewest by a shortest path over the allowed shortcuts (Imai & Iri 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bools, Float64s, Indices
 from contour.geometry.segments import BoxTree, distances_to_segments, self_meetings
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 _FINER = (0.0, 0.35, 0.6, 0.8)
 """Shares of the tolerance at which Douglas-Peucker offers candidates; the first that offers few enough is used. At 0
@@ -34,7 +30,7 @@ _MOST_CELLS = 1 << 19
 """Cells of one batch of cones: starts x reach."""
 
 
-def simplify_indices(ring: Floats, tolerance: float) -> Indices:
+def simplify_indices(ring: Float64s, tolerance: float) -> Indices:
     """Indices of the vertices to keep, ascending, at least 3: the ring through them lies within `tolerance` both ways.
 
     `tolerance` is in the ring's unit. A simple ring stays simple. The choice does not depend on where the ring starts,
@@ -56,7 +52,7 @@ def simplify_indices(ring: Floats, tolerance: float) -> Indices:
     return np.sort((chosen + anchor) % count)
 
 
-def _far_apart(ring: Floats) -> tuple[int, int]:
+def _far_apart(ring: Float64s) -> tuple[int, int]:
     """Indices of two vertices far apart, found by geometry alone; corners of the hull, so likely to be kept anyway."""
     first = np.lexsort((ring[:, 1], ring[:, 0]))[0]
     offset = ring - ring[first]
@@ -65,7 +61,7 @@ def _far_apart(ring: Floats) -> tuple[int, int]:
     return one, int(np.argmax(np.einsum("ij,ij->i", offset, offset)))
 
 
-def _douglas_peucker(path: Floats, forced: Mask, tolerance: float) -> Mask:
+def _douglas_peucker(path: Float64s, forced: Bools, tolerance: float) -> Bools:
     """Mask of the vertices kept on an open path, `forced` among them (both ends are): all levels, each at once."""
     kept = forced.copy()
     bounds = np.flatnonzero(forced)
@@ -82,7 +78,7 @@ def _douglas_peucker(path: Floats, forced: Mask, tolerance: float) -> Mask:
         begin, end = np.concatenate([begin, farthest]), np.concatenate([farthest, end])
 
 
-def _farthest(path: Floats, begin: Indices, end: Indices) -> tuple[Indices, Floats]:
+def _farthest(path: Float64s, begin: Indices, end: Indices) -> tuple[Indices, Float64s]:
     """The vertex strictly between begin and end that is farthest from their segment, and how far, for each stretch."""
     counts = end - begin - 1
     first = np.cumsum(counts) - counts
@@ -95,7 +91,7 @@ def _farthest(path: Floats, begin: Indices, end: Indices) -> tuple[Indices, Floa
     return index[hits[once]], largest
 
 
-def _at_least_three(path: Floats, kept: Mask, tolerance: float) -> Mask:
+def _at_least_three(path: Float64s, kept: Bools, tolerance: float) -> Bools:
     """The mask with a third vertex where all lies within the tolerance of one segment: the one farthest from it."""
     if np.count_nonzero(kept) > 3:
         return kept
@@ -107,7 +103,7 @@ def _at_least_three(path: Floats, kept: Mask, tolerance: float) -> Mask:
     return _douglas_peucker(path, forced, tolerance)
 
 
-def _fewest(path: Floats, kept: Mask, tolerance: float) -> Indices:
+def _fewest(path: Float64s, kept: Bools, tolerance: float) -> Indices:
     """Indices (without the path's end, which is its start) of as few vertices as the candidates allow."""
     plain = np.flatnonzero(kept)[:-1]
     if len(plain) <= 3 or tolerance <= 0:
@@ -129,7 +125,7 @@ def _fewest(path: Floats, kept: Mask, tolerance: float) -> Indices:
     return min(solutions, key=len)
 
 
-def _shortest(path: Floats, candidates: Indices, tolerance: float) -> Indices:
+def _shortest(path: Float64s, candidates: Indices, tolerance: float) -> Indices:
     """Fewest of the candidates (path indices, both ends among them) joined by allowed shortcuts; the end left out."""
     forward = _cones(path, candidates, tolerance)
     backward = _cones(path[::-1], (len(path) - 1) - candidates[::-1], tolerance)
@@ -152,7 +148,7 @@ def _shortest(path: Floats, candidates: Indices, tolerance: float) -> Indices:
     return candidates[chosen[:0:-1]]
 
 
-def _area_shift(path: Floats, candidates: Indices) -> Floats:
+def _area_shift(path: Float64s, candidates: Indices) -> Float64s:
     """Area between the path and the shortcut from candidate i to j, shape (C, C), by sums of cross products."""
     centred = path - path.mean(axis=0)
     x, y = centred.T
@@ -162,7 +158,7 @@ def _area_shift(path: Floats, candidates: Indices) -> Floats:
     return np.asarray(np.abs(swept[None, :] - swept[:, None] - chord) / 2)
 
 
-def _cones(path: Floats, starts: Indices, tolerance: float) -> Mask:
+def _cones(path: Float64s, starts: Indices, tolerance: float) -> Bools:
     """allowed[i, j]: the ray from starts[i] through starts[j] passes all path vertices between within `tolerance`."""
     allowed = np.zeros((len(starts), len(starts)), np.bool_)
     waiting = np.arange(len(starts) - 1)
@@ -178,7 +174,7 @@ def _cones(path: Floats, starts: Indices, tolerance: float) -> Mask:
     return allowed
 
 
-def _cone_batch(path: Floats, starts: Indices, rows: Indices, reach: int, tolerance: float, allowed: Mask) -> Mask:
+def _cone_batch(path: Float64s, starts: Indices, rows: Indices, reach: int, tolerance: float, allowed: Bools) -> Bools:
     """Fill `allowed` for some starts, looking `reach` vertices ahead; True for starts whose cone is still open then.
 
     A vertex farther than the tolerance allows directions within asin(tolerance / distance) of its own; what has been
@@ -207,7 +203,7 @@ def _cone_batch(path: Floats, starts: Indices, rows: Indices, reach: int, tolera
     return np.asarray((low[:, -1] <= high[:, -1]) & (starts[rows] + reach < last))
 
 
-def _untangled(path: Floats, kept: Indices, tolerance: float) -> Indices:
+def _untangled(path: Float64s, kept: Indices, tolerance: float) -> Indices:
     """The choice with vertices put back until its ring is simple, as far as the path itself is."""
     last = len(path) - 1
     while True:

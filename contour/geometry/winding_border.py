@@ -11,14 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Bools, Float64s, Int64s
 from contour.geometry.segments import BoxTree, near_pairs
 from contour.geometry.simplification import simplify_indices
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _BITS = 28
 """Of a coordinate on the grid: differences have 29, their products 58, so that int64 decides every turn exactly. Of
@@ -33,7 +30,7 @@ _GRID_STEPS = 2.0
 _ROWS = 256
 
 
-def positive_border(curves: Sequence[Floats]) -> tuple[tuple[Floats, ...], float]:
+def positive_border(curves: Sequence[Float64s]) -> tuple[tuple[Float64s, ...], float]:
     """Rings around all points with a positive winding number, that region on their left, and the grid's step.
 
     Curves have shape (N, 2) and are closed. Rings are within two steps of the exact ones; two that touch at a point may
@@ -49,7 +46,7 @@ def positive_border(curves: Sequence[Floats]) -> tuple[tuple[Floats, ...], float
     return tuple(ring[simplify_indices(ring, _GRID_STEPS)] * step + low for ring in rings), step
 
 
-def _cut_apart(start: Ints, end: Ints) -> tuple[Ints, Ints]:
+def _cut_apart(start: Int64s, end: Int64s) -> tuple[Int64s, Int64s]:
     """The same edges in pieces that share end points at most."""
     for _ in range(_MOST_ROUNDS):
         moves = (start != end).any(axis=1)
@@ -61,17 +58,17 @@ def _cut_apart(start: Ints, end: Ints) -> tuple[Ints, Ints]:
     raise ParameterError(f"The curves' crossings are not told apart in {_MOST_ROUNDS} rounds. Use fewer vertices.")
 
 
-def _turns(a: Ints, b: Ints, c: Ints) -> NDArray[np.int64]:
+def _turns(a: Int64s, b: Int64s, c: Int64s) -> Int64s:
     """Sign of the turn a -> b -> c, exact: 1 to the left, 0 straight, -1 to the right."""
     one, two = b - a, c - a
     return np.asarray(np.sign(one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]))
 
 
-def _cuts(start: Ints, end: Ints) -> tuple[Ints, Ints]:
+def _cuts(start: Int64s, end: Int64s) -> tuple[Int64s, Int64s]:
     """Edges to cut, and where: at crossings, and at the end points of others that lie on them."""
     tree = BoxTree.of_segments(start.astype(np.float64), end.astype(np.float64))
-    owners: list[Ints] = []
-    points: list[Ints] = []
+    owners: list[Int64s] = []
+    points: list[Int64s] = []
     for i, j in near_pairs(tree):
         a, b, c, d = start[i], end[i], start[j], end[j]
         sides = _turns(a, b, c), _turns(a, b, d), _turns(c, d, a), _turns(c, d, b)
@@ -91,14 +88,14 @@ def _cuts(start: Ints, end: Ints) -> tuple[Ints, Ints]:
     return np.concatenate(owners), np.concatenate(points)
 
 
-def _within(point: Ints, start: Ints, end: Ints) -> NDArray[np.bool_]:
+def _within(point: Int64s, start: Int64s, end: Int64s) -> Bools:
     """True where a point on an edge's line lies between its ends, ends left out."""
     inside = (point >= np.minimum(start, end)) & (point <= np.maximum(start, end))
     ends = (point == start).all(axis=1) | (point == end).all(axis=1)
     return np.asarray(inside.all(axis=1) & ~ends)
 
 
-def _crossing(a: Ints, b: Ints, c: Ints, d: Ints) -> tuple[int, int]:
+def _crossing(a: Int64s, b: Int64s, c: Int64s, d: Int64s) -> tuple[int, int]:
     """The grid point nearest to where two edges cross; in Python's integers, which do not overflow."""
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = a.tolist(), b.tolist(), c.tolist(), d.tolist()
     below = (bx - ax) * (dy - cy) - (by - ay) * (dx - cx)
@@ -109,7 +106,7 @@ def _crossing(a: Ints, b: Ints, c: Ints, d: Ints) -> tuple[int, int]:
     return ax + x, ay + y
 
 
-def _pieces(start: Ints, end: Ints, owner: Ints, points: Ints) -> tuple[Ints, Ints]:
+def _pieces(start: Int64s, end: Int64s, owner: Int64s, points: Int64s) -> tuple[Int64s, Int64s]:
     """The edges with theirs cut at the points, in the order of the edges."""
     edge = np.concatenate([np.arange(len(start)), owner])
     along = ((points - start[owner]) * (end[owner] - start[owner])).sum(axis=1)
@@ -123,7 +120,7 @@ def _pieces(start: Ints, end: Ints, owner: Ints, points: Ints) -> tuple[Ints, In
     return begin, until
 
 
-def _border(start: Ints, end: Ints) -> tuple[Ints, Ints]:
+def _border(start: Int64s, end: Int64s) -> tuple[Int64s, Int64s]:
     """Pieces with a positive winding number on one side only, directed so that it is on their left."""
     back = (start[:, 0] > end[:, 0]) | ((start[:, 0] == end[:, 0]) & (start[:, 1] > end[:, 1]))
     low, high = np.where(back[:, None], end, start), np.where(back[:, None], start, end)
@@ -137,7 +134,7 @@ def _border(start: Ints, end: Ints) -> tuple[Ints, Ints]:
     return np.concatenate([low[forward], high[backward]]), np.concatenate([high[forward], low[backward]])
 
 
-def _winding_left(low: Ints, high: Ints, times: Ints) -> Ints:
+def _winding_left(low: Int64s, high: Int64s, times: Int64s) -> Int64s:
     """Winding number just left of each piece, by a ray from its middle along x; `times` it runs from low to high."""
     middle = low + high  # twice the middle; the ends count twice below
     rises = high[:, 1] > low[:, 1]
@@ -156,7 +153,7 @@ def _winding_left(low: Ints, high: Ints, times: Ints) -> Ints:
     return np.asarray(winding + np.where(rises, times, 0))
 
 
-def _loops(start: Ints, end: Ints) -> list[Floats]:
+def _loops(start: Int64s, end: Int64s) -> list[Float64s]:
     """The directed pieces as closed rings; as many end in each point as begin there."""
     after: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for (x, y), (to_x, to_y) in zip(start.tolist(), end.tolist(), strict=True):

@@ -8,20 +8,20 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
-Floats = NDArray[np.float64]
-Anything = TypeVar("Anything", NDArray[np.uint8], NDArray[np.uint16], NDArray[np.float32])
+from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, Int64s
+
+Anything = TypeVar("Anything", Bytes, NDArray[np.uint16], Float32s)
 
 _LENS_STEPS = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 """undistortPoints stops after 5 steps by itself, which leaves tenths of a pixel in the corners of wide lenses."""
 
 
-def rotation_matrix(rotation_vector: Floats) -> Floats:
+def rotation_matrix(rotation_vector: Float64s) -> Float64s:
     """Rotation matrix (3, 3) of a Rodrigues vector."""
     return np.asarray(cv2.Rodrigues(np.asarray(rotation_vector, np.float64).reshape(3, 1))[0], np.float64)
 
 
-def camera_rays(points_px: Floats, camera_matrix: Floats, distortion: Floats) -> Floats:
+def camera_rays(points_px: Float64s, camera_matrix: Float64s, distortion: Float64s) -> Float64s:
     """Directions in the camera frame with z = 1, shape (N, 3), that the lens maps to the pixels."""
     if len(points_px) == 0:
         return np.zeros((0, 3))
@@ -30,7 +30,9 @@ def camera_rays(points_px: Floats, camera_matrix: Floats, distortion: Floats) ->
     return np.column_stack([np.asarray(rays, np.float64).reshape(-1, 2), np.ones(len(points_px))])
 
 
-def project(points: Floats, rotation: Floats, translation: Floats, camera_matrix: Floats, distortion: Floats) -> Floats:
+def project(
+    points: Float64s, rotation: Float64s, translation: Float64s, camera_matrix: Float64s, distortion: Float64s
+) -> Float64s:
     """Pixels, shape (N, 2), of points in space, shape (N, 3)."""
     if len(points) == 0:
         return np.zeros((0, 2))
@@ -42,32 +44,32 @@ def project(points: Floats, rotation: Floats, translation: Floats, camera_matrix
 class FoundContours(NamedTuple):
     """Rings through pixel centres, each (N, 2) int32, and for each its parent's index, -1 for an outer one."""
 
-    rings: list[NDArray[np.int32]]
-    parents: NDArray[np.int32]
+    rings: list[Int32s]
+    parents: Int32s
 
 
-def outer_contours(mask: Picture) -> list[NDArray[np.int32]]:
+def outer_contours(mask: Bytes) -> list[Int32s]:
     """The outer contours of the white components, all their points."""
     found, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return [cast(NDArray[np.int32], ring).reshape(-1, 2) for ring in found]
+    return [cast(Int32s, ring).reshape(-1, 2) for ring in found]
 
 
-def contours_in_two_levels(mask: Picture) -> FoundContours:
+def contours_in_two_levels(mask: Bytes) -> FoundContours:
     """Outer contours of the white components and inner contours around their holes, all their points."""
     found, hierarchy = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    rings = [cast(NDArray[np.int32], ring).reshape(-1, 2) for ring in found]
+    rings = [cast(Int32s, ring).reshape(-1, 2) for ring in found]
     parents = np.asarray(hierarchy, np.int32).reshape(-1, 4)[:, 3] if rings else np.zeros(0, np.int32)
     return FoundContours(rings, parents)
 
 
-def enclosed_area(ring: NDArray[np.int32]) -> float:
+def enclosed_area(ring: Int32s) -> float:
     """Area within a pixel ring, px²."""
     return float(cv2.contourArea(ring))
 
 
-def integral(picture: Picture) -> NDArray[np.int32]:
+def integral(picture: Bytes) -> Int32s:
     """Sums of all pixels above and left, shape (H + 1, W + 1)."""
-    return cast(NDArray[np.int32], cv2.integral(picture, sdepth=cv2.CV_32S))
+    return cast(Int32s, cv2.integral(picture, sdepth=cv2.CV_32S))
 
 
 def box_mean(picture: Anything, size: int) -> Anything:
@@ -75,9 +77,9 @@ def box_mean(picture: Anything, size: int) -> Anything:
     return cast(Anything, cv2.blur(picture, (size, size), borderType=cv2.BORDER_REPLICATE))
 
 
-def gaussian(picture: Picture) -> Picture:
+def gaussian(picture: Bytes) -> Bytes:
     """The picture under a 3 x 3 binomial blur (sigma 0.85 px)."""
-    return cast(Picture, cv2.GaussianBlur(picture, (3, 3), 0))
+    return cast(Bytes, cv2.GaussianBlur(picture, (3, 3), 0))
 
 
 def shrunk(picture: Anything, factor: int) -> Anything:
@@ -102,63 +104,63 @@ def grown(picture: Anything, shape: tuple[int, ...]) -> Anything:
     return cast(Anything, cv2.resize(picture, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR))
 
 
-def as_float32(picture: NDArray[np.uint16]) -> NDArray[np.float32]:
+def as_float32(picture: NDArray[np.uint16]) -> Float32s:
     """The picture with 32-bit floats."""
     return picture.astype(np.float32)
 
 
-def subtracted(a: Picture, b: Picture) -> Picture:
+def subtracted(a: Bytes, b: Bytes) -> Bytes:
     """a - b, 0 where b is larger."""
-    return cast(Picture, cv2.subtract(a, b))
+    return cast(Bytes, cv2.subtract(a, b))
 
 
-def inverted(picture: Picture) -> Picture:
+def inverted(picture: Bytes) -> Bytes:
     """255 less the picture."""
-    return cast(Picture, cv2.bitwise_not(picture))
+    return cast(Bytes, cv2.bitwise_not(picture))
 
 
-def either(a: Picture, b: Picture) -> Picture:
+def either(a: Bytes, b: Bytes) -> Bytes:
     """Bits that are set in a or in b."""
-    return cast(Picture, cv2.bitwise_or(a, b))
+    return cast(Bytes, cv2.bitwise_or(a, b))
 
 
-def exceeding(picture: Picture, bound: Picture) -> Picture:
+def exceeding(picture: Bytes, bound: Bytes) -> Bytes:
     """255 where the picture is greater than the bound, else 0."""
-    return cast(Picture, cv2.compare(picture, bound, cv2.CMP_GT))
+    return cast(Bytes, cv2.compare(picture, bound, cv2.CMP_GT))
 
 
-def looked_up(picture: Picture, table: Anything) -> Anything:
+def looked_up(picture: Bytes, table: Anything) -> Anything:
     """table[picture], in the table's type; shape (256,)."""
     return cast(Anything, cv2.LUT(picture, table))
 
 
-def levels(picture: Picture) -> NDArray[np.int64]:
+def levels(picture: Bytes) -> Int64s:
     """Pixels at each of the 256 levels."""
     return np.asarray(cv2.calcHist([picture], [0], None, [256], [0, 256]), np.int64).ravel()
 
 
-def grey(picture: Picture) -> Picture:
+def grey(picture: Bytes) -> Bytes:
     """Grey levels of a BGR picture; a grey one is handed through."""
-    return picture if picture.ndim == 2 else cast(Picture, cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
+    return picture if picture.ndim == 2 else cast(Bytes, cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
 
 
-def otsu_threshold(picture: Picture) -> float:
+def otsu_threshold(picture: Bytes) -> float:
     """Otsu's threshold (1979) of a grey picture."""
     return float(cv2.threshold(picture, 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)[0])
 
 
-def above(picture: Picture, threshold: float) -> Picture:
+def above(picture: Bytes, threshold: float) -> Bytes:
     """255 where the picture is greater than the threshold, else 0."""
-    return cast(Picture, cv2.threshold(picture, threshold, 255, cv2.THRESH_BINARY)[1])
+    return cast(Bytes, cv2.threshold(picture, threshold, 255, cv2.THRESH_BINARY)[1])
 
 
-def region_boxes_and_areas(mask: Picture) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def region_boxes_and_areas(mask: Bytes) -> tuple[Int32s, Int32s]:
     """Boxes (left, top, width, height), shape (N, 4), and areas, shape (N,), of the black regions, joined by edges."""
     _, _, stats, _ = cv2.connectedComponentsWithStats(cv2.bitwise_not(mask), connectivity=4, ltype=cv2.CV_32S)
     table = np.asarray(stats, np.int32)[1:]
     return table[:, :4], table[:, cv2.CC_STAT_AREA]
 
 
-def bgr(picture: Picture) -> Picture:
+def bgr(picture: Bytes) -> Bytes:
     """A BGR copy of a grey or BGR picture."""
-    return cast(Picture, cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)) if picture.ndim == 2 else picture.copy()
+    return cast(Bytes, cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)) if picture.ndim == 2 else picture.copy()

@@ -10,9 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Picture = NDArray[np.uint8]
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int64s
 
 _CORNER_STEPS = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-4)
 _SOLVE_STEPS = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
@@ -38,7 +36,7 @@ def dictionary_size(name: str) -> int:
     return len(_dictionary(name).bytesList)
 
 
-def marker_bits(name: str, number: int) -> NDArray[np.bool_]:
+def marker_bits(name: str, number: int) -> Bools:
     """True where a mark is white, its black border of one cell included, shape (cells, cells), row 0 at the top."""
     dictionary = _dictionary(name)
     cells = dictionary.markerSize + 2
@@ -48,19 +46,19 @@ def marker_bits(name: str, number: int) -> NDArray[np.bool_]:
 class FoundMarks(NamedTuple):
     """ArUco marks: ids, shape (N,), and corners, shape (N, 4, 2), pixels."""
 
-    ids: Ints
-    corners_px: Floats
+    ids: Int64s
+    corners_px: Float64s
 
 
 class FoundCharuco(NamedTuple):
     """Inner corners by number, shape (N,) and (N, 2), and the marks they were found by."""
 
-    ids: Ints
-    corners_px: Floats
+    ids: Int64s
+    corners_px: Float64s
     marks: FoundMarks
 
 
-def find_marks(picture: Picture, dictionary: str) -> FoundMarks:
+def find_marks(picture: Bytes, dictionary: str) -> FoundMarks:
     """All marks of a dictionary in a grey picture, corners to a fraction of a pixel."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
@@ -70,7 +68,7 @@ def find_marks(picture: Picture, dictionary: str) -> FoundMarks:
 
 
 def find_charuco(
-    picture: Picture, squares: tuple[int, int], square_mm: float, marker_mm: float, dictionary: str
+    picture: Bytes, squares: tuple[int, int], square_mm: float, marker_mm: float, dictionary: str
 ) -> FoundCharuco:
     """Inner corners of a ChArUco board in a grey picture; every mark of the dictionary, the board's or not."""
     board = cv2.aruco.CharucoBoard(squares, square_mm, marker_mm, _dictionary(dictionary))
@@ -97,20 +95,20 @@ def _marks(corners: Sequence[NDArray[np.generic]], ids: NDArray[np.generic] | No
     return FoundMarks(np.asarray(ids, np.int64).ravel(), np.asarray(corners, np.float64).reshape(-1, 4, 2))
 
 
-def find_chessboard(picture: Picture, columns: int, rows: int) -> Floats | None:
+def find_chessboard(picture: Bytes, columns: int, rows: int) -> Float64s | None:
     """Inner corners of a whole chessboard in a grey picture, row by row in some order, shape (columns * rows, 2)."""
     done, corners = cv2.findChessboardCornersSB(picture, (columns, rows), flags=_PLAIN_CHESSBOARD)
     return np.asarray(corners, np.float64).reshape(-1, 2) if done else None
 
 
-def chessboard_in_view(picture: Picture) -> tuple[int, int] | None:
+def chessboard_in_view(picture: Bytes) -> tuple[int, int] | None:
     """Inner corners each way of any chessboard of 3 x 3 or more that the picture shows, or None."""
     flags = _PLAIN_CHESSBOARD | cv2.CALIB_CB_LARGER
     done, _, meta = cv2.findChessboardCornersSBWithMeta(picture, (3, 3), flags)
     return (int(meta.shape[1]), int(meta.shape[0])) if done else None
 
 
-def refined_corners(picture: Picture, corners_px: Floats, half_window_px: int) -> Floats:
+def refined_corners(picture: Bytes, corners_px: Float64s, half_window_px: int) -> Float64s:
     """Saddle points to a fraction of a pixel, by the gradients around them (Förstner), shape (N, 2)."""
     corners = np.ascontiguousarray(corners_px, np.float32).reshape(-1, 1, 2)
     size = (half_window_px, half_window_px)
@@ -119,7 +117,7 @@ def refined_corners(picture: Picture, corners_px: Floats, half_window_px: int) -
     return np.asarray(found, np.float64).reshape(-1, 2)
 
 
-def homography(source: Floats, target: Floats, threshold: float = 0.0) -> tuple[Floats, NDArray[np.bool_]] | None:
+def homography(source: Float64s, target: Float64s, threshold: float = 0.0) -> tuple[Float64s, Bools] | None:
     """The homography that takes source to target, by RANSAC where there is a threshold, and who fits; or None."""
     method = cv2.RANSAC if threshold > 0 else 0
     matrix, mask = cv2.findHomography(source, target, method, max(threshold, 1.0))
@@ -128,13 +126,13 @@ def homography(source: Floats, target: Floats, threshold: float = 0.0) -> tuple[
     return np.asarray(matrix, np.float64), np.asarray(mask).ravel().astype(bool)
 
 
-def mapped(matrix: Floats, points: Floats) -> Floats:
+def mapped(matrix: Float64s, points: Float64s) -> Float64s:
     """Points through a homography, shape (N, 2)."""
     lifted = points @ matrix[:, :2].T + matrix[:, 2]
     return np.asarray(lifted[:, :2] / lifted[:, 2:])
 
 
-def sampled(picture: Picture, points_px: Floats) -> NDArray[np.float32]:
+def sampled(picture: Bytes, points_px: Float64s) -> Float32s:
     """Grey levels at points of any shape (…, 2), linear between pixels."""
     flat = points_px.reshape(-1, 2).astype(np.float32)
     # remap takes maps of up to 32767 rows only: lay the points out as a square.
@@ -151,18 +149,18 @@ def sampled(picture: Picture, points_px: Floats) -> NDArray[np.float32]:
 class Solved(NamedTuple):
     """OpenCV's camera: matrix (3, 3), distortion (K,), and a pose for each view, (V, 3) and (V, 3)."""
 
-    camera_matrix: Floats
-    distortion: Floats
-    rotations: Floats
-    translations: Floats
+    camera_matrix: Float64s
+    distortion: Float64s
+    rotations: Float64s
+    translations: Float64s
 
 
 def solve_camera(
-    points: Sequence[Floats],
-    pixels: Sequence[Floats],
+    points: Sequence[Float64s],
+    pixels: Sequence[Float64s],
     size: tuple[int, int],
     flags: int,
-    guess: tuple[Floats, Floats] | None,
+    guess: tuple[Float64s, Float64s] | None,
 ) -> Solved | None:
     """The camera of least reprojection error over all views; points (N, 3) and pixels (N, 2) a view; None: no way."""
     start, lens = (np.eye(3), np.zeros(14)) if guess is None else (guess[0].copy(), guess[1].copy())
@@ -185,7 +183,9 @@ def solve_camera(
     return solved if all(np.isfinite(part).all() for part in solved) else None
 
 
-def solve_pose(points: Floats, pixels: Floats, camera_matrix: Floats, distortion: Floats) -> tuple[Floats, Floats]:
+def solve_pose(
+    points: Float64s, pixels: Float64s, camera_matrix: Float64s, distortion: Float64s
+) -> tuple[Float64s, Float64s]:
     """Rotation vector and translation of a board before a known camera, (3,) and (3,), refined."""
     objects = np.ascontiguousarray(points, np.float64).reshape(-1, 1, 3)
     images = np.ascontiguousarray(pixels, np.float64).reshape(-1, 1, 2)
@@ -195,8 +195,8 @@ def solve_pose(points: Floats, pixels: Floats, camera_matrix: Floats, distortion
 
 
 def projection_jacobian(
-    points: Floats, rotation: Floats, translation: Floats, camera_matrix: Floats, distortion: Floats
-) -> tuple[Floats, Floats]:
+    points: Float64s, rotation: Float64s, translation: Float64s, camera_matrix: Float64s, distortion: Float64s
+) -> tuple[Float64s, Float64s]:
     """Pixels (N, 2) of points (N, 3), and their derivatives (2 N, 10 + K).
 
     Columns: rotation vector 3, translation 3, fx, fy, cx, cy, then the distortion coefficients.
@@ -206,13 +206,13 @@ def projection_jacobian(
     return np.asarray(pixels, np.float64).reshape(-1, 2), np.asarray(jacobian, np.float64)
 
 
-def convex_hull(points: Floats) -> Floats:
+def convex_hull(points: Float64s) -> Float64s:
     """The convex hull of points, shape (M, 2), in order around it."""
     hull = cv2.convexHull(np.ascontiguousarray(points, np.float32))
     return np.asarray(hull, np.float64).reshape(-1, 2)
 
 
-def inside_ring(ring: Floats, points: Floats) -> NDArray[np.bool_]:
+def inside_ring(ring: Float64s, points: Float64s) -> Bools:
     """True for each point inside a ring or on it, shape (N,)."""
     outline = np.ascontiguousarray(ring, np.float32).reshape(-1, 1, 2)
     return np.array([cv2.pointPolygonTest(outline, (float(x), float(y)), False) >= 0 for x, y in points], np.bool_)

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Float64s, Int32s
 from contour.geometry.rings import Contour, Ring
 from contour.image import opencv as _cv
-from contour.tracing.tracing import check_picture
+from contour.image.picture_check import check_picture
 
-Picture = NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
 ACCEPTED: Colour = (80, 220, 60)
@@ -38,7 +37,7 @@ _MOST_MARKS = 400
 
 
 def draw_overlay(
-    picture: Picture,
+    picture: Bytes,
     contour_px: Contour | None,
     *,
     caption: Sequence[str] = (),
@@ -46,7 +45,7 @@ def draw_overlay(
     marks: bool = True,
     uncertainty_px: float | None = None,
     others_px: Sequence[Ring] = (),
-) -> Picture:
+) -> Bytes:
     """The picture as BGR, shape (H, W, 3), with the contour, its vertices and lines of text; the input stays as it is.
 
     Where `refused`, the text stands on rows of its own above the picture: what speaks against it may lie anywhere.
@@ -78,12 +77,12 @@ def draw_overlay(
     return canvas
 
 
-def _fixed_point(points: NDArray[np.float64]) -> NDArray[np.int32]:
+def _fixed_point(points: Float64s) -> Int32s:
     limit = 2**30
     return np.asarray(np.clip(np.round(points * (1 << _FRACTION_BITS)), -limit, limit), np.int32)
 
 
-def _draw_ring(canvas: Picture, ring: Ring, colour: Colour, unit: float) -> None:
+def _draw_ring(canvas: Bytes, ring: Ring, colour: Colour, unit: float) -> None:
     points = _fixed_point(ring).reshape(-1, 1, 2)
     width = _line_width(unit)
     # A dark line below keeps the colour visible on bright walls.
@@ -91,7 +90,7 @@ def _draw_ring(canvas: Picture, ring: Ring, colour: Colour, unit: float) -> None
         cv2.polylines(canvas, [points], True, tone, thickness, cv2.LINE_AA, _FRACTION_BITS)
 
 
-def _draw_band(canvas: Picture, contour_px: Contour, half_px: float, unit: float) -> None:
+def _draw_band(canvas: Bytes, contour_px: Contour, half_px: float, unit: float) -> None:
     width = round(2.0 * half_px)
     if width <= _line_width(unit) + 2:
         return
@@ -108,7 +107,7 @@ def _line_width(unit: float) -> int:
     return max(round(1.5 * unit), 1)
 
 
-def _mark_vertices(canvas: Picture, ring: Ring, unit: float) -> None:
+def _mark_vertices(canvas: Bytes, ring: Ring, unit: float) -> None:
     radius = round(2.5 * unit) << _FRACTION_BITS
     for x, y in _fixed_point(ring).tolist():
         cv2.circle(canvas, (x, y), radius, VERTEX, -1, cv2.LINE_AA, _FRACTION_BITS)
@@ -136,16 +135,16 @@ class _Caption:
         """Rows that the text takes."""
         return self.margin + self.line_height * len(self.lines) if self.lines else 0
 
-    def darken(self, canvas: Picture) -> None:
+    def darken(self, canvas: Bytes) -> None:
         """Darken the band that the text will stand on."""
         band = canvas[: self.height]
         band[:] = band // 3
 
-    def above(self, canvas: Picture) -> Picture:
+    def above(self, canvas: Bytes) -> Bytes:
         """The canvas with black rows above it that the text will stand on."""
         return np.vstack([np.zeros((self.height, *canvas.shape[1:]), np.uint8), canvas])
 
-    def write(self, canvas: Picture, colour: Colour, unit: float) -> None:
+    def write(self, canvas: Bytes, colour: Colour, unit: float) -> None:
         stroke = max(round(1.2 * unit), 1)
         for k, (line, size) in enumerate(zip(self.lines, self.sizes, strict=False)):
             place = (self.margin, self.margin + self.line_height * (k + 1) - round(0.35 * self.line_height))

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from contour.geometry.arrays import Bytes
 
 DARKEST, BRIGHTEST = 2, 253  # noise moves clipped pixels by a level or two
 
@@ -28,7 +29,7 @@ class PictureFigures:
         )
 
 
-def picture_figures(pixels: NDArray[np.uint8]) -> PictureFigures:
+def picture_figures(pixels: Bytes) -> PictureFigures:
     """Figures of a picture, shape (H, W) grey or (H, W, 3) BGR, uint8.
 
     Sharpness is the root mean square of the Sobel gradient over the standard deviation of the grey levels (Tenenbaum's

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from contour.geometry.arrays import Bytes, Float32s, Float64s
 
 _ROW = 1024
 
 
-def sample_at(
-    image: NDArray[np.uint8] | NDArray[np.float32], x: NDArray[np.float64], y: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def sample_at(image: Bytes | Float32s, x: Float64s, y: Float64s) -> Float64s:
     """Bilinear values of `image` (H, W) at (x, y), in the shape of x and y; the border goes on outside."""
     # cv2.remap takes no more than 32767 rows or columns: rows of 1024, the last one filled up.
     flat = np.zeros((2, -(-x.size // _ROW) * _ROW), np.float32)

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rings import Contour, Ring
 from contour.geometry.segments import contains, distances_to_ring
-
-Picture = NDArray[np.uint8]
 
 _LEAST_PX = 32
 
@@ -28,7 +26,7 @@ class Region:
         """The region between two columns and two rows of pixels, both included."""
         return cls(np.array([[left, top], [right, top], [right, bottom], [left, bottom]], dtype=np.float64))
 
-    def cut(self, picture: Picture) -> tuple[Picture, NDArray[np.float64]]:
+    def cut(self, picture: Bytes) -> tuple[Bytes, Float64s]:
         """The part of the picture within the region's box, and that part's first pixel (x, y).
 
         What lies in the box but outside the region has the colour that is usual along the region's border: there is
@@ -61,6 +59,6 @@ class Region:
         return float(np.where(contains(self.ring, points), distance, -distance).min())
 
 
-def shifted(contour: Contour, by: NDArray[np.float64]) -> Contour:
+def shifted(contour: Contour, by: Float64s) -> Contour:
     """The contour moved by (x, y) pixels."""
     return Contour(contour.exterior + by, tuple(hole + by for hole in contour.holes))

@@ -8,13 +8,9 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import CalibrationError, PictureError
-
-Picture = NDArray[np.uint8]
-Floats = NDArray[np.float32]
-Mask = NDArray[np.uint8]
+from contour.geometry.arrays import Bytes, Float32s
 
 _CELL_PX = 16
 _RIM_CELLS = 2
@@ -39,11 +35,11 @@ _UNREST = 4.0
 class TaughtTable:
     """A picture of the empty table, (H, W) grey or (H, W, 3) BGR, uint8, and the noise of one pixel of one picture."""
 
-    picture: Picture
+    picture: Bytes
     noise: float
 
     @cached_property
-    def pattern(self) -> Picture:
+    def pattern(self) -> Bytes:
         """What takes the pattern out when it is added to the picture: light without pattern − picture + 128."""
         rough = cv2.medianBlur(np.rint(_cells(self.picture)).astype(np.uint8), 5)
         height, width = self.picture.shape[:2]
@@ -81,14 +77,14 @@ class TableLook:
     as taught; `changed_share` of the picture that does not.
     """
 
-    picture: Picture
+    picture: Bytes
     gain: float
     shift_px: float | None
     rim_share: float
     changed_share: float
 
 
-def teach(pictures: Sequence[Picture]) -> TaughtTable:
+def teach(pictures: Sequence[Bytes]) -> TaughtTable:
     """The table in pictures of the empty table, averaged.
 
     Raises PictureError where there is none, they differ in size, or something moved between them.
@@ -114,7 +110,7 @@ def teach(pictures: Sequence[Picture]) -> TaughtTable:
     return TaughtTable(mean, noise)
 
 
-def look_at(picture: Picture, table: TaughtTable) -> TableLook:
+def look_at(picture: Bytes, table: TaughtTable) -> TableLook:
     """The picture compared with the taught table. Raises CalibrationError where they differ in size or colour."""
     if picture.shape != table.picture.shape:
         raise CalibrationError(
@@ -144,7 +140,7 @@ def look_at(picture: Picture, table: TaughtTable) -> TableLook:
     )
 
 
-def _changed(picture: Picture, known: Picture, noise: float) -> tuple[float, Mask, Mask]:
+def _changed(picture: Bytes, known: Bytes, noise: float) -> tuple[float, Bytes, Bytes]:
     """The light now over what it was; samples that are not the table's, 255 or 0; small squares of which a part is not,
     1 or 0.
     """
@@ -167,7 +163,7 @@ def _changed(picture: Picture, known: Picture, noise: float) -> tuple[float, Mas
     return gain, over, (share > 255 * _CHANGED_SHARE).astype(np.uint8)
 
 
-def _shift(picture: Picture, table: TaughtTable) -> tuple[float, float] | None:
+def _shift(picture: Bytes, table: TaughtTable) -> tuple[float, float] | None:
     """How far (x, y) the table's pattern has moved, pixels; None where it does not show in several places alike."""
     window = cv2.createHanningWindow((_TILE_PX, _TILE_PX), cv2.CV_32F)
     found = []
@@ -187,19 +183,19 @@ def _shift(picture: Picture, table: TaughtTable) -> tuple[float, float] | None:
     return float(middle[0]), float(middle[1])
 
 
-def _moved(picture: Picture, shift: tuple[float, float]) -> Picture:
+def _moved(picture: Bytes, shift: tuple[float, float]) -> Bytes:
     move = np.array([[1.0, 0.0, shift[0]], [0.0, 1.0, shift[1]]])
     size = (picture.shape[1], picture.shape[0])
     return np.asarray(cv2.warpAffine(picture, move, size, borderMode=cv2.BORDER_REPLICATE), np.uint8)
 
 
-def _cells(picture: Picture) -> Floats:
+def _cells(picture: Bytes) -> Float32s:
     """Means over squares of the picture, (h, w) or (h, w, 3)."""
     size = (max(5, picture.shape[1] // _CELL_PX), max(5, picture.shape[0] // _CELL_PX))
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
-def _fine(picture: Picture) -> Floats:
+def _fine(picture: Bytes) -> Float32s:
     """Some of the pixels, less the light around them: light that changes is no noise."""
     every = (slice(None, None, 7), slice(None, None, 7))
     height, width = picture.shape[:2]
@@ -207,9 +203,9 @@ def _fine(picture: Picture) -> Floats:
     return np.asarray(picture[every].astype(np.float32) - around[every], np.float32)
 
 
-def _grey(picture: Picture) -> Picture:
+def _grey(picture: Bytes) -> Bytes:
     return picture if picture.ndim == 2 else np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
-def _kind(picture: Picture) -> str:
+def _kind(picture: Bytes) -> str:
     return f"{picture.shape[1]} x {picture.shape[0]} px {'grey' if picture.ndim == 2 else 'in colour'}"

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.outline.corners import Flags, Joints, ends
-from contour.outline.lines_and_arcs import Complex, Index, Real, feet
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.outline.corners import Joints, ends
+from contour.outline.lines_and_arcs import feet
 from contour.outline.runs import Segments
 from contour.outline.witnesses import Witnesses
 
@@ -40,7 +41,7 @@ class _Corner:
     only_ends: bool
 
 
-def bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Flags, material: Complex) -> Joints:
+def bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools, material: Complexes) -> Joints:
     """The joints with doubtful convex corners cut parallel to the chord between the last witnesses on their edges.
 
     `material`: points of all walls near the edge, and of what else may be material. A corner of which much was not seen
@@ -83,7 +84,7 @@ def _left_out(corner: _Corner) -> float:
 
 
 def _unseen(
-    witnesses: Witnesses, between: Index, material: Complex, *, corner: complex, near: complex, far: complex
+    witnesses: Witnesses, between: Indices, material: Complexes, *, corner: complex, near: complex, far: complex
 ) -> _Corner:
     """What lies between a corner and the convex chain from `near` to `far` around all that was seen in it."""
     along = (far - near) / abs(far - near)
@@ -91,7 +92,7 @@ def _unseen(
     if depth <= 0.0:
         return _Corner(0.0, 0.0, 0.0, 0.0, anything=False, only_ends=True)
 
-    def height(points: Complex) -> Real:
+    def height(points: Complexes) -> Float64s:
         """How far points lie beyond the chord, towards the corner."""
         return np.asarray(-((points - near) * along.conjugate()).imag, np.float64)
 
@@ -107,20 +108,20 @@ def _unseen(
     way = stop - start
     share = np.clip(((corner - start) * way.conj()).real / np.maximum(np.abs(way) ** 2, 1e-12), 0.0, 1.0)
     area = 0.5 * float(((start - corner).conj() * (stop - corner)).imag.sum())
-    pitch = witnesses.pitch
+    pitch_px = witnesses.pitch_px
     highest = float(height(chain).max())
-    ends_at = height(witnesses.points[between]) > -_NEAR_CHORD * pitch
+    ends_at = height(witnesses.points[between]) > -_NEAR_CHORD * pitch_px
     return _Corner(
-        abs(area) / pitch**2,
-        float(np.abs(corner - start - share * way).min()) / pitch,
-        (depth - highest) / pitch,
-        depth / pitch,
-        anything=highest > _NEAR_CHORD * pitch or bool(ends_at.any()),
+        abs(area) / pitch_px**2,
+        float(np.abs(corner - start - share * way).min()) / pitch_px,
+        (depth - highest) / pitch_px,
+        depth / pitch_px,
+        anything=highest > _NEAR_CHORD * pitch_px or bool(ends_at.any()),
         only_ends=bool(witnesses.clean[between].all()),
     )
 
 
-def _around(near: complex, far: complex, points: Complex) -> Complex:
+def _around(near: complex, far: complex, points: Complexes) -> Complexes:
     """The convex chain from `near` to `far` around the points between them."""
     along = (far - near) / abs(far - near)
     chain = [near]
@@ -132,7 +133,7 @@ def _around(near: complex, far: complex, points: Complex) -> Complex:
     return np.array(chain)
 
 
-def _between(segments: Segments, inlier: Flags, before: int, after: int) -> Index:
+def _between(segments: Segments, inlier: Bools, before: int, after: int) -> Indices:
     """Witnesses after the last inlier of one segment and before the first of the next; none where either has none."""
     of_before, of_after = ((segments.first[k] + np.arange(segments.length[k])) % len(inlier) for k in (before, after))
     if not inlier[of_before].any() or not inlier[of_after].any():

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.outline.corners import Flags, Joints
-from contour.outline.free_curves import Curve, smooth_curve
+from contour.geometry.arrays import Bools, Float64s, Indices
+from contour.outline.corners import Joints
+from contour.outline.free_curves import Curve, Guide, smooth_curve
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE
-from contour.outline.lines_and_arcs import Complex, Index, Real, feet
+from contour.outline.lines_and_arcs import feet
 from contour.outline.runs import Segments
 from contour.outline.witnesses import Witnesses, cost
 
@@ -26,10 +27,10 @@ class Chain:
 
     segments: tuple[int, ...]
     curve: Curve
-    witnesses: np.ndarray[tuple[int], np.dtype[np.intp]]
+    witnesses: Indices
 
 
-def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed: Real) -> list[Chain]:
+def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed: Float64s) -> list[Chain]:
     """Chains whose spline is the shorter description: its misfit and parameters cost less than those of its lines and
     arcs.
 
@@ -54,14 +55,16 @@ def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed:
     return chains
 
 
-def _as_curve(witnesses: Witnesses, segments: Segments, members: list[int], closed: bool, signed: Real) -> Chain | None:
+def _as_curve(
+    witnesses: Witnesses, segments: Segments, members: list[int], closed: bool, signed: Float64s
+) -> Chain | None:
     """The members as one curve, or None where lines and arcs are the shorter description."""
     index = np.concatenate([(segments.first[k] + np.arange(segments.length[k])) % len(witnesses) for k in members])
     if len(index) < 8:
         return None
-    guide, place, length = _guide(witnesses, segments, members, index, closed)
+    guide = _guide(witnesses, segments, members, index, closed)
     sound = np.abs(signed[index]) < 4.0 * witnesses.outer[index]
-    curve = smooth_curve(witnesses, index, guide, place, length=length, sound=sound, closed=closed)
+    curve = smooth_curve(witnesses, index, guide, sound)
     price = sum(PRICE_ARC if segments.bend[k] else PRICE_LINE for k in members)
     present = float(cost(witnesses, signed[index], index).sum()) + price
     if curve.nats + _PRICE_OF_FREEDOM * curve.freedom < present:
@@ -69,17 +72,17 @@ def _as_curve(witnesses: Witnesses, segments: Segments, members: list[int], clos
     return None
 
 
-def _links(witnesses: Witnesses, segments: Segments, found: Joints) -> Flags:
+def _links(witnesses: Witnesses, segments: Segments, found: Joints) -> Bools:
     """True where a segment may flow into the next: no sharp turn, an arc on either side, no long straight edge."""
     length = np.abs(found.end - np.roll(found.begin, 1))
-    supple = segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch)
-    links: Flags = (
+    supple = segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch_px)
+    links: Bools = (
         (found.kink < _SHARPEST) & supple & np.roll(supple, -1) & (segments.bend | np.roll(segments.bend, -1))
     )
     return links
 
 
-def _runs(segments: Segments, linked: Flags) -> list[tuple[list[int], bool]]:
+def _runs(segments: Segments, linked: Bools) -> list[tuple[list[int], bool]]:
     """Longest runs of linked segments, at least two, and whether the run is the whole ring."""
     total = len(segments)
     if total > 1 and linked.all():
@@ -94,15 +97,12 @@ def _runs(segments: Segments, linked: Flags) -> list[tuple[list[int], bool]]:
     return found
 
 
-def _guide(
-    witnesses: Witnesses, segments: Segments, members: list[int], index: Index, closed: bool
-) -> tuple[Complex, Real, float]:
-    """Feet of the witnesses at `index` on their own members, their arc length along them (rising), and the whole
-    length."""
+def _guide(witnesses: Witnesses, segments: Segments, members: list[int], index: Indices, closed: bool) -> Guide:
+    """Feet of the witnesses at `index` on their own members."""
     owner = np.repeat(members, segments.length[members])
     foot, tangent = feet(segments.models.take(owner), witnesses.points[index])
     way = np.roll(foot, -1) - foot
     middle = tangent + np.roll(tangent, -1)
     forward = np.maximum((way * middle.conj()).real / np.maximum(np.abs(middle), 1e-9), 0.0)
     place = np.concatenate([[0.0], np.cumsum(forward[:-1])])
-    return foot, place, float(place[-1] + (forward[-1] if closed else 0.0))
+    return Guide(foot, place, float(place[-1] + (forward[-1] if closed else 0.0)), closed)

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.outline.lines_and_arcs import Complex, Index, Models, Real, distance, feet
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.outline.lines_and_arcs import Models, distance, feet
 from contour.outline.runs import Segments
 from contour.outline.witnesses import Witnesses
-
-Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 _REACH = 1.7
 _SLACK = 0.8
@@ -29,12 +28,12 @@ class Joints:
     kink: how far the two are from flowing into one another, the turn in radians; infinite where they step aside.
     """
 
-    end: Complex
-    begin: Complex
-    kink: Real
+    end: Complexes
+    begin: Complexes
+    kink: Float64s
 
 
-def ends(witnesses: Witnesses, segments: Segments, inlier: Flags, *, but: int = 0) -> tuple[Complex, Complex]:
+def ends(witnesses: Witnesses, segments: Segments, inlier: Bools, *, but: int = 0) -> tuple[Complexes, Complexes]:
     """Feet of each segment's first and last inlying witness on its model, shape (S,) each; `but` so many at either."""
     count = len(witnesses)
     places_first, places_last = segments.first.copy(), segments.first + segments.length - 1
@@ -49,7 +48,7 @@ def ends(witnesses: Witnesses, segments: Segments, inlier: Flags, *, but: int = 
     return first, last
 
 
-def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
+def joints(witnesses: Witnesses, segments: Segments, inlier: Bools) -> Joints:
     """The joint after each segment: a corner at the intersection where it lies within reach of the evidence, a smooth
     join where the two all but touch, else a bevel from the last witness of one to the first of the next."""
     first, last = ends(witnesses, segments, inlier)
@@ -62,11 +61,11 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
     gap = np.abs(far - near)
     turn = tangent.conj() * next_tangent
     half = np.tan(0.5 * np.maximum(np.pi - np.abs(np.angle(turn)), 0.2))
-    reach = _REACH * witnesses.pitch * np.maximum(1.0, 0.5 / half) + gap
-    slack = _SLACK * witnesses.pitch
+    reach = _REACH * witnesses.pitch_px * np.maximum(1.0, 0.5 / half) + gap
+    slack = _SLACK * witnesses.pitch_px
     ahead = ((point - near) * tangent.conj()).real
     behind = ((far - point) * next_tangent.conj()).real
-    lone = _LONE * witnesses.pitch
+    lone = _LONE * witnesses.pitch_px
     inner_first, inner_last = ends(witnesses, segments, inlier, but=1)
     lone_last = (ahead > -lone) & (((point - inner_last) * tangent.conj()).real > 0.0)
     lone_first = (behind > -lone) & (((inner_first[after] - point) * next_tangent.conj()).real > 0.0)
@@ -81,15 +80,15 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Flags) -> Joints:
     smooth_turn = np.abs((one_tangent.conj() * other_tangent).imag) < _SMOOTH_SINE
     smooth_turn &= (one_tangent.conj() * other_tangent).real > 0.0
     sigma = float(np.median(witnesses.outer))
-    touching = smooth_turn & (aside < max(4.0 * sigma, 0.05 * witnesses.pitch))
+    touching = smooth_turn & (aside < max(4.0 * sigma, 0.05 * witnesses.pitch_px))
     blend = 0.5 * (one + other)
     end = np.where(corner, point, np.where(touching, blend, near))
     begin = np.where(corner, point, np.where(touching, blend, far))
     kink = np.abs(np.angle(one_tangent.conj() * other_tangent))
-    return Joints(end, begin, np.where(aside < _ASIDE * witnesses.pitch, kink, np.inf))
+    return Joints(end, begin, np.where(aside < _ASIDE * witnesses.pitch_px, kink, np.inf))
 
 
-def _intersections(models: Models, following: Models, near: Complex, far: Complex) -> tuple[Complex, Flags]:
+def _intersections(models: Models, following: Models, near: Complexes, far: Complexes) -> tuple[Complexes, Bools]:
     """Where neighbours intersect nearest to the evidence (Newton on the two distances), and whether they do."""
     point = 0.5 * (near + far)
     foot, tangent = feet(models, near)
@@ -106,7 +105,7 @@ def _intersections(models: Models, following: Models, near: Complex, far: Comple
     return point, met
 
 
-def without_reversed(witnesses: Witnesses, segments: Segments, inlier: Flags) -> tuple[Segments, Joints]:
+def without_reversed(witnesses: Witnesses, segments: Segments, inlier: Bools) -> tuple[Segments, Joints]:
     """Segments and joints after dropping short segments that their neighbours' corners leave no room for."""
     while True:
         found = joints(witnesses, segments, inlier)
@@ -115,7 +114,7 @@ def without_reversed(witnesses: Witnesses, segments: Segments, inlier: Flags) ->
         begin = np.roll(found.begin, 1)
         _, tangent = feet(segments.models, 0.5 * (begin + found.end))
         run = ((found.end - begin) * tangent.conj()).real
-        sweep = np.abs(segments.models.curvature) * segments.length * witnesses.pitch
+        sweep = np.abs(segments.models.curvature) * segments.length * witnesses.pitch_px
         reversed_ = (run < -1e-9) & (sweep < 3.0)
         if not reversed_.any():
             return segments, found
@@ -154,7 +153,7 @@ def sweep(model: Models, start: complex, stop: complex, run: float) -> tuple[flo
 
 def arc_points(
     model: Models, start: complex, stop: complex, *, run: float, tolerance: float, whole: bool = False
-) -> Complex:
+) -> Complexes:
     """Inner vertices of an arc from `start` to `stop` (both on it, not included), chords within `tolerance` pixels.
 
     `run` is about the arc's length. Vertices stand out by two thirds of the sagitta, so that the area under the
@@ -171,11 +170,13 @@ def arc_points(
     turned = np.exp(1j * (from_ + turn * np.arange(0 if whole else 1, chords) / chords))
     sagitta = (1.0 - np.cos(0.5 * turn / chords)) / curvature
     origin, tangent = complex(model.origin), complex(model.tangent)
-    inner: Complex = origin + 1j * tangent * (1.0 - turned) / curvature - 1j * tangent * turned * (2.0 / 3.0) * sagitta
+    inner: Complexes = (
+        origin + 1j * tangent * (1.0 - turned) / curvature - 1j * tangent * turned * (2.0 / 3.0) * sagitta
+    )
     return inner
 
 
-def thinned(ring: Complex, tolerance: float) -> Index:
+def thinned(ring: Complexes, tolerance: float) -> Indices:
     """Indices of the vertices to keep: none twice, none within `tolerance` of the chord of its neighbours."""
     keep = np.arange(len(ring))
     while len(keep) > 3:

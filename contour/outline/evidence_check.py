@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from contour.errors import NoBlockFound
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside
-from contour.tracing.tracing import Rectifier
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 _FAR_OFF_PITCHES = 0.5
 
 
-def check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float, rectifier: Rectifier | None) -> None:
+def check_against_evidence(evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: Rectifier | None) -> None:
     """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side.
 
     A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
@@ -25,7 +25,7 @@ def check_against_evidence(evidence: RingEvidence, ring: Ring, pitch: float, rec
         ring, places = rectifier.rectify(ring), rectifier.rectify(places)
     depth = depth_inside(ring, places)
     # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
-    inside, outside = depth > _FAR_OFF_PITCHES * pitch, (depth < -_FAR_OFF_PITCHES * pitch)[ends]
+    inside, outside = depth > _FAR_OFF_PITCHES * pitch_px, (depth < -_FAR_OFF_PITCHES * pitch_px)[ends]
     for off, points in ((inside, evidence.points), (outside, evidence.points[ends])):
         in_a_row = off & np.roll(off, 1) & np.roll(off, 2) & np.roll(off, 3)
         if in_a_row.any():

@@ -5,22 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.outline.bevels import bevelled
 from contour.outline.chains import Chain, free_curves
-from contour.outline.corners import Flags, Joints, arc_points, thinned, without_reversed
+from contour.outline.corners import Joints, arc_points, thinned, without_reversed
 from contour.outline.free_curves import curve_points, within
 from contour.outline.labelling import label
-from contour.outline.lines_and_arcs import Complex, Real, distance
+from contour.outline.lines_and_arcs import distance
 from contour.outline.missed_walls import overlooked, with_bounds
 from contour.outline.proposals import FEW, gather, propose
 from contour.outline.runs import Segments, around, fitted, runs
-from contour.outline.spread import unseen_share, vertex_sigma
+from contour.outline.spread import Vertices, unseen_share, vertex_sigma
 from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
-from contour.tracing.tracing import Rectifier
 from contour.walls.wall_evidence import RingEvidence
 
 _FEWEST = 6
@@ -46,11 +46,11 @@ class FittedRing:
     """
 
     ring: Ring
-    inlier: NDArray[np.bool_]
-    residual: NDArray[np.float64]
+    inlier: Bools
+    residual: Float64s
     spread_px: float
     unseen_share: float
-    vertex_sigma_px: NDArray[np.float64]
+    vertex_sigma_px: Float64s
     segments: int
 
 
@@ -94,23 +94,23 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
     found = bevelled(witnesses, segments, found, inlier, _material(evidence, rectifier))
-    ring, owners = polygon(witnesses, segments, found, chains)
+    vertices = _vertices(witnesses, segments, found, chains)
     spread = _spread(residual[inlier], wall_px)
     free = np.isin(np.arange(len(segments)), [k for chain in chains for k in chain.segments])
-    sigma = vertex_sigma(witnesses, segments, inlier, ring=ring, owners=owners, free=free, spread=spread)
-    vertices = np.column_stack([ring.real, ring.imag])
+    sigma = vertex_sigma(witnesses, segments, inlier, vertices, free=free, spread=spread)
+    ring = np.column_stack([vertices.ring.real, vertices.ring.imag])
     if rectifier is not None:
-        vertices = rectifier.unrectify(vertices)
+        ring = rectifier.unrectify(ring)
     pieces = len(segments) - sum(len(chain.segments) - 1 for chain in chains)
-    return FittedRing(vertices, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces)
+    return FittedRing(ring, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces)
 
 
-def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complex:
+def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complexes:
     """Points of walls, and of what else may be material, in the fitting plane, shape (K,)."""
     points = np.concatenate([evidence.walls.points, evidence.beside])
     if rectifier is not None:
         points = rectifier.rectify(points)
-    places: Complex = points[:, 0] + 1j * points[:, 1]
+    places: Complexes = points[:, 0] + 1j * points[:, 1]
     return places
 
 
@@ -152,36 +152,31 @@ def _refitted(witnesses: Witnesses, segments: Segments) -> Segments:
     return replace(segments, models=models)
 
 
-def residuals(witnesses: Witnesses, segments: Segments) -> Real:
+def residuals(witnesses: Witnesses, segments: Segments) -> Float64s:
     """Signed distance of each witness from its segment's model, shape (N,)."""
     return distance(segments.models.take(segments.owner(len(witnesses))), witnesses.points)
 
 
-def _inlying(witnesses: Witnesses, residual: Real) -> Flags:
+def _inlying(witnesses: Witnesses, residual: Float64s) -> Bools:
     sigma = np.where(residual > 0.0, witnesses.outer, witnesses.inner)
-    inlying: Flags = (np.abs(residual) < 3.0 * sigma) & ~witnesses.bound
+    inlying: Bools = (np.abs(residual) < 3.0 * sigma) & ~witnesses.bound
     return inlying
 
 
-def _spread(residual: Real, wall_px: float) -> float:
+def _spread(residual: Float64s, wall_px: float) -> float:
     """Robust standard deviation of the inliers; a wall's width where there are too few to tell."""
     return float(1.4826 * np.median(np.abs(residual))) if len(residual) >= _FEWEST else max(wall_px, 1.0)
 
 
-def polygon(
-    witnesses: Witnesses, segments: Segments, found: Joints, chains: list[Chain]
-) -> tuple[Complex, NDArray[np.intp]]:
-    """Vertices of the ring, complex, and the two segments that meet in each, shape (M, 2).
-
-    Joints, and between them the chords of arcs and curves.
-    """
+def _vertices(witnesses: Witnesses, segments: Segments, found: Joints, chains: list[Chain]) -> Vertices:
+    """The ring's vertices: joints, and between them the chords of arcs and curves."""
     if len(segments) == 1:
         return _alone(witnesses, segments)
     total = len(segments)
     curve_of = {chain.segments[0]: chain for chain in chains}
     inside = {k for chain in chains for k in chain.segments[1:]}
     begin = np.roll(found.begin, 1)
-    parts: list[Complex] = []
+    parts: list[Complexes] = []
     owners: list[tuple[int, int]] = []
     for k in range(total):
         if k in inside:
@@ -192,7 +187,7 @@ def polygon(
             start, stop = within(chain.curve, complex(begin[k]), complex(found.end[last]))
             inner = curve_points(chain.curve, _CHORD_PX, start, stop)
             if chain.curve.closed:
-                return inner, _members(chain, len(inner))
+                return Vertices(inner, _members(chain, len(inner)))
         elif segments.bend[k]:
             stops = complex(begin[k]), complex(found.end[k])
             inner = arc_points(
@@ -206,10 +201,10 @@ def polygon(
         owners += [(last, (last + 1) % total)]
     ring = np.concatenate(parts)
     keep = thinned(ring, _FLAT_PX)
-    return ring[keep], np.array(owners, dtype=np.intp)[keep]
+    return Vertices(ring[keep], np.array(owners, dtype=np.intp)[keep])
 
 
-def _members(chain: Chain, count: int) -> NDArray[np.intp]:
+def _members(chain: Chain, count: int) -> Indices:
     """The chain's segment at each of `count` vertices along it, twice, shape (count, 2); by share of its length."""
     share = np.arange(count) * len(chain.segments) // max(count, 1)
     return np.array(chain.segments, dtype=np.intp)[np.stack([share, share], axis=1)]
@@ -221,8 +216,8 @@ def _run(witnesses: Witnesses, segments: Segments, k: int) -> float:
     return float(witnesses.gap[inner].sum())
 
 
-def _alone(witnesses: Witnesses, segments: Segments) -> tuple[Complex, NDArray[np.intp]]:
+def _alone(witnesses: Witnesses, segments: Segments) -> Vertices:
     """The ring of a single circle."""
     start = complex(witnesses.points[0])
     ring = arc_points(segments.models.take((0,)), start, start, run=0.0, tolerance=_CHORD_PX, whole=True)
-    return ring, np.zeros((len(ring), 2), dtype=np.intp)
+    return Vertices(ring, np.zeros((len(ring), 2), dtype=np.intp))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.outline.lines_and_arcs import Complex, Index, Real
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
 from contour.outline.witnesses import Witnesses, cost, weights
 
 _KNOT_PITCHES = 1.3
@@ -26,38 +26,41 @@ class Curve:
     knots: control points, complex. freedom: effective number of its parameters. nats: what its witnesses cost.
     """
 
-    knots: Complex
+    knots: Complexes
     length: float
     closed: bool
     freedom: float
     nats: float
-    signed: Real
+    signed: Float64s
 
-    def at(self, place: Real) -> tuple[Complex, Complex]:
+    def at(self, place: Float64s) -> tuple[Complexes, Complexes]:
         """Points and derivatives (pixels per pixel of arc length) at `place`."""
         column, value, slope = _basis(place, len(self.knots), self.length, self.closed)
         near = self.knots[column]
         return (value * near).sum(axis=1), (slope * near).sum(axis=1)
 
 
-def smooth_curve(
-    witnesses: Witnesses,
-    index: np.ndarray[tuple[int], np.dtype[np.intp]],
-    guide: Complex,
-    place: Real,
-    *,
-    length: float,
-    sound: np.ndarray[tuple[int], np.dtype[np.bool_]],
-    closed: bool,
-) -> Curve:
-    """The spline through the witnesses at `index`, starting from `guide`: a first guess of each one's foot.
+@dataclass(frozen=True)
+class Guide:
+    """A first guess of a curve: each witness's foot, its arc length along the curve (rising), the whole length, pixels,
+    and whether it closes.
+    """
 
-    place: arc length of each foot, of `length` pixels. sound: the feet to start from. Each round moves the feet along
+    foot: Complexes
+    place: Float64s
+    length: float
+    closed: bool
+
+
+def smooth_curve(witnesses: Witnesses, index: Indices, guide: Guide, sound: Bools) -> Curve:
+    """The spline through the witnesses at `index`, starting from a guide.
+
+    sound: the feet to start from. Each round moves the feet along
     the curve and solves the robust penalised least squares of the distances across it, penalising the third
     derivative (a circle costs little); smoothness by generalised cross-validation.
     """
-    length = max(length, 1e-6)
-    count = int(np.clip(np.ceil(length / (_KNOT_PITCHES * witnesses.pitch)), 4, _MOST_KNOTS))
+    closed, place, length = guide.closed, guide.place, max(guide.length, 1e-6)
+    count = int(np.clip(np.ceil(length / (_KNOT_PITCHES * witnesses.pitch_px)), 4, _MOST_KNOTS))
     knots = count if closed else count + 3
     rough = _roughness(knots, closed)
     column, value, _ = _basis(place, knots, length, closed)
@@ -65,7 +68,7 @@ def smooth_curve(
     hold = np.where(sound, 1.0, 1e-3)
     control = np.linalg.solve(
         _gathered(column, value, value * hold[:, None], knots) + 1e-2 * bent + 1e-9 * np.eye(knots),
-        _summed(column, value * (hold * guide)[:, None], knots),
+        _summed(column, value * (hold * guide.foot)[:, None], knots),
     )
     points = witnesses.points[index]
     freedom = float(knots)
@@ -86,8 +89,14 @@ def smooth_curve(
 
 
 def _solved(
-    basis: tuple[Index, Real], signed: Real, tangent: Complex, *, weight: Real, bent: Real, control: Complex
-) -> tuple[Complex, float]:
+    basis: tuple[Indices, Float64s],
+    signed: Float64s,
+    tangent: Complexes,
+    *,
+    weight: Float64s,
+    bent: Float64s,
+    control: Complexes,
+) -> tuple[Complexes, float]:
     """Control points and effective parameters of the penalised fit across the tangents, at the best of a few
     smoothnesses.
 
@@ -121,15 +130,15 @@ def _solved(
     return control + lean * moves[best], float(freedom[best])
 
 
-def _gathered(column: Index, one: Real, other: Real, knots: int) -> Real:
+def _gathered(column: Indices, one: Float64s, other: Float64s, knots: int) -> Float64s:
     """one.T @ other for rows of four entries at `column`, shape (knots, knots), without the dense product."""
     place = column[:, :, None] * knots + column[:, None, :]
     product = one[:, :, None] * other[:, None, :]
-    sums: Real = np.bincount(place.ravel(), weights=product.ravel(), minlength=knots * knots).astype(np.float64)
+    sums: Float64s = np.bincount(place.ravel(), weights=product.ravel(), minlength=knots * knots).astype(np.float64)
     return sums.reshape(knots, knots)
 
 
-def _summed(column: Index, entries: NDArray[Any], knots: int) -> NDArray[Any]:
+def _summed(column: Indices, entries: NDArray[Any], knots: int) -> NDArray[Any]:
     """Sums of the entries of each column, shape (knots,), real or complex as they are."""
     flat = column.ravel()
     if np.iscomplexobj(entries):
@@ -137,7 +146,7 @@ def _summed(column: Index, entries: NDArray[Any], knots: int) -> NDArray[Any]:
     return np.bincount(flat, entries.ravel(), knots)
 
 
-def _basis(place: Real, knots: int, length: float, closed: bool) -> tuple[Index, Real, Real]:
+def _basis(place: Float64s, knots: int, length: float, closed: bool) -> tuple[Indices, Float64s, Float64s]:
     """The four uniform cubic B-splines that live at each arc length: their columns, values and derivatives, shape (N,
     4)."""
     spans = knots if closed else knots - 3
@@ -153,7 +162,7 @@ def _basis(place: Real, knots: int, length: float, closed: bool) -> tuple[Index,
     return (span[:, None] + np.arange(4)) % knots, value, slope
 
 
-def _roughness(knots: int, closed: bool) -> Real:
+def _roughness(knots: int, closed: bool) -> Float64s:
     """Third differences of the control points, shape (knots or knots - 3, knots)."""
     if closed:
         unit = np.eye(knots)
@@ -173,7 +182,7 @@ def within(curve: Curve, start: complex, stop: complex) -> tuple[float, float]:
     return float(place[low]), float(place[high])
 
 
-def curve_points(curve: Curve, tolerance: float, start: float, stop: float) -> Complex:
+def curve_points(curve: Curve, tolerance: float, start: float, stop: float) -> Complexes:
     """Few vertices along the curve between arc lengths `start` and `stop` (neither included unless closed), area kept.
 
     Spacing goes with the root of the curvature, so that each chord's sagitta is about `tolerance` pixels; each vertex
@@ -193,5 +202,5 @@ def curve_points(curve: Curve, tolerance: float, start: float, stop: float) -> C
     chosen = np.interp(mark, total, place)
     point, along = curve.at(chosen)
     sagitta = np.interp(chosen, place, bend) / 8.0 * (total[-1] / chords / np.interp(chosen, place, density)) ** 2
-    few: Complex = point - 1j * along / np.maximum(np.abs(along), 1e-9) * (2.0 / 3.0) * sagitta
+    few: Complexes = point - 1j * along / np.maximum(np.abs(along), 1e-9) * (2.0 / 3.0) * sagitta
     return few

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.outline.lines_and_arcs import Complex, Index, Real, distance, feet
+from contour.geometry.arrays import Complexes, Float64s, Indices
+from contour.outline.lines_and_arcs import distance, feet
 from contour.outline.proposals import FEW, Proposals
 from contour.outline.reach import Reach, reach, supports
 from contour.outline.witnesses import Witnesses, cost
@@ -47,7 +48,7 @@ _FAR = 1e6
 class Labelling:
     """label: proposal of each witness, shape (N,). energy: nats of the whole ring."""
 
-    label: Index
+    label: Indices
     energy: float
 
 
@@ -61,7 +62,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     unary = cost(witnesses, signed, np.arange(count)[:, None])
     foot, tangent = feet(models, points)
     reached = reach(witnesses, models, foot, last=last, following=following)
-    hidden = (reached.back + reached.ahead) / witnesses.pitch
+    hidden = (reached.back + reached.ahead) / witnesses.pitch_px
     unary = unary * np.clip(1.0 + _DEARER_PER_PITCH * (hidden - _UNSEEN_EDGE), 1.0, _DEAREST)
     unary = np.where(here >= 0, unary, _FAR)
     unary = unary + _REFLEX_PER_RADIAN * np.maximum(witnesses.rare * models.curvature, 0.0) * witnesses.gap[:, None]
@@ -73,7 +74,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     return Labelling(here[np.arange(count), path], energy)
 
 
-def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Index, Index, Index]:
+def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Indices, Indices, Indices]:
     """The proposals that explain each witness's neighbourhood best, shape (N, A), -1 where fewer reach it; and the
     nearest witness back and ahead that lies on the proposal, -1 where none does."""
     count = len(witnesses)
@@ -106,76 +107,79 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Index, Index, I
 
 
 def _steps(
-    witnesses: Witnesses, proposals: Proposals, here: Index, foot: Complex, tangent: Complex, reached: Reach
-) -> Real:
+    witnesses: Witnesses, proposals: Proposals, here: Indices, foot: Complexes, tangent: Complexes, reached: Reach
+) -> Float64s:
     """Price of going from state a at witness i to state b at witness i + 1, shape (N, A, A)."""
 
     def after(of_next: NDArray[Any]) -> NDArray[Any]:
         return np.roll(of_next, -1, axis=0)[:, None, :]
 
     following = np.roll(here, -1, axis=0)
-    joint = joint_cost(
-        foot[:, :, None],
-        tangent[:, :, None],
-        after(foot),
-        after(tangent),
+    between = _Between(
         gap=witnesses.gap[:, None, None],
         unseen=reached.back[:, :, None] + after(reached.ahead),
         sigma=np.maximum(witnesses.outer, np.roll(witnesses.outer, -1))[:, None, None],
-        pitch=witnesses.pitch,
-        rare=witnesses.rare,
     )
+    last = _Foot(foot[:, :, None], tangent[:, :, None])
+    joint = _joint_cost(last, _Foot(after(foot), after(tangent)), between, witnesses.pitch_px, witnesses.rare)
     price = np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
     same = here[:, :, None] == following[:, None, :]
     return np.where(same, 0.0, price + joint)
 
 
-def joint_cost(
-    foot: Complex,
-    tangent: Complex,
-    next_foot: Complex,
-    next_tangent: Complex,
-    *,
-    gap: Real,
-    unseen: Real,
-    sigma: Real,
-    pitch: float,
-    rare: float,
-) -> Real:
-    """Nats of a joint between two models, given their feet and tangents at the last and the next witness (shapes
-    broadcast).
+@dataclass(frozen=True)
+class _Foot:
+    """Feet of a witness on models, and the models' tangents there, complex."""
 
-    unseen: pixels from the last witness that lies on the one model to `foot`, and from `next_foot` to the first that
-    lies on the other, together. rare: sign of the turns that have to be earned.
+    at: Complexes
+    tangent: Complexes
+
+
+@dataclass(frozen=True)
+class _Between:
+    """What lies between the last witness of one model and the next, of another: the gap between both, and the larger
+    standard deviation of the two. unseen: pixels from the last witness that lies on the one model to its foot, and from
+    the next foot to the first that lies on the other, together.
+    """
+
+    gap: Float64s
+    unseen: Float64s
+    sigma: Float64s
+
+
+def _joint_cost(last: _Foot, following: _Foot, between: _Between, pitch_px: float, rare: float) -> Float64s:
+    """Nats of a joint between two models, given their feet at the last and the next witness (shapes broadcast).
+
+    rare: sign of the turns that have to be earned.
 
     A corner: the tangents meet ahead of the one and behind the other, within reach of the evidence. A smooth join:
     small turn, small step aside. Else a jump at a fixed price.
     """
-    way = next_foot - foot
-    turn = tangent.conj() * next_tangent
+    way = following.at - last.at
+    turn = last.tangent.conj() * following.tangent
     sine = turn.imag
     reflex = _REFLEX_PER_RADIAN * np.maximum(rare * np.angle(turn), 0.0)
     safe = np.where(np.abs(sine) > 0.05, sine, 1.0)
-    ahead = (way.conj() * next_tangent).imag / safe
-    behind = (tangent.conj() * way).imag / safe
-    slack, most = 0.3 * pitch, _REACH * pitch + gap
+    ahead = (way.conj() * following.tangent).imag / safe
+    behind = (last.tangent.conj() * way).imag / safe
+    slack, most = 0.3 * pitch_px, _REACH * pitch_px + between.gap
     excess = (
         np.maximum(np.maximum(-ahead - slack, ahead - most), 0.0) ** 2
         + np.maximum(np.maximum(-behind - slack, behind - most), 0.0) ** 2
     )
-    corner = _CORNER + reflex + _REFLEX * (rare * sine > 0.0) + 8.0 * excess / pitch**2
+    corner = _CORNER + reflex + _REFLEX * (rare * sine > 0.0) + 8.0 * excess / pitch_px**2
     # A cell in a corner touches its edges at a distance that goes with the cotangent of half the angle between them.
-    hidden = (unseen + ahead + behind) / pitch + 1.0 - np.abs(sine) / np.maximum(1.0 + turn.real, 0.2)
+    hidden = (between.unseen + ahead + behind) / pitch_px + 1.0 - np.abs(sine) / np.maximum(1.0 + turn.real, 0.2)
     corner = corner + _MISSING_CELL * np.clip(hidden - _UNSEEN_CORNER + 2.0, 0.0, 1.0)
     corner = corner + _UNSEEN_PER_PITCH * np.maximum(hidden - _UNSEEN_CORNER, 0.0)
     corner = np.where(np.abs(sine) > 0.05, corner, np.inf)
-    middle = tangent + next_tangent
+    middle = last.tangent + following.tangent
     aside = (middle.conj() * way).imag / np.maximum(np.abs(middle), 1e-6)
-    smooth = 0.25 * (aside / sigma) ** 2 + 12.0 * np.where(turn.real > 0.0, sine**2, 1.0)
+    smooth = 0.25 * (aside / between.sigma) ** 2 + 12.0 * np.where(turn.real > 0.0, sine**2, 1.0)
     return np.minimum(np.minimum(corner, smooth), _JUMP + reflex)
 
 
-def _cheapest_cycle(step: Real, first: Real) -> tuple[Index, float]:
+def _cheapest_cycle(step: Float64s, first: Float64s) -> tuple[Indices, float]:
     """Cheapest closed path: step[i] holds prices from i to i + 1 (cyclic), with the price of being there; and its
     price.
 
@@ -195,7 +199,7 @@ def _cheapest_cycle(step: Real, first: Real) -> tuple[Index, float]:
     return np.roll(path, anchor), energy
 
 
-def _cheapest_path(step: Real, initial: Real, closing: int | None) -> tuple[Index, float]:
+def _cheapest_path(step: Float64s, initial: Float64s, closing: int | None) -> tuple[Indices, float]:
     """Cheapest path from the initial prices, open or (where `closing` is a state) back to that state, and its price."""
     count, width = step.shape[0], step.shape[1]
     back = np.empty((count, width), dtype=np.intp)

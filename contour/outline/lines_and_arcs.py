@@ -11,11 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
-Index = NDArray[np.intp]
+from contour.geometry.arrays import Bools, Complexes, Float64s
 
 _LEAST_ROOT = 1e-6
 
@@ -25,9 +22,9 @@ class Models:
     """Lines and arcs, any shape of batch: origin and unit tangent (complex, pixels), curvature (1/pixel, convex
     positive)."""
 
-    origin: Complex
-    tangent: Complex
-    curvature: Real
+    origin: Complexes
+    tangent: Complexes
+    curvature: Float64s
 
     def __len__(self) -> int:
         return len(self.origin)
@@ -46,7 +43,7 @@ def join(parts: list[Models]) -> Models:
     )
 
 
-def distance(models: Models, points: Complex) -> Real:
+def distance(models: Models, points: Complexes) -> Float64s:
     """Signed distances of `points` from `models` (shapes broadcast), positive outside the material.
 
     With u along the tangent and v outwards, F = v + k (u^2 + v^2) / 2 is the power of the point; the distance from the
@@ -58,7 +55,7 @@ def distance(models: Models, points: Complex) -> Real:
     return 2.0 * power / (1.0 + root)
 
 
-def feet(models: Models, points: Complex) -> tuple[Complex, Complex]:
+def feet(models: Models, points: Complexes) -> tuple[Complexes, Complexes]:
     """Nearest points of `models` to `points`, and the unit tangents there (shapes broadcast)."""
     local = (points - models.origin) * models.tangent.conj()
     power = 0.5 * models.curvature * (local.real**2 + local.imag**2) - local.imag
@@ -68,7 +65,7 @@ def feet(models: Models, points: Complex) -> tuple[Complex, Complex]:
     return points + 1j * tangent * (2.0 * power / (1.0 + root)), tangent
 
 
-def through_pairs(first: Complex, last: Complex) -> Models:
+def through_pairs(first: Complexes, last: Complexes) -> Models:
     """Lines from `first` to `last`; the origin is their middle."""
     chord = last - first
     length = np.abs(chord)
@@ -76,7 +73,7 @@ def through_pairs(first: Complex, last: Complex) -> Models:
     return Models(0.5 * (first + last), np.where(length > 0.0, tangent, 1.0 + 0j), np.zeros(length.shape))
 
 
-def through_triples(first: Complex, middle: Complex, last: Complex) -> Models:
+def through_triples(first: Complexes, middle: Complexes, last: Complexes) -> Models:
     """Circles through three points each, travelled in their order; the origin is `middle`.
 
     The tangent at the middle point leans on the nearer neighbour (weights 1 / length), the curvature is Menger's.
@@ -89,7 +86,7 @@ def through_triples(first: Complex, middle: Complex, last: Complex) -> Models:
     return Models(middle.copy(), tangent, 2.0 * (back.conj() * ahead).imag / product)
 
 
-def refine(models: Models, points: Complex, weights: Real, bend: NDArray[np.bool_]) -> Models:
+def refine(models: Models, points: Complexes, weights: Float64s, bend: Bools) -> Models:
     """One Gauss-Newton step of weighted least squares on the exact distance, each model on its own row of points.
 
     points, weights: shape (K, m). bend: shape (K,), True where the curvature is free; a line stays a line. Rows whose
@@ -124,8 +121,14 @@ def refine(models: Models, points: Complex, weights: Real, bend: NDArray[np.bool
 
 
 def _normal_step(
-    weights: Real, residual: Real, *, cosine: Real, along: Real, bulge: Real, bend: NDArray[np.bool_]
-) -> Real:
+    weights: Float64s,
+    residual: Float64s,
+    *,
+    cosine: Float64s,
+    along: Float64s,
+    bulge: Float64s,
+    bend: Bools,
+) -> Float64s:
     """Steps of offset (outwards), turn (times the spread) and curvature (times the spread squared), shape (K, 3).
 
     The distance changes by -cosine with the offset, by +along with the turn (to the left) and by +bulge with the

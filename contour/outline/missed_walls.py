@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside
-from contour.tracing.tracing import Rectifier
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
-
-Index = NDArray[np.intp]
 
 # From where a wall's boundary counts as outside, and how far out some of it must lie, pitches: walls behind a zigzag
 # edge lie less than 0.15 outside.
@@ -28,7 +26,9 @@ _CHAIN_BREAKS = 0.4
 _BOUNDS_APART = 0.3
 
 
-def overlooked(evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: Rectifier | None) -> tuple[Index, float]:
+def overlooked(
+    evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: Rectifier | None
+) -> tuple[Indices, float]:
     """Indices of the evidence's wall points that bound the outline from inside where `ring` leaves walls out, and how
     far it does in all, pitches.
 
@@ -58,7 +58,7 @@ def overlooked(evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: R
     return np.unique(np.concatenate(found)), total
 
 
-def _spaced(run: Index, walls: NDArray[np.float64], height: NDArray[np.float64], pitch_px: float) -> Index:
+def _spaced(run: Indices, walls: Float64s, height: Float64s, pitch_px: float) -> Indices:
     """The run's farthest points, none within a third of a pitch of another."""
     kept: list[int] = []
     for index in run[np.argsort(-height[run], kind="stable")]:
@@ -67,7 +67,7 @@ def _spaced(run: Index, walls: NDArray[np.float64], height: NDArray[np.float64],
     return np.array(kept, dtype=np.intp)
 
 
-def with_bounds(evidence: RingEvidence, bounds: Index) -> tuple[RingEvidence, Index]:
+def with_bounds(evidence: RingEvidence, bounds: Indices) -> tuple[RingEvidence, Indices]:
     """The evidence with its wall points at `bounds` among the witnesses, and where its own came to lie, shape (N,)."""
     walls, own = evidence.walls.take(bounds), len(evidence.points)
     position = np.concatenate([evidence.position, walls.position])

@@ -6,16 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.outline.lines_and_arcs import (
-    Complex,
-    Index,
-    Models,
-    distance,
-    join,
-    refine,
-    through_pairs,
-    through_triples,
-)
+from contour.geometry.arrays import Bools, Complexes, Indices
+from contour.outline.lines_and_arcs import Models, distance, join, refine, through_pairs, through_triples
 from contour.outline.witnesses import Witnesses, cost, weights, window_cost
 
 # Pairs and triples of sample places (shares of the window) that a fit starts from; far ones fix direction best.
@@ -62,15 +54,15 @@ class Proposals:
     nats."""
 
     models: Models
-    bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    first: Index
-    length: Index
+    bend: Bools
+    first: Indices
+    length: Indices
     gain: np.ndarray[tuple[int], np.dtype[np.float64]]
 
     def __len__(self) -> int:
         return len(self.first)
 
-    def take(self, keep: Index | np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Proposals:
+    def take(self, keep: Indices | Bools) -> Proposals:
         """The proposals at `keep`."""
         return Proposals(self.models.take(keep), self.bend[keep], self.first[keep], self.length[keep], self.gain[keep])
 
@@ -86,7 +78,7 @@ def gather(parts: list[Proposals]) -> Proposals:
     )
 
 
-def samples(count: int, first: Index, length: Index, places: int) -> Index:
+def samples(count: int, first: Indices, length: Indices, places: int) -> Indices:
     """`places` witness indices spread over each stretch, shape (K, places), cyclic; short stretches repeat some."""
     share = np.linspace(0.0, 1.0, places)
     offset = np.rint(share[None, :] * np.maximum(length[:, None] - 1, 0)).astype(np.intp)
@@ -132,7 +124,7 @@ def _propose_everywhere(witnesses: Witnesses) -> Proposals:
     return fits.take(_different(witnesses, fits))
 
 
-def _different(witnesses: Witnesses, fits: Proposals) -> Index:
+def _different(witnesses: Witnesses, fits: Proposals) -> Indices:
     """Indices of proposals, best first, without those that save about the same as a better one at every witness."""
     order = np.argsort(-fits.gain, kind="stable")
     signed = distance(fits.models.take((order, None)), witnesses.points[None, :])
@@ -176,9 +168,7 @@ def _stride(size: int, count: int) -> int:
     return max(1, size // 4 if size != 6 else 2) if size < count else count
 
 
-def window_fits(
-    witnesses: Witnesses, first: Index, length: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]], places: int
-) -> Proposals:
+def window_fits(witnesses: Witnesses, first: Indices, length: Indices, bend: Bools, places: int) -> Proposals:
     """A robust line or arc for each window that begins at `first`: the best of a few through its points, refined
     twice."""
     index = samples(len(witnesses), first, length, places)
@@ -195,18 +185,14 @@ def window_fits(
     return Proposals(starts, bend, first, length, np.where(sound, saved.sum(axis=1) * (length / places) - 8.0, -1.0))
 
 
-def gentle(witnesses: Witnesses, models: Models) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def gentle(witnesses: Witnesses, models: Models) -> Bools:
     """True where a model bends no more sharply than witnesses a pitch apart can show."""
-    turn = models.curvature * witnesses.pitch
-    mild: np.ndarray[tuple[int], np.dtype[np.bool_]] = (turn < 1.0 / _LEAST_RADIUS_CONVEX) & (
-        turn > -1.0 / _LEAST_RADIUS_CONCAVE
-    )
+    turn = models.curvature * witnesses.pitch_px
+    mild: Bools = (turn < 1.0 / _LEAST_RADIUS_CONVEX) & (turn > -1.0 / _LEAST_RADIUS_CONCAVE)
     return mild
 
 
-def _best_starts(
-    witnesses: Witnesses, points: Complex, index: Index, bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
-) -> Models:
+def _best_starts(witnesses: Witnesses, points: Complexes, index: Indices, bend: Bools) -> Models:
     """Of the lines through pairs (circles through triples where `bend`) of each row's points, the cheapest."""
     found = []
     rows = [np.flatnonzero(~bend), np.flatnonzero(bend)]
@@ -226,7 +212,7 @@ def _best_starts(
     return join(found).take(order)
 
 
-def _explained(witnesses: Witnesses, fits: Proposals, longer: Proposals) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _explained(witnesses: Witnesses, fits: Proposals, longer: Proposals) -> Bools:
     """True where one of the longer windows about the same place explains a window's own witnesses as well."""
     if not len(fits) or not len(longer):
         return np.zeros(len(fits), dtype=bool)
@@ -242,5 +228,5 @@ def _explained(witnesses: Witnesses, fits: Proposals, longer: Proposals) -> np.n
     signed = distance(longer.models.take(near).take((..., None)), points[:, None, :])
     theirs = cost(witnesses, signed, index[:, None, :]).sum(axis=2)
     theirs = np.where(longer.gain[near] > 0.0, theirs, np.inf).min(axis=1)
-    explained: np.ndarray[tuple[int], np.dtype[np.bool_]] = (theirs - own) * scale < _REDUNDANT
+    explained: Bools = (theirs - own) * scale < _REDUNDANT
     return explained

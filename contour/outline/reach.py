@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.outline.lines_and_arcs import Complex, Index, Models, Real, feet
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.outline.lines_and_arcs import Models, feet
 from contour.outline.witnesses import Witnesses
-
-Flags = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -17,16 +16,16 @@ class Reach:
     """From each state's foot along its model to the nearest witness that lies on it, back and ahead: shape (N, A),
     pixels, 0 where none does."""
 
-    back: Real
-    ahead: Real
+    back: Float64s
+    ahead: Float64s
 
 
-def reach(witnesses: Witnesses, models: Models, foot: Complex, *, last: Index, following: Index) -> Reach:
+def reach(witnesses: Witnesses, models: Models, foot: Complexes, *, last: Indices, following: Indices) -> Reach:
     """The reach of each state: its model, foot and supporting witnesses (see `supports`), shape (N, A) each."""
     return Reach(_away(witnesses, models, foot, last), _away(witnesses, models, foot, following))
 
 
-def supports(lies: Flags, place: Index, begin: Index, end: Index) -> tuple[Index, Index]:
+def supports(lies: Bools, place: Indices, begin: Indices, end: Indices) -> tuple[Indices, Indices]:
     """The witness at or before each entry, and at or after it, that `lies` on the same model; -1 where none does.
 
     Entries of one model run from `begin` to `end`, one for each witness (at `place`) that it may explain.
@@ -39,6 +38,6 @@ def supports(lies: Flags, place: Index, begin: Index, end: Index) -> tuple[Index
     return back, ahead
 
 
-def _away(witnesses: Witnesses, models: Models, foot: Complex, support: Index) -> Real:
+def _away(witnesses: Witnesses, models: Models, foot: Complexes, support: Indices) -> Float64s:
     there, _ = feet(models, witnesses.points[support])
     return np.where(support >= 0, np.abs(there - foot), 0.0)

@@ -6,18 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contour.geometry.arrays import Bools, Float64s, Indices
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE, Labelling
-from contour.outline.lines_and_arcs import (
-    Index,
-    Models,
-    Real,
-    distance,
-    feet,
-    join,
-    refine,
-    through_pairs,
-    through_triples,
-)
+from contour.outline.lines_and_arcs import Models, distance, feet, join, refine, through_pairs, through_triples
 from contour.outline.proposals import Proposals, gather, gentle, window_fits
 from contour.outline.witnesses import Witnesses, cost, weights
 
@@ -33,14 +24,14 @@ class Segments:
     (S,)."""
 
     models: Models
-    bend: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    first: Index
-    length: Index
+    bend: Bools
+    first: Indices
+    length: Indices
 
     def __len__(self) -> int:
         return len(self.first)
 
-    def owner(self, count: int) -> Index:
+    def owner(self, count: int) -> Indices:
         """Segment of each of the `count` witnesses, shape (N,)."""
         owner = np.repeat(np.arange(len(self)), self.length)
         return np.roll(owner, int(self.first[0]))[:count]
@@ -57,7 +48,7 @@ def runs(labelling: Labelling, proposals: Proposals) -> Segments:
     return Segments(proposals.models.take(chosen), proposals.bend[chosen], first, length)
 
 
-def stretch(count: int, first: Index, length: Index) -> tuple[Index, Real]:
+def stretch(count: int, first: Indices, length: Indices) -> tuple[Indices, Float64s]:
     """Witness indices of each stretch, shape (K, m), and how many witnesses each entry stands for (0: padding)."""
     places = min(int(length.max()), _MOST_PLACES)
     rank = np.arange(places)[None, :]
@@ -68,8 +59,8 @@ def stretch(count: int, first: Index, length: Index) -> tuple[Index, Real]:
 
 
 def fitted(
-    witnesses: Witnesses, models: Models, bend: np.ndarray[tuple[int], np.dtype[np.bool_]], first: Index, length: Index
-) -> tuple[Models, Real]:
+    witnesses: Witnesses, models: Models, bend: Bools, first: Indices, length: Indices
+) -> tuple[Models, Float64s]:
     """Models refitted robustly to their own stretches, and the nats each saves there over calling all outliers."""
     index, multiplicity = stretch(len(witnesses), first, length)
     points = witnesses.points[index]
@@ -86,7 +77,7 @@ def around(witnesses: Witnesses, segments: Segments) -> Proposals:
     arc."""
     count, total = len(witnesses), len(segments)
     starts: list[Models] = []
-    lengths: list[Index] = []
+    lengths: list[Indices] = []
     begin = np.arange(total)
     spans = range(1, min(3, total) + 1)
     for span in spans:
@@ -114,7 +105,7 @@ def around(witnesses: Witnesses, segments: Segments) -> Proposals:
     return merged.take(merged.gain > 0.0)
 
 
-def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Index, Index]:
+def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Indices, Indices]:
     """Stretches of four and more witnesses in a row, single ones apart, that lie off their segments: first and length.
 
     Each comes as it is, and longer by one at either end. Those inside come shifted, too: what an arc cuts off of an
@@ -139,12 +130,12 @@ def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Index, Index
     return np.concatenate(begins) % count, np.minimum(np.concatenate(sizes), count)
 
 
-def _starts(witnesses: Witnesses, segments: Segments, begin: Index, last: Index, bend: bool) -> Models:
+def _starts(witnesses: Witnesses, segments: Segments, begin: Indices, last: Indices, bend: bool) -> Models:
     """First guesses of a union's model through feet on its first and last segments."""
     count = len(witnesses)
     alone = begin == last
 
-    def foot(which: Index, share: float) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
+    def foot(which: Indices, share: float) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
         place = segments.first[which] + np.floor(share * segments.length[which]).astype(np.intp)
         place = np.minimum(place, segments.first[which] + segments.length[which] - 1) % count
         return feet(segments.models.take(which), witnesses.points[place])[0]
@@ -161,7 +152,7 @@ def _starts(witnesses: Witnesses, segments: Segments, begin: Index, last: Index,
     return _choose(alone & segments.bend[begin], segments.models.take(begin), triple)
 
 
-def _choose(mask: np.ndarray[tuple[int], np.dtype[np.bool_]], yes: Models, no: Models) -> Models:
+def _choose(mask: Bools, yes: Models, no: Models) -> Models:
     return Models(
         np.where(mask, yes.origin, no.origin),
         np.where(mask, yes.tangent, no.tangent),

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
 
-from contour.outline.corners import Flags
-from contour.outline.lines_and_arcs import Complex, Index, Models, Real, feet
+import numpy as np
+
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.outline.lines_and_arcs import Models, feet
 from contour.outline.runs import Segments, stretch
 from contour.outline.witnesses import Witnesses
 
@@ -16,38 +17,41 @@ _MOST = 1.0
 _MOST_FREE = 0.25
 
 
+@dataclass(frozen=True)
+class Vertices:
+    """Vertices of a ring, complex, shape (M,), and the two segments that meet in each, twice the same inside one, shape
+    (M, 2).
+    """
+
+    ring: Complexes
+    owners: Indices
+
+
 def vertex_sigma(
-    witnesses: Witnesses,
-    segments: Segments,
-    inlier: Flags,
-    *,
-    ring: Complex,
-    owners: NDArray[np.intp],
-    free: Flags,
-    spread: float,
-) -> Real:
+    witnesses: Witnesses, segments: Segments, inlier: Bools, vertices: Vertices, *, free: Bools, spread: float
+) -> Float64s:
     """Standard deviation of each vertex, shape (M,), pixels: of its place across its segment, or of a corner's place.
 
-    owners: the two segments that meet in each vertex (twice the same inside one), shape (M, 2). A segment's own
-    deviation at a place is the residual spread times the root of the fit's leverage there; a corner's is both of its
-    edges', over the sine of the angle between them. A segment of one witness says nothing of its own direction, so no
-    vertex counts with more than `_MOST`: an outline farther off leaves walls out, and that is told apart. free:
-    segments of a curve that is drawn through all their witnesses together, shape (K,).
+    A segment's own deviation at a place is the residual spread times the root of the fit's leverage there; a corner's
+    is both of its edges', over the sine of the angle between them. A segment of one witness says nothing of its own
+    direction, so no vertex counts with more than `_MOST`: an outline farther off leaves walls out, and that is told
+    apart. free: segments of a curve that is drawn through all their witnesses together, shape (K,).
     """
+    ring, owners = vertices.ring, vertices.owners
     index, multiplicity = stretch(len(witnesses), segments.first, segments.length)
     weight = multiplicity * inlier[index]
     count = np.maximum(weight.sum(axis=1), 1.0)
     along = _along(segments.models.take((slice(None), None)), witnesses.points[index])
     middle = (weight * along).sum(axis=1) / count
-    scale = np.sqrt((weight * (along - middle[:, None]) ** 2).sum(axis=1) / count) + 0.3 * witnesses.pitch
+    scale = np.sqrt((weight * (along - middle[:, None]) ** 2).sum(axis=1) / count) + 0.3 * witnesses.pitch_px
     design = _powers((along - middle[:, None]) / scale[:, None], segments.bend[:, None])
     normal = np.einsum("kmi,km,kmj->kij", design, weight, design) + 1e-6 * count[:, None, None] * np.eye(3)
     inverse = np.linalg.inv(normal)
 
-    def leverage(which: Index) -> Real:
+    def leverage(which: Indices) -> Float64s:
         place = (_along(segments.models.take(which), ring) - middle[which]) / scale[which]
         row = _powers(place, segments.bend[which])
-        spread_there: Real = np.einsum("mi,mij,mj->m", row, inverse[which], row)
+        spread_there: Float64s = np.einsum("mi,mij,mj->m", row, inverse[which], row)
         return spread_there
 
     first, second = owners[:, 0], owners[:, 1]
@@ -57,21 +61,21 @@ def vertex_sigma(
     sine = np.abs((tangent.conj() * next_tangent).imag)
     corner = (first != second) & (sine > _SHARPEST_SINE)
     ratio = np.where(corner, (one + other) / np.maximum(sine, _SHARPEST_SINE) ** 2, np.maximum(one, other))
-    most = np.where(free[first] | free[second], _MOST_FREE, _MOST) * witnesses.pitch
+    most = np.where(free[first] | free[second], _MOST_FREE, _MOST) * witnesses.pitch_px
     return np.minimum(spread * np.sqrt(ratio), most)
 
 
-def unseen_share(witnesses: Witnesses, inlier: Flags) -> float:
+def unseen_share(witnesses: Witnesses, inlier: Bools) -> float:
     """Share of the outline farther than a pitch from every inlying witness along the coarse ring, 0 to 1."""
     total = float(witnesses.gap.sum())
     if not inlier.any() or total <= 0.0:
         return 1.0
     place = np.cumsum(witnesses.gap)[inlier]
     gaps = np.diff(place, append=place[0] + total)
-    return float(np.maximum(gaps - 2.0 * witnesses.pitch, 0.0).sum() / total)
+    return float(np.maximum(gaps - 2.0 * witnesses.pitch_px, 0.0).sum() / total)
 
 
-def _along(models: Models, points: Complex) -> Real:
+def _along(models: Models, points: Complexes) -> Float64s:
     """Arc length of the points' feet from the models' origins."""
     local = (points - models.origin) * models.tangent.conj()
     bent = np.abs(models.curvature) > 1e-9
@@ -79,6 +83,6 @@ def _along(models: Models, points: Complex) -> Real:
     return np.where(bent, np.angle(1.0 + 1j * curvature * local) / curvature, local.real)
 
 
-def _powers(place: Real, bend: NDArray[np.bool_]) -> Real:
+def _powers(place: Float64s, bend: Bools) -> Float64s:
     """1, place and (where `bend`) place squared, on a new last axis."""
     return np.stack([np.ones(place.shape), place, np.where(bend, place**2, 0.0)], axis=-1)

@@ -23,12 +23,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float64s, Indices
 from contour.outline.fit import FittedRing
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
-
-Vector = NDArray[np.float64]
 
 SHARE = 0.95
 LEAST_PX = 0.15
@@ -65,15 +63,15 @@ class Stretches:
     length: along the coarse ring. The others are the causes of `Coefficients`, by the same names.
     """
 
-    length: Vector
-    blur: Vector
-    dark: Vector
-    leverage: Vector
-    gap: Vector
-    misfit: Vector
-    outside: Vector
+    length: Float64s
+    blur: Float64s
+    dark: Float64s
+    leverage: Float64s
+    gap: Float64s
+    misfit: Float64s
+    outside: Float64s
 
-    def sigma(self, coefficients: Coefficients) -> Vector:
+    def sigma(self, coefficients: Coefficients) -> Float64s:
         """Standard deviation of the outline's place in each stretch."""
         terms = [getattr(coefficients, one.name) * getattr(self, one.name) for one in fields(coefficients)]
         return np.asarray(np.sqrt(np.sum(np.square(terms), axis=0)), np.float64)
@@ -96,7 +94,7 @@ def uncertainty(
     return max(bound(sigma, np.concatenate([one.length for one in stretches])), LEAST_PX)
 
 
-def bound(sigma: Vector, length: Vector) -> float:
+def bound(sigma: Float64s, length: Float64s) -> float:
     """The distance within which normal errors of standard deviation `sigma` keep 95 % of the stretches' length."""
     share = length / max(float(length.sum()), 1e-12)
     sigma = np.maximum(sigma, 1e-6)
@@ -135,7 +133,7 @@ def ring_stretches(
     )
 
 
-def _leverage(evidence: RingEvidence, fitted: FittedRing, place: Vector, around: float) -> Vector:
+def _leverage(evidence: RingEvidence, fitted: FittedRing, place: Float64s, around: float) -> Float64s:
     """Standard deviation of the fit over that of one witness, at places along the coarse ring, between its vertices."""
     ring, points = fitted.ring, evidence.points
     nearest = np.concatenate(
@@ -147,12 +145,12 @@ def _leverage(evidence: RingEvidence, fitted: FittedRing, place: Vector, around:
     return np.asarray(np.interp(place, at[order], ratio[order], period=around), np.float64)
 
 
-def _middle_of_five(residual: Vector) -> Vector:
+def _middle_of_five(residual: Float64s) -> Float64s:
     """Median of each residual and its two neighbours on either side, around the ring."""
     return np.asarray(np.median([np.roll(residual, shift) for shift in range(-2, 3)], axis=0), np.float64)
 
 
-def _largest_between(values: Vector, on_line: NDArray[np.intp]) -> Vector:
+def _largest_between(values: Float64s, on_line: Indices) -> Float64s:
     """Largest of the values from each witness on the outline up to and with the next one on it, around the ring."""
     turned = np.roll(values, -int(on_line[0]))
     largest = np.maximum.reduceat(turned, on_line - on_line[0])

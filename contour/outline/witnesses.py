@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.outline.lines_and_arcs import Complex, Index, Models, Real, distance
-from contour.tracing.tracing import Rectifier
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.geometry.rectifier import Rectifier
+from contour.outline.lines_and_arcs import Models, distance
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 # Shares of witnesses that are no clean wall end, for the price of calling one an outlier.
@@ -43,22 +44,22 @@ class Witnesses:
     for a hole.
     """
 
-    points: Complex
-    normal: Complex
-    inner: Real
-    outer: Real
-    cap_inside: Real
-    cap_outside: Real
-    clean: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    gap: Real
-    pitch: float
+    points: Complexes
+    normal: Complexes
+    inner: Float64s
+    outer: Float64s
+    cap_inside: Float64s
+    cap_outside: Float64s
+    clean: Bools
+    gap: Float64s
+    pitch_px: float
     rare: float
 
     def __len__(self) -> int:
         return len(self.points)
 
     @property
-    def bound(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def bound(self) -> Bools:
         """Which are no witnesses of the edge, but bound it from inside."""
         return np.isinf(self.inner)
 
@@ -94,7 +95,7 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
     of their odds at the outline itself.
     """
     inner, outer = witnesses.inner * factor, witnesses.outer * factor
-    odds = witnesses.pitch / (np.sqrt(2.0 * np.pi) * np.minimum(inner, outer))
+    odds = witnesses.pitch_px / (np.sqrt(2.0 * np.pi) * np.minimum(inner, outer))
     inside = np.log((1.0 - _SHARE_INSIDE) / _SHARE_INSIDE * odds)
     dearer = _HOLE if witnesses.rare > 0.0 else 1.0
     inside = np.where(witnesses.inner > witnesses.outer * 1.01, 4.0, np.clip(inside, 3.0, 5.5))
@@ -109,7 +110,7 @@ def scaled(witnesses: Witnesses, factor: float) -> Witnesses:
     )
 
 
-def cost(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
+def cost(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(None)) -> Float64s:
     """Nats of signed distances (last axis: the witnesses at `index`, or index's own shape): half squares near the
     outline, bent towards a cap either side.
 
@@ -121,15 +122,15 @@ def cost(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None))
     outside = signed > 0.0
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
     cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
-    beyond = np.clip(np.where(np.isinf(sigma), 0.0, np.abs(signed)) / witnesses.pitch - _DEEPEST, 0.0, 3.0)
+    beyond = np.clip(np.where(np.isinf(sigma), 0.0, np.abs(signed)) / witnesses.pitch_px - _DEEPEST, 0.0, 3.0)
     square = 0.5 * (signed / sigma) ** 2
-    bent: Real = cap * square / (cap + square) + 4.0 * beyond**2
+    bent: Float64s = cap * square / (cap + square) + 4.0 * beyond**2
     if witnesses.rare > 0.0:
         return bent
-    return bent + _FAR_OUTSIDE * np.clip(signed / witnesses.pitch - _DUST, 0.0, 1.0)
+    return bent + _FAR_OUTSIDE * np.clip(signed / witnesses.pitch_px - _DUST, 0.0, 1.0)
 
 
-def weights(witnesses: Witnesses, signed: Real, index: Index | slice = slice(None)) -> Real:
+def weights(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(None)) -> Float64s:
     """Weights of a robust fit, 1/pixel^2: inverse variance, falling smoothly as the cost bends towards its inner cap.
 
     The same cap on both sides, or clean noise alone would pull the outline outwards.
@@ -167,7 +168,7 @@ def noise_from_neighbours(witnesses: Witnesses) -> float:
     return float(np.clip(level / 0.36, 0.5, most))
 
 
-def noise_from_residuals(witnesses: Witnesses, signed: Real) -> float:
+def noise_from_residuals(witnesses: Witnesses, signed: Float64s) -> float:
     """Noise over the present one, from the clean witnesses' distances to their own models; 1 where there are too
     few."""
     ratio = np.abs(signed[witnesses.clean] / witnesses.outer[witnesses.clean])
@@ -177,7 +178,7 @@ def noise_from_residuals(witnesses: Witnesses, signed: Real) -> float:
     return float(np.clip(np.median(ratio) / 0.6745, 0.5, 2.0))
 
 
-def window_cost(witnesses: Witnesses, models: Models, index: Index) -> Real:
+def window_cost(witnesses: Witnesses, models: Models, index: Indices) -> Float64s:
     """Cost of each model at its own witnesses: models of shape (K,), index of shape (K, m); result (K, m)."""
     signed = distance(models.take((slice(None), None)), witnesses.points[index])
     return cost(witnesses, signed, index)

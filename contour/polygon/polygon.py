@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.calibration import Calibration, scales
 from contour.errors import MarginImpossible, ParameterError
+from contour.geometry.arrays import Float64s, Indices
 from contour.geometry.offset import offset_contour
 from contour.geometry.rings import Contour, area, contour_defect, oriented_contour, simplify_indices
 from contour.geometry.segments import distances_to_ring
@@ -89,9 +89,9 @@ def cutting_polygon(
         polygon = _in_pixels(contour_px, finish)
     else:
         traced_mm = convert(contour_px, calibration, height_mm)
-        mm_per_px = float(scales(calibration, contour_px.exterior, height_mm).max())
+        plane = _Plane(calibration, height_mm, float(scales(calibration, contour_px.exterior, height_mm).max()))
         on_stage("convert")
-        polygon = _in_millimetres(contour_px, traced_mm, calibration, height_mm, mm_per_px, tolerance_mm, finish)
+        polygon = _in_millimetres(contour_px, traced_mm, plane, tolerance_mm, finish)
     on_stage("simplify")
     return polygon
 
@@ -106,14 +106,17 @@ def _in_pixels(contour_px: Contour, finish: Finish) -> Polygon:
     return Polygon(pixels, None, area(pixels), None, None, _shift(contour_px, pixels))
 
 
+@dataclass(frozen=True)
+class _Plane:
+    """The traced plane's height above the table, and its coarsest scale along the contour."""
+
+    calibration: Calibration
+    height_mm: float
+    mm_per_px: float
+
+
 def _in_millimetres(
-    contour_px: Contour,
-    traced_mm: Contour,
-    calibration: Calibration,
-    height_mm: float,
-    mm_per_px: float,
-    tolerance_mm: float,
-    finish: Finish,
+    contour_px: Contour, traced_mm: Contour, plane: _Plane, tolerance_mm: float, finish: Finish
 ) -> Polygon:
     kept = _kept_vertices(traced_mm, tolerance_mm)
     pixels, millimetres = _subset(contour_px, kept), _subset(traced_mm, kept)
@@ -125,17 +128,16 @@ def _in_millimetres(
         moved = _with_margin(before, finish.margin_mm)
     except MarginImpossible as error:
         moved, defect = before, f"{error}. Correct margin_mm, or use a recipe for a block of this size"
-    shift_px = 0.0 if given_up_mm else _shift(traced_mm, millimetres) / mm_per_px
+    shift_px = 0.0 if given_up_mm else _shift(traced_mm, millimetres) / plane.mm_per_px
     if moved is not millimetres:
         millimetres = moved
-        rings = [calibration.to_pixels(ring, height_mm) for ring in moved.rings]
+        rings = [plane.calibration.to_pixels(ring, plane.height_mm) for ring in moved.rings]
         pixels = Contour(rings[0], tuple(rings[1:]))
     if finish.start is not None:
         first = first_vertices(millimetres, finish.start, _START_TIE_MM)
         pixels, millimetres = begun_at(pixels, first), begun_at(millimetres, first)
-    return Polygon(
-        pixels, millimetres, area(pixels), area(millimetres), mm_per_px, shift_px, given_up_mm / mm_per_px, defect
-    )
+    given_up_px = given_up_mm / plane.mm_per_px
+    return Polygon(pixels, millimetres, area(pixels), area(millimetres), plane.mm_per_px, shift_px, given_up_px, defect)
 
 
 def _budgeted(traced_mm: Contour, simplified_mm: Contour, most: int, budget_mm: float) -> tuple[Contour, float]:
@@ -152,7 +154,7 @@ def _with_margin(contour_mm: Contour, margin_mm: float) -> Contour:
     return offset_contour(contour_mm, margin_mm)
 
 
-def _mirrored(ring: NDArray[np.float64]) -> NDArray[np.float64]:
+def _mirrored(ring: Float64s) -> Float64s:
     return ring * [1.0, -1.0]
 
 
@@ -162,7 +164,7 @@ def convert(contour_px: Contour, calibration: Calibration, height_mm: float) -> 
     return Contour(rings[0], tuple(rings[1:]))
 
 
-def _kept_vertices(contour: Contour, tolerance: float) -> list[NDArray[np.intp]]:
+def _kept_vertices(contour: Contour, tolerance: float) -> list[Indices]:
     """Indices of the vertices to keep, ring by ring; rings that were apart stay apart."""
     if not (np.isfinite(tolerance) and tolerance >= 0):
         raise ParameterError(f"tolerance is {tolerance}: expected a number of 0 or more, in the contour's unit.")
@@ -179,6 +181,6 @@ def _shift(traced: Contour, kept: Contour) -> float:
     return max((float(distances_to_ring(one, few).max()) for one, few in pairs), default=0.0)
 
 
-def _subset(contour: Contour, kept: list[NDArray[np.intp]]) -> Contour:
+def _subset(contour: Contour, kept: list[Indices]) -> Contour:
     rings = [ring[indices] for ring, indices in zip(contour.rings, kept, strict=True)]
     return Contour(rings[0], tuple(rings[1:]))

@@ -14,12 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bools, Float64s, Indices
 from contour.geometry.rings import Contour, Ring
 from contour.geometry.segments import BoxTree, distances_to_segments, near_pairs, segments_meet, self_meetings, turns
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 _SHARE = 0.25
 """Of the steps that are allowed in a round, the share of the cheapest that is taken: near enough to one at a time."""
@@ -53,8 +50,8 @@ class _Step:
     ring: int
     at: int
     shift: float
-    given_up: Floats
-    tip: Floats | None = None
+    given_up: Float64s
+    tip: Float64s | None = None
     first: int = 0
 
     def footprint(self, count: int) -> tuple[int, ...]:
@@ -160,7 +157,7 @@ def _merges(number: int, ring: _Ring, turn: NDArray[np.int8], bound: float) -> l
     ]
 
 
-def _tips(before: Floats, here: Floats, there: Floats, after: Floats) -> tuple[Floats, Mask]:
+def _tips(before: Float64s, here: Float64s, there: Float64s, after: Float64s) -> tuple[Float64s, Bools]:
     """Where the edges before -> here and after -> there meet when prolonged, and for which they do, not too far off.
 
     The tip is exactly on their lines or left of them, so that the new edges take no point from beyond the old ones.
@@ -179,7 +176,7 @@ def _tips(before: Floats, here: Floats, there: Floats, after: Floats) -> tuple[F
     return tips, np.asarray(good)
 
 
-def _stretches(ring: _Ring, first: Indices, lengths: Indices) -> tuple[Indices, Floats, Indices]:
+def _stretches(ring: _Ring, first: Indices, lengths: Indices) -> tuple[Indices, Float64s, Indices]:
     """The traced vertices of several stretches one after another: whose each is, where it lies, where each begins."""
     begins = np.cumsum(lengths + 1) - (lengths + 1)
     owner = np.repeat(np.arange(len(first)), lengths + 1)
@@ -187,7 +184,7 @@ def _stretches(ring: _Ring, first: Indices, lengths: Indices) -> tuple[Indices, 
     return owner, ring.traced[index % len(ring.traced)], begins
 
 
-def _largest(values: Floats, begins: Indices) -> Floats:
+def _largest(values: Float64s, begins: Indices) -> Float64s:
     return np.maximum.reduceat(values, begins) if len(begins) else np.zeros(0)
 
 

@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour, Ring, contour_defect, oriented_contour
 from contour.geometry.segments import BoxTree, contains, distances_to_ring, near_pairs, turns
 from contour.polygon.shrinking_steps import reduced
-
-Floats = NDArray[np.float64]
 
 _SAMPLES = 16
 """The proof may find up to this part of the bound more than there is; steps keep clear of it."""
@@ -116,7 +114,7 @@ def _farthest(here: Ring, there: Ring, seen: float, slack: float) -> float:
         at_start, at_end = np.concatenate([at_start, at_middle]), np.concatenate([at_middle, at_end])
 
 
-def _unlike(here: Ring, there: Ring) -> tuple[Floats, Floats]:
+def _unlike(here: Ring, there: Ring) -> tuple[Float64s, Float64s]:
     """Starts and ends of the edges of `here` that are no edges of `there`."""
     edges = [np.concatenate([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in (here, there)]
     known = {edge.tobytes() for edge in edges[1]}
@@ -124,5 +122,5 @@ def _unlike(here: Ring, there: Ring) -> tuple[Floats, Floats]:
     return new[:, :2], new[:, 2:]
 
 
-def _nearest(points: Floats, contour: Contour) -> Floats:
+def _nearest(points: Float64s, contour: Contour) -> Float64s:
     return np.asarray(np.min([distances_to_ring(points, ring) for ring in contour.rings], axis=0))

@@ -6,13 +6,11 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.camera_calibration.board import Board
+from contour.geometry.arrays import Float64s
 from contour.synthetic.board_view import board_camera
 from contour.synthetic.camera import CameraModel
-
-Floats = NDArray[np.float64]
 
 _STEPS_INWARDS = 40
 
@@ -20,8 +18,8 @@ _STEPS_INWARDS = 40
 class BoardPose(NamedTuple):
     """Takes board points to the table's frame: rotation (3, 3) and translation (3,), mm."""
 
-    rotation: Floats
-    translation_mm: Floats
+    rotation: Float64s
+    translation_mm: Float64s
 
 
 def board_poses(
@@ -63,7 +61,7 @@ def board_poses(
     return poses
 
 
-def _spread(count: int, rng: np.random.Generator) -> Floats:
+def _spread(count: int, rng: np.random.Generator) -> Float64s:
     """Points of the unit square, one in each cell of a lattice of about `count` cells, in random order, (count, 2)."""
     columns = int(np.ceil(np.sqrt(count)))
     rows = int(np.ceil(count / columns))

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.camera_calibration.board import Board
+from contour.geometry.arrays import Bytes, Float32s, Float64s
 from contour.synthetic.camera import CameraModel
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.scene import Sensor
 from contour.synthetic.sensor import expose
-
-Floats = NDArray[np.float64]
 
 TABLE, PAPER, INK = 0.35, 0.82, 0.06
 """Light they return, shares of full scale."""
@@ -23,7 +21,7 @@ _STEP_PX = 16.0
 """A chord this long leaves the bent edge by 0.002 px under k1 = -0.12."""
 
 
-def board_camera(camera: CameraModel, rotation: Floats, translation_mm: Floats) -> CameraModel:
+def board_camera(camera: CameraModel, rotation: Float64s, translation_mm: Float64s) -> CameraModel:
     """The same camera seen from a board's frame: the board is turned and moved before `camera`'s work frame.
 
     `rotation` (3, 3) and `translation_mm` (3,) take points of the board frame to the work frame.
@@ -35,8 +33,8 @@ def board_camera(camera: CameraModel, rotation: Floats, translation_mm: Floats) 
 
 
 def render_flat(
-    camera: CameraModel, sheets: Sequence[tuple[Floats, Floats]], *, sensor: Sensor | None = None, seed: int = 1
-) -> NDArray[np.uint8]:
+    camera: CameraModel, sheets: Sequence[tuple[Float64s, Float64s]], *, sensor: Sensor | None = None, seed: int = 1
+) -> Bytes:
     """The picture of sheets in the plane z = 0 of the camera's frame: (H, W), uint8.
 
     A sheet is its white box and its black boxes: left, bottom, right, top, shapes (4,) and (N, 4), millimetres.
@@ -49,14 +47,12 @@ def render_flat(
     return expose(sensor or Sensor(), [light], seed)
 
 
-def render_board(
-    board: Board, camera: CameraModel, *, sensor: Sensor | None = None, seed: int = 1
-) -> NDArray[np.uint8]:
+def render_board(board: Board, camera: CameraModel, *, sensor: Sensor | None = None, seed: int = 1) -> Bytes:
     """The picture of a board on its sheet; `camera` is given in the board's frame."""
     return render_flat(camera, [board_sheet(board)], sensor=sensor, seed=seed)
 
 
-def board_sheet(board: Board, offset_mm: tuple[float, float] = (0.0, 0.0)) -> tuple[Floats, Floats]:
+def board_sheet(board: Board, offset_mm: tuple[float, float] = (0.0, 0.0)) -> tuple[Float64s, Float64s]:
     """A board's sheet, with a margin of half a square, as `render_flat` takes it."""
     width, height = board.size_mm
     margin = 0.5 * board.square_mm
@@ -64,7 +60,7 @@ def board_sheet(board: Board, offset_mm: tuple[float, float] = (0.0, 0.0)) -> tu
     return np.array([-margin, -margin, width + margin, height + margin]) + shift, board.black_boxes() + shift
 
 
-def _coverage(camera: CameraModel, boxes: Floats) -> NDArray[np.float32]:
+def _coverage(camera: CameraModel, boxes: Float64s) -> Float32s:
     """Share of each pixel that the boxes cover; what lies beside the picture is left out."""
     middle = np.array([[camera.width / 2, camera.height / 2]])
     x, y = camera.back_project(middle, 0.0)[0].tolist()

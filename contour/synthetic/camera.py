@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour, Ring
-
-Points = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,14 +28,14 @@ class CameraModel:
     translation_mm: tuple[float, float, float]
 
     @property
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> Float64s:
         """The camera matrix, shape (3, 3)."""
         return np.array(
             [[self.focal_px[0], 0.0, self.centre_px[0]], [0.0, self.focal_px[1], self.centre_px[1]], [0.0, 0.0, 1.0]]
         )
 
     @property
-    def position_mm(self) -> NDArray[np.float64]:
+    def position_mm(self) -> Float64s:
         """The optical centre in the work frame, shape (3,), millimetres."""
         return np.asarray(-np.array(self.rotation).T @ np.array(self.translation_mm), dtype=np.float64)
 
@@ -47,13 +45,13 @@ class CameraModel:
         x, y, z = cv2.Rodrigues(np.array(self.rotation))[0].ravel().tolist()
         return (x, y, z)
 
-    def project(self, points_mm: Points, z_mm: float) -> Points:
+    def project(self, points_mm: Float64s, z_mm: float) -> Float64s:
         """Pixels of work points at height z, shape (N, 2), float64."""
         rotation, shift = np.array(self.rotation), np.array(self.translation_mm)
         ray = points_mm @ rotation[:, :2].T + (rotation[:, 2] * z_mm + shift)
         return self.distort(ray[:, :2] / ray[:, 2:3])
 
-    def distort(self, normal: Points) -> Points:
+    def distort(self, normal: Float64s) -> Float64s:
         """Pixels of undistorted normalised image coordinates, shape (N, 2)."""
         x, y = normal[:, 0], normal[:, 1]
         k1, k2, p1, p2, k3 = self.distortion
@@ -63,7 +61,7 @@ class CameraModel:
         yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
         return np.column_stack((xd * self.focal_px[0] + self.centre_px[0], yd * self.focal_px[1] + self.centre_px[1]))
 
-    def undistort(self, pixels: Points) -> Points:
+    def undistort(self, pixels: Float64s) -> Float64s:
         """Normalised image coordinates without the lens, shape (N, 2): fixed-point inverse of `distort`, to 1e-10."""
         k1, k2, p1, p2, k3 = self.distortion
         xd = (pixels[:, 0] - self.centre_px[0]) / self.focal_px[0]
@@ -80,7 +78,7 @@ class CameraModel:
                 break
         return np.column_stack((x, y))
 
-    def back_project(self, pixels: Points, z_mm: float) -> Points:
+    def back_project(self, pixels: Float64s, z_mm: float) -> Float64s:
         """Work points at height z that are seen at these pixels, shape (N, 2), millimetres."""
         rotation, position = np.array(self.rotation), self.position_mm
         rays = np.column_stack((self.undistort(pixels), np.ones(len(pixels)))) @ rotation
@@ -142,16 +140,16 @@ def densified(ring: Ring, step: float) -> Ring:
     return np.asarray(ring[edge] * (1.0 - share) + ends[edge] * share, dtype=np.float64)
 
 
-def _turn_x(angle: float) -> NDArray[np.float64]:
+def _turn_x(angle: float) -> Float64s:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
-def _turn_y(angle: float) -> NDArray[np.float64]:
+def _turn_y(angle: float) -> Float64s:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
-def _turn_z(angle: float) -> NDArray[np.float64]:
+def _turn_z(angle: float) -> Float64s:
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Float32s, Float64s, Int32s
 
-Floats = NDArray[np.float32]
 CellKind = Literal["honeycomb", "irregular", "foam", "perforated", "solid"]
 
 _ROW = math.sqrt(3.0) / 2.0
@@ -85,12 +84,12 @@ class Lattice:
 
     first: tuple[int, int]
     counts: tuple[int, int]
-    keep: Floats
-    tone: Floats
-    shift: Floats
-    cell: Floats
+    keep: Float32s
+    tone: Float32s
+    shift: Float32s
+    cell: Float32s
 
-    def index(self, i: Floats, j: Floats) -> NDArray[np.int32]:
+    def index(self, i: Float32s, j: Float32s) -> Int32s:
         """Row of the tables for the cell (i, j)."""
         return ((j - self.first[1]) * self.counts[0] + (i - self.first[0])).astype(np.int32)
 
@@ -107,16 +106,14 @@ class WallField:
     `cell` is a number 0…1 of the cell the point lies in; `lean` where in the cell (−1…1 along the light).
     """
 
-    distance: Floats
-    half_width: Floats
-    tone: Floats
-    cell: Floats
-    lean: Floats
+    distance: Float32s
+    half_width: Float32s
+    tone: Float32s
+    cell: Float32s
+    lean: Float32s
 
 
-def lattice_coordinates(
-    geometry: CellGeometry, x_mm: NDArray[np.float64], y_mm: NDArray[np.float64], seed: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def lattice_coordinates(geometry: CellGeometry, x_mm: Float64s, y_mm: Float64s, seed: int) -> tuple[Float64s, Float64s]:
     """Work points in the lattice's own frame, millimetres: turned to the ribbon, shifted, smoothly warped."""
     turn = math.radians(geometry.ribbon_deg) - math.pi / 2.0  # the lattice's y axis is the ribbon
     x, y = x_mm - geometry.offset_mm[0], y_mm - geometry.offset_mm[1]
@@ -138,8 +135,8 @@ def lattice_coordinates(
 
 def _add_waves(
     rng: np.random.Generator,
-    moved: tuple[NDArray[np.float64], NDArray[np.float64]],
-    place: tuple[NDArray[np.float64], NDArray[np.float64]],
+    moved: tuple[Float64s, Float64s],
+    place: tuple[Float64s, Float64s],
     length: float,
     size: float,
 ) -> None:
@@ -150,14 +147,17 @@ def _add_waves(
         moved[axis][...] += size * np.sin(wave)
 
 
+@dataclass(frozen=True)
+class WallTones:
+    """How walls differ in tone: share of glints, relative spread, and what more walls return that face the light."""
+
+    glints: float = 0.05
+    spread: float = 0.22
+    sheen: float = 0.0
+
+
 def draw_lattice(
-    geometry: CellGeometry,
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    seed: int,
-    glints: float = 0.05,
-    spread: float = 0.22,
-    sheen: float = 0.0,
+    geometry: CellGeometry, x: Float64s, y: Float64s, seed: int, tones: WallTones = WallTones()
 ) -> Lattice:
     """The tables for all cells between the extremes of lattice coordinates x, y (mm)."""
     step_x, step_y = _steps(geometry)
@@ -173,11 +173,11 @@ def draw_lattice(
         hit = rng.random((cells, 3)) < geometry.broken
         part = rng.uniform(-1.6, 0.7, (cells, 3))
         keep[hit] = np.where(part[hit] < -0.9, GONE, part[hit])
-    tone = np.clip(1.0 + spread * rng.standard_normal((cells, 3)), 0.35, 1.7)
-    tone[rng.random((cells, 3)) < glints] *= 1.9
+    tone = np.clip(1.0 + tones.spread * rng.standard_normal((cells, 3)), 0.35, 1.7)
+    tone[rng.random((cells, 3)) < tones.glints] *= 1.9
     if geometry.kind == "honeycomb":
         normals = np.radians([90.0, 150.0, 210.0]) + math.radians(geometry.ribbon_deg)
-        tone *= 1.0 + sheen * np.cos(2.0 * (normals - 1.0))
+        tone *= 1.0 + tones.sheen * np.cos(2.0 * (normals - 1.0))
     shift = (rng.random((cells, 2)) - 0.5) * 2.0 * geometry.jitter
     lattice = Lattice(
         (i0, j0), counts, keep, tone.astype(np.float32), shift.astype(np.float32), rng.random(cells).astype(np.float32)
@@ -198,7 +198,7 @@ def _remove_cells(geometry: CellGeometry, lattice: Lattice, seed: int) -> None:
         lattice.keep[lattice.index(i - di, j - dj), axis] = GONE
 
 
-def wall_field(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> WallField:
+def wall_field(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
     """The walls around lattice points x, y (mm), arrays of one shape, float32."""
     if geometry.kind == "honeycomb":
         return _hexagons(geometry, lattice, x, y)
@@ -218,7 +218,7 @@ def _steps(geometry: CellGeometry) -> tuple[float, float]:
     return geometry.pitch_mm, geometry.pitch_mm * (1.0 if geometry.square_grid else _ROW)
 
 
-def _canonical(geometry: CellGeometry, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def _canonical(geometry: CellGeometry, x: Float32s, y: Float32s) -> tuple[Float32s, Float32s]:
     """Coordinates in which cells are regular hexagons one apart; straight and slanted walls stretch separately."""
     step_x, step_y = _steps(geometry)
     xc = x * np.float32(1.0 / step_x)
@@ -238,7 +238,7 @@ def _canonical(geometry: CellGeometry, x: Floats, y: Floats) -> tuple[Floats, Fl
     return xc, row * np.float32(_ROW) + within - np.float32(straight / 2.0)
 
 
-def _nearest_hex(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def _nearest_hex(x: Float32s, y: Float32s) -> tuple[Float32s, Float32s, Float32s, Float32s]:
     """Indices (i, j) of the nearest site i·(1, 0) + j·(½, √3/2), and the offset from it."""
     tall = np.float32(2.0 * _ROW)
     row_a = np.rint(y * np.float32(0.5 / _ROW))
@@ -253,7 +253,7 @@ def _nearest_hex(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     return i, j, np.where(first, ax, bx), np.where(first, ay, by)
 
 
-def _hexagons(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> WallField:
+def _hexagons(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
     xc, yc = _canonical(geometry, x, y)
     i, j, dx, dy = _nearest_hex(xc, yc)
     here = lattice.index(i, j)
@@ -281,9 +281,9 @@ def _hexagons(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) ->
     return WallField(distance, half, lattice.tone.ravel()[wall], lattice.cell[here], dx - dy)
 
 
-def _holes(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> WallField:
-    pitch = np.float32(geometry.pitch_mm)
-    xc, yc = x / pitch, y / pitch
+def _holes(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
+    pitch_mm = np.float32(geometry.pitch_mm)
+    xc, yc = x / pitch_mm, y / pitch_mm
     if geometry.square_grid:
         i, j = np.rint(xc), np.rint(yc)
         dx, dy = xc - i, yc - j
@@ -291,16 +291,16 @@ def _holes(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> Wa
         i, j, dx, dy = _nearest_hex(xc, yc)
     here = lattice.index(i, j)
     radius = np.float32(0.5 * (geometry.pitch_mm - geometry.wall_mm))
-    outside = np.sqrt(dx * dx + dy * dy) * pitch - radius
+    outside = np.sqrt(dx * dx + dy * dy) * pitch_mm - radius
     outside = np.where(lattice.keep[here, 0] < INTACT, np.float32(400.0), outside)  # this hole was never drilled
     one = np.ones_like(outside)
     # a half-plane written as a very wide wall: its near face lies where the hole ends
     return WallField(np.float32(500.0) - outside, np.float32(500.0) * one, one, lattice.cell[here], dx - dy)
 
 
-def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> WallField:
-    pitch = np.float32(geometry.pitch_mm)
-    xc, yc = x / pitch, y / pitch
+def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
+    pitch_mm = np.float32(geometry.pitch_mm)
+    xc, yc = x / pitch_mm, y / pitch_mm
     i, j, dx, dy = _nearest_hex(xc, yc)
     here = lattice.index(i, j)
     reach = 1 if geometry.jitter <= 0.2 else 2
@@ -327,7 +327,7 @@ def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> 
             near1, id1 = np.where(first, far2, near1), np.where(first, there, id1)
             at[1] = (np.where(first, ox, at[1][0]), np.where(first, oy, at[1][1]))
     apart = np.sqrt((at[2][0] - at[1][0]) ** 2 + (at[2][1] - at[1][1]) ** 2)
-    distance = (near2 - near1) / (2.0 * np.maximum(apart, np.float32(1e-3))) * pitch
+    distance = (near2 - near1) / (2.0 * np.maximum(apart, np.float32(1e-3))) * pitch_mm
     pair = (id1 + id2) % np.int32(len(lattice.tone))
     keep = lattice.keep[pair, 0]
     distance = np.where(keep < INTACT, np.float32(1e3), distance)
@@ -337,7 +337,7 @@ def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Floats, y: Floats) -> 
     return WallField(distance.astype(np.float32), half, tone, lattice.cell[id1], lean)
 
 
-def lattice_centres(geometry: CellGeometry, lattice: Lattice) -> NDArray[np.float64]:
+def lattice_centres(geometry: CellGeometry, lattice: Lattice) -> Float64s:
     """Centres of all cells in the tables' order, work millimetres, shape (cells, 2); the warp is left out."""
     columns, rows = np.meshgrid(np.arange(lattice.counts[0]), np.arange(lattice.counts[1]))
     i, j = columns.ravel() + lattice.first[0], rows.ravel() + lattice.first[1]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour, Ring
 from contour.synthetic.camera import densified
 from contour.synthetic.cells import CellGeometry, draw_lattice, lattice_centres, lattice_coordinates
@@ -45,7 +45,7 @@ def closed_border(geometry: CellGeometry, outline: Contour, seed: int) -> Contou
     return Contour(moved[0], tuple(ring for ring in moved[1:] if _area(ring) < 0.0))
 
 
-def to_work(geometry: CellGeometry, points: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+def to_work(geometry: CellGeometry, points: Float64s, seed: int) -> Float64s:
     """Work points whose lattice coordinates these are (fixed-point inverse of `lattice_coordinates`), shape (N, 2)."""
     turn = math.radians(geometry.ribbon_deg) - math.pi / 2.0
     back = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
@@ -58,7 +58,7 @@ def to_work(geometry: CellGeometry, points: NDArray[np.float64], seed: int) -> N
     return np.asarray(found, dtype=np.float64)
 
 
-def _unturned(geometry: CellGeometry, work: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unturned(geometry: CellGeometry, work: Float64s) -> Float64s:
     """Lattice coordinates of points given without the warp."""
     turn = math.radians(geometry.ribbon_deg) - math.pi / 2.0
     forth = np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])

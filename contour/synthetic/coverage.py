@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float32s, Float64s
 from contour.geometry.rings import Ring
 
 
-def area_coverage(rings: Sequence[Ring], width: int, height: int) -> NDArray[np.float32]:
+def area_coverage(rings: Sequence[Ring], width: int, height: int) -> Float32s:
     """Share of each pixel inside the rings, shape (height, width), float32, 0…1.
 
     Rings are in pixels with (0, 0) the centre of the top-left pixel; the exterior comes first, holes run the other way.
@@ -44,7 +44,7 @@ def _signed_area(ring: Ring) -> float:
     return 0.5 * float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
 
 
-def _pieces(start: Ring, end: Ring, width: int, height: int) -> NDArray[np.float64]:
+def _pieces(start: Ring, end: Ring, width: int, height: int) -> Float64s:
     """Edges from `start` to `end` cut at every pixel border they cross, as x0, y0, x1, y1, shape (M, 4)."""
     edges = [np.arange(len(start)), np.arange(len(start))]
     shares = [np.zeros(len(start)), np.ones(len(start))]

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float32s
 from contour.synthetic.scene import Scene
-
-Floats = NDArray[np.float32]
 
 _NO_MAP = np.empty(0, dtype=np.float32)
 _BAND = 64
@@ -25,11 +23,11 @@ _BAND = 64
 class Relief:
     """All that is seen of the block: `cover` share of each pixel, `light` it returns (premultiplied), shape (H, W)."""
 
-    cover: Floats
-    light: Floats
+    cover: Float32s
+    light: Float32s
 
 
-def relief(scene: Scene, cover: Floats, light: Floats) -> Relief:
+def relief(scene: Scene, cover: Float32s, light: Float32s) -> Relief:
     """The top plane's cover and light completed by the walls' sides."""
     shift = _parallax(scene)
     longest = float(np.abs(shift).max(initial=0.0))
@@ -49,14 +47,20 @@ def relief(scene: Scene, cover: Floats, light: Floats) -> Relief:
     first, last = max(0, int(rows[0]) - margin), min(height, int(rows[-1]) + margin)
     for top in range(first, last, _BAND):  # bands stay in the processor's cache
         part = (slice(top, min(last, top + _BAND)), slice(left, right))
-        _march(scene, pair, fine[part], (left, top), steps, total[part], radiance[part])
+        _march(scene, pair, fine[part], (left, top), steps, Relief(total[part], radiance[part]))
     return Relief(total, radiance)
 
 
 def _march(
-    scene: Scene, pair: Floats, step: Floats, origin: tuple[int, int], steps: int, total: Floats, radiance: Floats
+    scene: Scene,
+    pair: Float32s,
+    step: Float32s,
+    origin: tuple[int, int],
+    steps: int,
+    seen: Relief,
 ) -> None:
-    """Follow each pixel's ray down to the table, adding what it meets first to `total` and `radiance`, in place."""
+    """Follow each pixel's ray down to the table, adding what it meets first to what is seen, in place."""
+    total, radiance = seen.cover, seen.light
     reach = 1.1 * scene.cells.pitch_mm
     x = np.arange(origin[0], origin[0] + step.shape[1], dtype=np.float32)
     y = np.arange(origin[1], origin[1] + step.shape[0], dtype=np.float32)
@@ -72,7 +76,7 @@ def _march(
         total += gain
 
 
-def _parallax(scene: Scene) -> Floats:
+def _parallax(scene: Scene) -> Float32s:
     """Where the top plane shows the place that a pixel's ray meets on the table, relative to it; coarse, (h, w, 2)."""
     camera, step = scene.camera, 16
     u = np.linspace(-0.5, camera.width - 0.5, max(2, camera.width // step) * 2 + 1)[1::2]

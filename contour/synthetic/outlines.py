@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour, Ring
 
 Point = tuple[float, float]
@@ -130,7 +130,7 @@ def with_holes(contour: Contour, *holes: Ring) -> Contour:
     return Contour(contour.exterior, (*contour.holes, *(_oriented(hole, -1.0) for hole in holes)))
 
 
-def _arc(centre: Point, radius: float, start: float, end: float) -> NDArray[np.float64]:
+def _arc(centre: Point, radius: float, start: float, end: float) -> Float64s:
     count = max(4, math.ceil(abs(end - start) * math.sqrt(radius / 0.016)))
     angle = np.linspace(start, end, count + 1)
     return np.column_stack((centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)))
@@ -142,7 +142,7 @@ def _oriented(ring: Ring, sign: float) -> Ring:
     return ring if area * sign > 0.0 else np.ascontiguousarray(ring[::-1])
 
 
-def signed_distance(contour: Contour, points: NDArray[np.float64]) -> NDArray[np.float64]:
+def signed_distance(contour: Contour, points: Float64s) -> Float64s:
     """Distance of points to the contour, positive inside (holes are outside), shape (N,)."""
     nearest = np.full(len(points), np.inf)
     crossings = np.zeros(len(points), dtype=np.int64)

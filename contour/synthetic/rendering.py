@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Float32s
 from contour.geometry.rings import Contour
 from contour.synthetic.camera import CameraModel
 from contour.synthetic.depth import Relief, relief
@@ -14,8 +14,6 @@ from contour.synthetic.scene import Scene
 from contour.synthetic.sensor import dust, expose, illumination, patches
 from contour.synthetic.surface import surface
 from contour.synthetic.table import smooth_noise, table_glare, table_light
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,7 @@ class Rendered:
     `truth_px` the same, densified in millimetres and projected. `pitch_px` is the root of the mean cell area × 1.1547.
     """
 
-    picture: NDArray[np.uint8]
+    picture: Bytes
     truth_px: Contour
     truth_mm: Contour
     camera: CameraModel
@@ -60,7 +58,7 @@ def _middle(scene: Scene) -> tuple[float, float]:
     return (x, y)
 
 
-def _tops(scene: Scene) -> tuple[Floats, Floats]:
+def _tops(scene: Scene) -> tuple[Float32s, Float32s]:
     """Cover and light of the top planes of all pieces, shape (H, W)."""
     shape = (scene.camera.height, scene.camera.width)
     cover, light = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
@@ -75,7 +73,7 @@ def _tops(scene: Scene) -> tuple[Floats, Floats]:
     return np.minimum(cover, 1.0), light
 
 
-def _texture(scene: Scene, light: Floats) -> None:
+def _texture(scene: Scene, light: Float32s) -> None:
     if scene.material.texture <= 0.0:
         return
     rng = np.random.default_rng([scene.seed, 51])
@@ -86,7 +84,7 @@ def _texture(scene: Scene, light: Floats) -> None:
     light *= np.clip(1.0 + np.float32(scene.material.texture) * noise + spots, 0.1, 3.0)
 
 
-def _planes(scene: Scene, block: Relief) -> list[Floats]:
+def _planes(scene: Scene, block: Relief) -> list[Float32s]:
     """Light that reaches the sensor, one plane for grey, three for colour."""
     falling = illumination(scene)
     shine = patches(scene)

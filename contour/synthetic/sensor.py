@@ -6,16 +6,14 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Bytes, Float32s
 from contour.synthetic.scene import Scene, Sensor
 from contour.synthetic.table import blurred, smooth_noise
 
-Floats = NDArray[np.float32]
 
-
-def illumination(scene: Scene) -> Floats:
+def illumination(scene: Scene) -> Float32s:
     """Light that falls on each pixel's place, lens fall-off included, shape (H, W), float32."""
     camera, light = scene.camera, scene.light
     x = ((np.arange(camera.width) - (camera.width - 1) / 2.0) / camera.width).astype(np.float32)
@@ -29,7 +27,7 @@ def illumination(scene: Scene) -> Floats:
     return np.asarray(np.float32(light.level) * np.maximum(1.0 + slope, 0.05) * (1.0 - corner), dtype=np.float32)
 
 
-def dust(scene: Scene, planes: list[Floats]) -> None:
+def dust(scene: Scene, planes: list[Float32s]) -> None:
     """Specks everywhere, bright and dark, added to each plane in place."""
     camera = scene.camera
     rng = np.random.default_rng([scene.seed, 41])
@@ -45,7 +43,7 @@ def dust(scene: Scene, planes: list[Floats]) -> None:
             plane[y0:y1, x0:x1] += spot.astype(np.float32)
 
 
-def patches(scene: Scene) -> Floats | None:
+def patches(scene: Scene) -> Float32s | None:
     """Broad bright reflections on the wall tops as a factor, shape (H, W), or None."""
     if scene.light.patches <= 0.0:
         return None
@@ -55,7 +53,7 @@ def patches(scene: Scene) -> Floats | None:
     return np.asarray(1.0 + np.float32(scene.light.patches) * np.maximum(waves, 0.0), dtype=np.float32)
 
 
-def expose(sensor: Sensor, planes: list[Floats], seed: int) -> NDArray[np.uint8]:
+def expose(sensor: Sensor, planes: list[Float32s], seed: int) -> Bytes:
     """The camera's picture of light planes (1 = full scale): (H, W) of one, (H, W, 3) BGR of three; uint8."""
     rng = np.random.default_rng([seed, 43])
     seen = []
@@ -71,7 +69,7 @@ def expose(sensor: Sensor, planes: list[Floats], seed: int) -> NDArray[np.uint8]
     return picture if sensor.jpeg_quality <= 0 else _compressed(picture, sensor.jpeg_quality)
 
 
-def _compressed(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+def _compressed(picture: Bytes, quality: int) -> Bytes:
     done, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not done:
         raise ParameterError(f"jpeg_quality {quality}: the picture could not be compressed; expected 1 to 100")

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float32s
 from contour.geometry.rings import Contour
-from contour.synthetic.cells import Lattice, draw_lattice, lattice_centres, lattice_coordinates, wall_field
+from contour.image.pixel_grid import pixels_of, samples_of
+from contour.synthetic.cells import Lattice, WallTones, draw_lattice, lattice_centres, lattice_coordinates, wall_field
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import signed_distance
 from contour.synthetic.scene import Scene
-
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
@@ -28,8 +27,8 @@ class Surface:
 
     left: int
     top: int
-    cover: Floats
-    light: Floats
+    cover: Float32s
+    light: Float32s
 
 
 def surface(scene: Scene, outline: Contour, seed: int) -> Surface | None:
@@ -51,13 +50,15 @@ def surface(scene: Scene, outline: Contour, seed: int) -> Surface | None:
     return Surface(left, top, _shrunk(inside, size), _shrunk(light, size))
 
 
-def _shrunk(raster: Floats, size: tuple[int, int]) -> Floats:
+def _shrunk(raster: Float32s, size: tuple[int, int]) -> Float32s:
     if raster.shape == (size[1], size[0]):
         return raster
     return np.asarray(cv2.resize(raster, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
-def _fill(scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], inside: Floats, light: Floats) -> None:
+def _fill(
+    scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], inside: Float32s, light: Float32s
+) -> None:
     """Turn `inside` (share inside the outline) into the share of material, and write its light beside it, by bands."""
     camera, ss, cells = scene.camera, scene.sensor.supersample, scene.cells
     scale = camera.mm_per_px(_middle(outline), scene.thickness_mm) / ss
@@ -65,12 +66,14 @@ def _fill(scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], in
     step = int(np.clip(cells.pitch_mm / scale / finest, 4, 32))
     height, width = inside.shape
     rows, columns = math.ceil(height / step), math.ceil(width / step)
-    u = (np.arange(-1, columns + 1) + 0.5) * step - 0.5
-    v = (np.arange(-1, rows + 1) + 0.5) * step - 0.5
+    u = pixels_of(np.arange(-1, columns + 1), step)
+    v = pixels_of(np.arange(-1, rows + 1), step)
     grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
-    work = camera.back_project((grid + 0.5) / ss - 0.5 + np.array(origin), scene.thickness_mm)
+    work = camera.back_project(samples_of(grid, ss) + np.array(origin), scene.thickness_mm)
     x, y = lattice_coordinates(cells, work[:, 0], work[:, 1], seed)
-    lattice = draw_lattice(cells, x, y, seed, scene.material.glints, scene.material.spread, scene.material.sheen)
+    material = scene.material
+    tones = WallTones(material.glints, material.spread, material.sheen)
+    lattice = draw_lattice(cells, x, y, seed, tones)
     _close_rim(scene, outline, lattice)
     nodes = np.stack((x, y), axis=-1).reshape(rows + 2, columns + 2, 2).astype(np.float32)
     band = max(1, 96 // step)
@@ -81,19 +84,13 @@ def _fill(scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], in
         stop = min(height, last * step)
         part = slice(first * step, stop)
         fine = fine[step : step + stop - first * step, step : step + width]
-        _paint(
-            scene,
-            lattice,
-            np.ascontiguousarray(fine[..., 0]),
-            np.ascontiguousarray(fine[..., 1]),
-            scale,
-            inside[part],
-            light[part],
-        )
+        _paint(scene, lattice, np.asarray(fine, np.float32), scale, inside[part], light[part])
 
 
-def _paint(scene: Scene, lattice: Lattice, x: Floats, y: Floats, scale: float, cover: Floats, light: Floats) -> None:
+def _paint(scene: Scene, lattice: Lattice, places: Float32s, scale: float, cover: Float32s, light: Float32s) -> None:
+    """`cover` by walls at lattice places (H, W, 2), and the light they return, in place."""
     material, cells = scene.material, scene.cells
+    x, y = np.ascontiguousarray(places[..., 0]), np.ascontiguousarray(places[..., 1])
     field = wall_field(cells, lattice, x, y)
     per_mm = np.float32(1.0 / scale)
     near = np.clip((field.half_width - field.distance) * per_mm + np.float32(0.5), 0.0, 1.0)

@@ -6,17 +6,16 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Float32s, Float64s
 from contour.geometry.rings import Contour
+from contour.image.pixel_grid import pixels_of
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import moved, signed_distance
 from contour.synthetic.scene import Scene
 
-Floats = NDArray[np.float32]
 
-
-def table_light(scene: Scene) -> Floats:
+def table_light(scene: Scene) -> Float32s:
     """Light the table returns under light 1, shape (H, W), float32."""
     camera, table = scene.camera, scene.table
     rng = np.random.default_rng([scene.seed, 31])
@@ -33,7 +32,7 @@ def table_light(scene: Scene) -> Floats:
     return np.maximum(picture, 0.0, out=picture)
 
 
-def table_glare(scene: Scene) -> Floats:
+def table_glare(scene: Scene) -> Float32s:
     """Light of a lamp that the table mirrors broadly; cells hide it. Shape (H, W), float32."""
     camera, light = scene.camera, scene.light
     x = (np.arange(camera.width) / camera.width - light.glare_at[0]).astype(np.float32)
@@ -42,7 +41,7 @@ def table_glare(scene: Scene) -> Floats:
     return np.asarray(spot * (1.0 - _under_block(scene)), dtype=np.float32)
 
 
-def _under_block(scene: Scene) -> Floats:
+def _under_block(scene: Scene) -> Float32s:
     """How far each pixel's place on the table lies under the block, 0…1: open cells at the cut let light in."""
     camera = scene.camera
     foot = camera.project_contour(scene.outline, 0.0)
@@ -51,7 +50,7 @@ def _under_block(scene: Scene) -> Floats:
     return blurred(inside, 0.45 * scene.cells.pitch_mm / camera.mm_per_px((x, y), 0.0))
 
 
-def smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], size: float) -> Floats:
+def smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], size: float) -> Float32s:
     """Noise of unit spread whose grains are about `size` pixels, shape (H, W), float32."""
     small = (max(3, math.ceil(shape[0] / size) + 2), max(3, math.ceil(shape[1] / size) + 2))
     grains = rng.standard_normal(small, dtype=np.float32)
@@ -61,34 +60,34 @@ def smooth_noise(rng: np.random.Generator, shape: tuple[int, ...], size: float) 
     return np.asarray(enlarged[: shape[0], : shape[1]] * np.float32(1.3), dtype=np.float32)
 
 
-def _machined(scene: Scene, picture: Floats) -> None:
+def _machined(scene: Scene, picture: Float32s) -> None:
     """Darken the holes and grooves of a vacuum table, at z = 0."""
     camera, table = scene.camera, scene.table
     step = 16
     columns, rows = math.ceil(camera.width / step), math.ceil(camera.height / step)
-    u = (np.arange(-1, columns + 1) + 0.5) * step - 0.5
-    v = (np.arange(-1, rows + 1) + 0.5) * step - 0.5
+    u = pixels_of(np.arange(-1, columns + 1), step)
+    v = pixels_of(np.arange(-1, rows + 1), step)
     work = camera.back_project(np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2), 0.0)
     nodes = work.reshape(rows + 2, columns + 2, 2).astype(np.float32)
     fine = cv2.resize(nodes, ((columns + 2) * step, (rows + 2) * step), interpolation=cv2.INTER_LINEAR)
     fine = fine[step : step + camera.height, step : step + camera.width]
     per_mm = 1.0 / camera.mm_per_px((float(work[:, 0].mean()), float(work[:, 1].mean())), 0.0)
     if table.perforation_pitch_mm > 0.0:
-        pitch = np.float32(table.perforation_pitch_mm)
-        off = fine / pitch
+        pitch_mm = np.float32(table.perforation_pitch_mm)
+        off = fine / pitch_mm
         off -= np.rint(off)
-        outside = np.sqrt(off[..., 0] ** 2 + off[..., 1] ** 2) * pitch - np.float32(table.perforation_mm / 2.0)
+        outside = np.sqrt(off[..., 0] ** 2 + off[..., 1] ** 2) * pitch_mm - np.float32(table.perforation_mm / 2.0)
         hole = np.clip(np.float32(0.5) - outside * np.float32(per_mm), 0.0, 1.0)
         picture += hole * (np.float32(table.perforation_level) - picture)
     if table.groove_pitch_mm > 0.0:
-        pitch = np.float32(table.groove_pitch_mm)
-        off = fine / pitch
-        near = np.abs(off - np.rint(off)).min(axis=-1) * pitch
+        pitch_mm = np.float32(table.groove_pitch_mm)
+        off = fine / pitch_mm
+        near = np.abs(off - np.rint(off)).min(axis=-1) * pitch_mm
         groove = np.clip(np.float32(0.5) - (near - np.float32(1.5)) * np.float32(per_mm), 0.0, 1.0)
         picture *= 1.0 - np.float32(0.55) * groove
 
 
-def _scratch(rng: np.random.Generator, picture: Floats, level: float) -> None:
+def _scratch(rng: np.random.Generator, picture: Float32s, level: float) -> None:
     height, width = picture.shape
     start = rng.uniform((0, 0), (width, height))
     angle, length, bend = rng.uniform(0, 2 * math.pi), rng.uniform(0.05, 0.4) * width, rng.uniform(-0.3, 0.3)
@@ -107,7 +106,7 @@ def cell_floor(scene: Scene) -> float:
     return 0.3 + 0.7 * math.exp(-scene.thickness_mm / (1.3 * scene.cells.pitch_mm))
 
 
-def _shade(scene: Scene, picture: Floats) -> None:
+def _shade(scene: Scene, picture: Float32s) -> None:
     """Shadow beside the block, and the darkness at the bottom of its cells."""
     camera = scene.camera
     under = _under_block(scene)
@@ -122,7 +121,7 @@ def _shade(scene: Scene, picture: Floats) -> None:
     picture *= 1.0 - np.float32(1.0 - cell_floor(scene)) * under
 
 
-def blurred(raster: Floats, sigma: float) -> Floats:
+def blurred(raster: Float32s, sigma: float) -> Float32s:
     """Gaussian blur; wide ones are done on a smaller raster."""
     if sigma < 0.2:
         return raster
@@ -135,7 +134,7 @@ def blurred(raster: Floats, sigma: float) -> Floats:
     return np.asarray(cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR), dtype=np.float32)
 
 
-def _chips(scene: Scene, picture: Floats) -> None:
+def _chips(scene: Scene, picture: Float32s) -> None:
     """Curled foil chips and crumbs on the table, at a distance from the block."""
     camera, clutter = scene.camera, scene.clutter
     rng = np.random.default_rng([scene.seed, 32])
@@ -153,13 +152,13 @@ def _chips(scene: Scene, picture: Floats) -> None:
         _stroke(picture, path, level, thickness)
 
 
-def _clearance(scene: Scene, path: NDArray[np.float64]) -> float:
+def _clearance(scene: Scene, path: Float64s) -> float:
     points = scene.camera.back_project(path, scene.thickness_mm)
     coarse = Contour(scene.outline.exterior[:: max(1, len(scene.outline.exterior) // 120)], ())
     return float(-signed_distance(coarse, points).max())
 
 
-def _stroke(picture: Floats, path: NDArray[np.float64], level: float, thickness: int) -> None:
+def _stroke(picture: Float32s, path: Float64s, level: float, thickness: int) -> None:
     height, width = picture.shape
     x0, y0 = np.floor(path.min(axis=0)).astype(int) - 3
     x1, y1 = np.ceil(path.max(axis=0)).astype(int) + 4

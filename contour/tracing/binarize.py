@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import ParameterError
+from contour.geometry.arrays import Bytes, Float32s
 from contour.image import opencv as _cv
-from contour.tracing.paper_cells import Cells, measure_cells
-
-Picture = NDArray[np.uint8]
-Polarity = Literal["bright", "dark"]
+from contour.tracing.paper_cells import EnclosedCells, measure_cells
+from contour.tracing.trace import Polarity
 
 _CONTRAST_SHARE = 0.45
 """Where a wall's profile is cut, as a share of the contrast of walls around; half, less a little for dim walls."""
@@ -51,17 +49,17 @@ white noise after the 3 x 3 blur these percentiles are 0.88 and 0.62 of the stan
 
 
 @dataclass(frozen=True)
-class WallMask:
+class BinarizedPicture:
     """The wall mask, shape (H, W), 0 or 255, with what it was made for and the cells seen in it (None: too few)."""
 
-    mask: Picture
+    mask: Bytes
     polarity: Polarity
-    cells: Cells | None
+    cells: EnclosedCells | None
 
 
 def binarize(
-    picture: Picture, mode: Literal["flat", "otsu"] | int = "flat", polarity: Literal["auto", "bright", "dark"] = "auto"
-) -> WallMask:
+    picture: Bytes, mode: Literal["flat", "otsu"] | int = "flat", polarity: Literal["auto", "bright", "dark"] = "auto"
+) -> BinarizedPicture:
     """The wall mask of a grey (H, W) or BGR (H, W, 3) picture, uint8. Raises ParameterError.
 
     A fixed `mode` is a grey level 0 … 255: bright walls are above it, dark ones at or below. With polarity `auto`
@@ -80,11 +78,11 @@ def binarize(
     return max(masks, key=_plausibility)
 
 
-def _measured(mask: Picture, polarity: Polarity) -> WallMask:
-    return WallMask(mask, polarity, measure_cells(mask))
+def _measured(mask: Bytes, polarity: Polarity) -> BinarizedPicture:
+    return BinarizedPicture(mask, polarity, measure_cells(mask))
 
 
-def _plausibility(found: WallMask) -> tuple[float, float]:
+def _plausibility(found: BinarizedPicture) -> tuple[float, float]:
     """How many regular cells, and how much they enclose; where neither polarity has any, how little is at the border.
 
     By area alone the squares between a table's grooves would outweigh a small block's cells, by number alone specks of
@@ -94,7 +92,7 @@ def _plausibility(found: WallMask) -> tuple[float, float]:
     return (found.cells.count**2 * found.cells.area_px2 if found.cells else 0.0, -float(np.mean(border)))
 
 
-def _flat_masks(grey: Picture, polarities: tuple[Polarity, ...]) -> list[WallMask]:
+def _flat_masks(grey: Bytes, polarities: tuple[Polarity, ...]) -> list[BinarizedPicture]:
     """The better polarity's mask, flattened twice: with a window from the picture's size, then from the cells seen."""
     first, shrink = _first_look(grey, polarities)
     if first.cells is None:
@@ -106,10 +104,10 @@ def _flat_masks(grey: Picture, polarities: tuple[Polarity, ...]) -> list[WallMas
     measured = _measured_near(mask, cells)
     if measured is None and shrink == 1:
         return [first]
-    return [WallMask(mask, first.polarity, measured or cells)]
+    return [BinarizedPicture(mask, first.polarity, measured or cells)]
 
 
-def _first_look(grey: Picture, polarities: tuple[Polarity, ...]) -> tuple[WallMask, int]:
+def _first_look(grey: Bytes, polarities: tuple[Polarity, ...]) -> tuple[BinarizedPicture, int]:
     """The better polarity's mask with the first window, and how much smaller than the picture it is.
 
     Large pictures are looked at small; only where that shows no cells (they may be too fine) as they are.
@@ -127,7 +125,7 @@ def _first_look(grey: Picture, polarities: tuple[Polarity, ...]) -> tuple[WallMa
     return found, factor
 
 
-def _measured_near(mask: Picture, cells: Cells) -> Cells | None:
+def _measured_near(mask: Bytes, cells: EnclosedCells) -> EnclosedCells | None:
     """The cells of the mask; in a large one those around the middle of where cells were seen: they are many enough."""
     if mask.size <= _EASY_PX:
         return measure_cells(mask)
@@ -137,13 +135,13 @@ def _measured_near(mask: Picture, cells: Cells) -> Cells | None:
     return measure_cells(np.ascontiguousarray(mask[y : y + 2 * half, x : x + 2 * half]))
 
 
-def _flattened(smooth: Picture, noise: float, window_px: int, polarity: Polarity) -> Picture:
+def _flattened(smooth: Bytes, noise: float, window_px: int, polarity: Polarity) -> Bytes:
     if polarity == "dark":
         smooth = _cv.inverted(smooth)
     # Means over a window are smooth themselves: at about 8 px a window they are exact enough, and cost nothing.
     shrink = max(window_px // 8, 1)
     around = window_px // shrink | 1
-    mean: Picture = _cv.box_mean(_cv.shrunk(smooth, shrink), around)
+    mean: Bytes = _cv.box_mean(_cv.shrunk(smooth, shrink), around)
     rise = _cv.subtracted(smooth, _cv.grown(mean, smooth.shape))
     if smooth.size > _EASY_PX:
         # The contrast of walls is a mean over many: every second pixel tells as much.
@@ -154,7 +152,7 @@ def _flattened(smooth: Picture, noise: float, window_px: int, polarity: Polarity
     return _cv.exceeding(smooth, _cv.grown(bound, smooth.shape))
 
 
-def _wall_contrast(rise: Picture, floor: float, shape: tuple[int, ...], around: int) -> NDArray[np.float32]:
+def _wall_contrast(rise: Bytes, floor: float, shape: tuple[int, ...], around: int) -> Float32s:
     """How far walls rise above the mean around them, shrunk to a shape: the rises' mean, weighted by themselves.
 
     Rises up to the floor are noise and count nothing; those above the 80th percentile count as that, or a glint would
@@ -174,14 +172,14 @@ def _wall_contrast(rise: Picture, floor: float, shape: tuple[int, ...], around: 
     return np.asarray(64 * sums[1] / np.maximum(sums[0], np.float32(1)), np.float32)
 
 
-def _noise(smooth: Picture) -> float:
+def _noise(smooth: Bytes) -> float:
     """Standard deviation of the noise and the table's texture."""
     wide = _WIDE_FACTOR * _quiet_spread(smooth, _WIDE_TILE_PX, _WIDE_PERCENTILE)
     narrow = _NARROW_FACTOR * _quiet_spread(smooth, _NARROW_TILE_PX, _NARROW_PERCENTILE)
     return min(wide, narrow)
 
 
-def _quiet_spread(smooth: Picture, tile_px: int, percentile: int) -> float:
+def _quiet_spread(smooth: Bytes, tile_px: int, percentile: int) -> float:
     """A low percentile of the standard deviations within square tiles; 0 for a picture smaller than one."""
     height, width = (side // tile_px * tile_px for side in smooth.shape)
     if not (height and width):

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
+from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.rings import Contour, Ring
 from contour.image.pixel_sampling import sample_at
 from contour.tracing.table_surface import OUTLIER, table_surface
-
-Gray = NDArray[np.uint8]
-Points = NDArray[np.float64]
 
 _GRID_PX = 4
 # Chips and dust are small against a block; a block smaller than this share of the picture is a chip to this method.
@@ -32,7 +29,7 @@ _CELL_AREA = 1.5
 _SIMPLE_PX = 0.25
 
 
-def material_edge(picture: NDArray[np.uint8], pitch: float, walls: Gray) -> Contour:
+def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> Contour:
     """Boundary of the largest region that differs from the table, with holes wider than 2.2 pitches, in pixels.
 
     `walls` (H, W), 255 where the picture shows cell walls, adds those that differ less than most. Exterior with
@@ -42,7 +39,7 @@ def material_edge(picture: NDArray[np.uint8], pitch: float, walls: Gray) -> Cont
     difference, noise = _difference(picture)
     level = _level(difference, noise)
     faint = (walls > 0) & (difference > OUTLIER * noise)
-    region = _region((difference > level) | faint, pitch)
+    region = _region((difference > level) | faint, pitch_px)
     chains, hierarchy = cv2.findContours(region, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     rings = [
         (_sub_pixel(difference, chain[:, 0, :].astype(np.float64)), bool(node[3] >= 0))
@@ -54,7 +51,7 @@ def material_edge(picture: NDArray[np.uint8], pitch: float, walls: Gray) -> Cont
     return Contour(_turned(exterior, -1.0), holes)
 
 
-def _difference(picture: NDArray[np.uint8]) -> tuple[Gray, float]:
+def _difference(picture: Bytes) -> tuple[Bytes, float]:
     """How far each pixel is from the table: largest difference over the channels, shape (H, W), uint8; the table's
     spread.
     """
@@ -73,7 +70,7 @@ def _difference(picture: NDArray[np.uint8]) -> tuple[Gray, float]:
     return np.asarray(cv2.GaussianBlur(largest, (3, 3), 0), np.uint8), spread
 
 
-def _level(difference: Gray, spread: float) -> float:
+def _level(difference: Bytes, spread: float) -> float:
     """The level that parts material from table best (Otsu). Raises NoBlockFound where nothing stands out."""
     split, _ = cv2.threshold(difference[::2, ::2].copy(), 0, 255, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
     if split < OUTLIER * spread:
@@ -84,9 +81,9 @@ def _level(difference: Gray, spread: float) -> float:
     return float(split)
 
 
-def _region(apart: NDArray[np.bool_], pitch: float) -> Gray:
+def _region(apart: Bools, pitch_px: float) -> Bytes:
     """The largest piece with its cells filled; inner openings in which a disc of 1.1 pitches' radius fits stay open."""
-    material = _closed(apart.astype(np.uint8), _GAP_PITCHES * pitch)
+    material = _closed(apart.astype(np.uint8), _GAP_PITCHES * pitch_px)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(material, connectivity=8)
     area = (stats[:, cv2.CC_STAT_WIDTH] * stats[:, cv2.CC_STAT_HEIGHT]).astype(np.float64)
     area[0] = 0
@@ -96,34 +93,34 @@ def _region(apart: NDArray[np.bool_], pitch: float) -> Gray:
         )
     piece = (labels == int(np.argmax(area))).astype(np.uint8)
     # Of the piece alone: specks of a table lie as close as walls, and enclose as much.
-    piece |= _leaking_cells(piece, pitch)
+    piece |= _leaking_cells(piece, pitch_px)
     padded = cv2.copyMakeBorder(piece, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     _, inner, _, _ = cv2.connectedComponentsWithStats(1 - padded, connectivity=4)
     room = cv2.distanceTransform(1 - padded, cv2.DIST_L2, 5)
     open_ = np.zeros(int(inner.max()) + 1, np.bool_)
-    open_[inner[room > 1.1 * pitch]] = True
+    open_[inner[room > 1.1 * pitch_px]] = True
     open_[inner[0, 0]] = True
     open_[0] = False
     return np.asarray(1 - open_.astype(np.uint8)[inner][1:-1, 1:-1], np.uint8)
 
 
-def _closed(material: Gray, gap: float) -> Gray:
+def _closed(material: Bytes, gap: float) -> Bytes:
     size = 2 * int(gap / 2) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     wide = cv2.copyMakeBorder(material, size, size, size, size, cv2.BORDER_CONSTANT, value=0)
     return np.asarray(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, disc)[size:-size, size:-size], np.uint8)
 
 
-def _leaking_cells(material: Gray, pitch: float) -> Gray:
+def _leaking_cells(material: Bytes, pitch_px: float) -> Bytes:
     """Cells that only a broken or faint wall opens to the table, up to the line across the gap.
 
     Where walls are grown by half a gap, such cells lie apart from the table; what is nearer to a cell's rest than to
     the table's is the cell.
     """
     away = cv2.distanceTransform(1 - material, cv2.DIST_L2, 5)
-    seeds = (away > 0.5 * _WALL_PITCHES * pitch).astype(np.uint8)
+    seeds = (away > 0.5 * _WALL_PITCHES * pitch_px).astype(np.uint8)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=4)
-    cell = stats[:, cv2.CC_STAT_AREA] < _CELL_AREA * pitch * pitch
+    cell = stats[:, cv2.CC_STAT_AREA] < _CELL_AREA * pitch_px * pitch_px
     cell[0] = False
     if not cell.any():
         return np.zeros_like(material)
@@ -133,7 +130,7 @@ def _leaking_cells(material: Gray, pitch: float) -> Gray:
     return np.asarray(of_cell[nearest] & (material == 0), np.uint8)
 
 
-def _sub_pixel(difference: Gray, chain: Points) -> Ring:
+def _sub_pixel(difference: Bytes, chain: Float64s) -> Ring:
     """The chain moved to half of the material's own difference behind it, simplified to a quarter of a pixel."""
     smooth = _cyclic_mean(chain, 2)
     tangent = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
@@ -156,7 +153,7 @@ def _sub_pixel(difference: Gray, chain: Points) -> Ring:
     return np.asarray(simple, np.float64)
 
 
-def _cyclic_mean(points: Points, half: int) -> Points:
+def _cyclic_mean(points: Float64s, half: int) -> Float64s:
     total = sum(np.roll(points, shift, axis=0) for shift in range(-half, half + 1))
     return np.asarray(total / (2 * half + 1), np.float64)
 

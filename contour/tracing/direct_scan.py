@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, ParameterError
-from contour.tracing.paper_cells import Cells
+from contour.geometry.arrays import Bytes, Float64s, Indices
+from contour.tracing.paper_cells import EnclosedCells
 
 GAP_PITCHES = 3.0
 """A cell is 1.15 pitches from corner to corner, two that lost the wall between them 2.15. Over 22 rendered blocks
@@ -23,17 +23,17 @@ WIDTH_PITCHES = 2.0
 """Specks, and foil chips of a cell's size, are narrower; a block's corner loses no more than a cell."""
 
 
-def default_gap_px(cells: Cells) -> int:
+def default_gap_px(cells: EnclosedCells) -> int:
     """`max_gap_px` for a cell pitch, px."""
     return math.ceil(GAP_PITCHES * cells.pitch_px)
 
 
-def default_width_px(cells: Cells) -> int:
+def default_width_px(cells: EnclosedCells) -> int:
     """`min_width_px` for a cell pitch, px."""
     return math.ceil(WIDTH_PITCHES * cells.pitch_px)
 
 
-def scan_rows(mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int) -> NDArray[np.float64]:
+def scan_rows(mask: Bytes, max_gap_px: int, min_width_px: int) -> Float64s:
     """Left points from top to bottom, then right points from bottom to top: (x, y), shape (2 · rows with a pair, 2).
 
     `mask` is the binarised picture, shape (H, W), 0 = black. Raises ParameterError.
@@ -43,9 +43,7 @@ def scan_rows(mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int) -> ND
     return np.column_stack([x, y]).astype(np.float64)
 
 
-def scan_pairs(
-    mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def scan_pairs(mask: Bytes, max_gap_px: int, min_width_px: int) -> tuple[Indices, Indices]:
     """The pair of each row that has one, and the pairs dropped as noise on the way to it: (y, left, right), (N, 3).
 
     Behind its pair a row is not looked at. Raises ParameterError.
@@ -76,7 +74,7 @@ def scan_pairs(
     return pairs[kept], pairs[noise]
 
 
-def direct_scan_ring(mask: NDArray[np.uint8], max_gap_px: int, min_width_px: int) -> NDArray[np.float64]:
+def direct_scan_ring(mask: Bytes, max_gap_px: int, min_width_px: int) -> Float64s:
     """The scan's points as a ring: those that repeat their neighbour left out. Raises NoBlockFound, ParameterError."""
     points = scan_rows(mask, max_gap_px, min_width_px)
     if len(points):

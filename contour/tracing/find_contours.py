@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
+from contour.geometry.arrays import Bytes, Float64s
 from contour.image.opencv import enclosed_area, outer_contours
 
 
-def largest_contour(mask: NDArray[np.uint8]) -> NDArray[np.float64]:
+def largest_contour(mask: Bytes) -> Float64s:
     """The external contour that encloses most, through pixel centres, (x, y), shape (N, 2). Raises NoBlockFound."""
     ring = max(outer_contours(mask), key=enclosed_area, default=None)
     if ring is None or enclosed_area(ring) == 0:

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Int32s
 from contour.image.opencv import region_boxes_and_areas
 
 HEXAGON = 2 / math.sqrt(3)
@@ -30,7 +30,7 @@ _LONGEST = 3.0
 
 
 @dataclass(frozen=True)
-class Cells:
+class EnclosedCells:
     """A honeycomb's measures. `pitch_px` is that of the regular honeycomb with the same area a cell.
 
     `wall_px` is the mean wall width, `wall_share` the share of a cell's area that is wall, `count` the whole cells
@@ -44,12 +44,12 @@ class Cells:
     area_px2: float
     box: tuple[int, int, int, int]
 
-    def enlarged(self, factor: int) -> Cells:
+    def enlarged(self, factor: int) -> EnclosedCells:
         """The measures in a picture `factor` times as large."""
         if factor == 1:
             return self
         left, top, right, bottom = (factor * side for side in self.box)
-        return Cells(
+        return EnclosedCells(
             self.pitch_px * factor,
             self.wall_px * factor,
             self.wall_share,
@@ -64,7 +64,7 @@ class Cells:
         return self.pitch_px**2 / HEXAGON
 
 
-def measure_cells(mask: NDArray[np.uint8]) -> Cells | None:
+def measure_cells(mask: Bytes) -> EnclosedCells | None:
     """The measures of the cells in a wall mask, shape (H, W), walls 255; None if it has too few regular cells."""
     boxes, areas = region_boxes_and_areas(mask)
     left, top, width, height = boxes.T
@@ -81,18 +81,18 @@ def measure_cells(mask: NDArray[np.uint8]) -> Cells | None:
     x1, y1 = int((left + width)[regular].max()), int((top + height)[regular].max())
     wall = _wall_width(mask[y0:y1, x0:x1])
     inner = float(np.median(areas[regular]))
-    pitch = math.sqrt(HEXAGON * inner) + wall
-    return Cells(
-        pitch_px=pitch,
+    pitch_px = math.sqrt(HEXAGON * inner) + wall
+    return EnclosedCells(
+        pitch_px=pitch_px,
         wall_px=wall,
-        wall_share=1 - HEXAGON * inner / pitch**2,
+        wall_share=1 - HEXAGON * inner / pitch_px**2,
         count=int(np.count_nonzero(regular)),
         area_px2=float(areas[regular].sum()),
         box=(x0, y0, x1, y1),
     )
 
 
-def _typical_area(areas: NDArray[np.int32]) -> float:
+def _typical_area(areas: Int32s) -> float:
     """The area that most areas are alike to, each counting by its root.
 
     Counted alike, a thousand noise spots would outvote the cells; by area, a few cells that have run together would.
@@ -104,7 +104,7 @@ def _typical_area(areas: NDArray[np.int32]) -> float:
     return float(ordered[np.argmax(votes[high] - votes[low])])
 
 
-def _wall_width(mask: NDArray[np.uint8]) -> float:
+def _wall_width(mask: Bytes) -> float:
     """Mean width of the white bands: area over half the boundary's length (Crofton: from changes along both axes)."""
     changes = np.count_nonzero(mask[1:] != mask[:-1]) + np.count_nonzero(mask[:, 1:] != mask[:, :-1])
     return float(2 * np.count_nonzero(mask) / (math.pi / 4 * max(int(changes), 1)))

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, ParameterError
+from contour.geometry.arrays import Bools, Bytes, Indices
 from contour.geometry.rings import Contour, largest_loop, signed_area
 from contour.image.opencv import above, contours_in_two_levels, either, enclosed_area, integral
-from contour.tracing.paper_cells import Cells
+from contour.tracing.paper_cells import EnclosedCells
 
 CORE_PITCHES = 0.4
 """Over 22 rendered blocks: up to 0.3 cells stay open or the contour comes in pieces, larger cores stick out more."""
@@ -40,7 +40,7 @@ def default_step_px(core_px: int) -> int:
     return max(round(STEP_CORES * core_px), 1)
 
 
-def default_threshold(cells: Cells) -> float:
+def default_threshold(cells: EnclosedCells) -> float:
     """Half of what a window deep inside the block sees, 0 to 255."""
     return 255 * cells.wall_share * WALL_SHARES
 
@@ -56,7 +56,7 @@ def coarse_step(core_px: int, step_px: int) -> str | None:
     )
 
 
-def fill_windows(mask: NDArray[np.uint8], core_px: int, step_px: int, threshold: float) -> NDArray[np.uint8]:
+def fill_windows(mask: Bytes, core_px: int, step_px: int, threshold: float) -> Bytes:
     """The filled picture, 0 or 255, shape of `mask` (H, W), whose white is any value but 0. Raises ParameterError."""
     check_parameters(core_px, step_px, threshold)
     height, width = mask.shape
@@ -75,7 +75,7 @@ def fill_windows(mask: NDArray[np.uint8], core_px: int, step_px: int, threshold:
     return either(filled, _painted(chosen, mask.shape, size, step_px)) if chosen.any() else filled
 
 
-def _painted(chosen: NDArray[np.bool_], shape: tuple[int, ...], size: int, step: int) -> NDArray[np.uint8]:
+def _painted(chosen: Bools, shape: tuple[int, ...], size: int, step: int) -> Bytes:
     """255 where any chosen window lies: window (r, c) covers `size` pixels from (r · step, c · step).
 
     The windows over a pixel are those from first to last along each axis, and these change twice in `step` pixels
@@ -91,7 +91,7 @@ def _painted(chosen: NDArray[np.bool_], shape: tuple[int, ...], size: int, step:
     return np.repeat(stretched, row_repeats, axis=0)
 
 
-def _covering(count: int, length: int, size: int, step: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _covering(count: int, length: int, size: int, step: int) -> tuple[Indices, Indices]:
     """Along one axis: [first, end) of the windows over each stretch of pixels, shape (2, S), and its length, px."""
     starts = np.arange(count) * step
     cuts = np.unique(np.concatenate([[0], starts, starts + size]))
@@ -110,7 +110,7 @@ def check_parameters(core_px: int, step_px: int, threshold: float) -> None:
         raise ParameterError(f"threshold is {threshold}: expected 0 to 255, the scale of the binarised picture.")
 
 
-def sliding_matrix_contour(filled: NDArray[np.uint8], smallest_hole_px2: float) -> Contour:
+def sliding_matrix_contour(filled: Bytes, smallest_hole_px2: float) -> Contour:
     """The largest outer contour of the filled picture, with its inner contours above a size: openings, not gaps.
 
     Filaments of one pixel, along which a contour would run out and back, are left out. Raises NoBlockFound where

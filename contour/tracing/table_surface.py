@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Gray = NDArray[np.uint8]
+from contour.geometry.arrays import Bytes, Float64s
 
 OUTLIER = 4.0
 """Spreads of the table's light beyond which something is not the table."""
@@ -14,7 +13,7 @@ _BORDER_SHARE = 0.015
 _ROUNDS = 6
 
 
-def table_surface(small: NDArray[np.float64], texture: Gray) -> tuple[NDArray[np.float64], float]:
+def table_surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
     """The table's light under the block too, shape of `small` (h, w, channels), and its spread: a surface of second
     order.
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, ParameterError
+from contour.geometry.arrays import Bytes
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.outline.evidence_check import check_against_evidence
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import material_edge
-from contour.tracing.tracing import OnStage, Rectifier, Trace, TraceSettings
+from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import pieces_beside
@@ -19,15 +20,13 @@ from contour.walls.see_block import see_block
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
 from contour.walls.wall_mask import wall_mask
 
-__all__ = ["see_block", "wall_tips"]
-
 _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
 
 
 def wall_tips(
-    picture: NDArray[np.uint8],
+    picture: Bytes,
     settings: TraceSettings,
     *,
     rectifier: Rectifier | None = None,
@@ -43,11 +42,12 @@ def wall_tips(
         raise ParameterError(
             f"binarize is {settings.binarize!r}, but wall-tips finds its own threshold; use flat, or another method"
         )
+    light = wall_light(picture)
     if settings.edge == "cells":
-        return _closed_cells(picture, settings, on_stage)
-    seen = see_block(picture, settings.polarity, lambda: on_stage("mask"))
+        return _closed_cells(picture, light, settings, on_stage)
+    seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"))
     if seen.leaves_picture:
-        return _cut_off(picture, seen, on_stage)
+        return _cut_off(light, seen, on_stage)
     rings = [_fitted(ring, seen, rectifier) for ring in seen.rings]
     for evidence, ring in zip(seen.rings, rings, strict=True):
         check_against_evidence(evidence, ring.ring, seen.pitch_px, rectifier)
@@ -68,24 +68,25 @@ def wall_tips(
         dark=seen.polarity == "dark",
     )
     on_stage("trace")
-    return _told(seen, contour, uncertainty_px=sure_px)
+    return _trace(seen, contour, light, uncertainty_px=sure_px)
 
 
-def _cut_off(picture: NDArray[np.uint8], seen: BlockEvidence, on_stage: OnStage) -> Trace:
+def _cut_off(light: Bytes, seen: BlockEvidence, on_stage: OnStage) -> Trace:
     """The coarse outline of a block that leaves the picture, along its border there: for a refusal to show."""
-    last = np.array([picture.shape[1] - 1.0, picture.shape[0] - 1.0])
+    last = np.array([light.shape[1] - 1.0, light.shape[0] - 1.0])
     rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
     on_stage("trace")
     contour = Contour(rings[0], tuple(rings[1:]))
-    return _told(seen, contour)
+    return _trace(seen, contour, light)
 
 
-def _told(seen: BlockEvidence, contour: Contour, *, uncertainty_px: float | None = None) -> Trace:
+def _trace(seen: BlockEvidence, contour: Contour, light: Bytes, *, uncertainty_px: float | None = None) -> Trace:
     return Trace(
         "wall-tips",
         "dark" if seen.polarity == "dark" else "bright",
         seen.pitch_px,
         contour,
+        light,
         uncertainty_px=uncertainty_px,
         others=seen.others,
         comb=seen.comb,
@@ -93,16 +94,15 @@ def _told(seen: BlockEvidence, contour: Contour, *, uncertainty_px: float | None
     )
 
 
-def _closed_cells(picture: NDArray[np.uint8], settings: TraceSettings, on_stage: OnStage) -> Trace:
+def _closed_cells(picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage) -> Trace:
     """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
-    light = wall_light(picture)
     cells = probe(light, settings.polarity)
-    walls = wall_mask(light, cells.pitch, bright=cells.bright, contrast=cells.contrast).mask
+    walls = wall_mask(light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
     on_stage("mask")
-    contour = material_edge(picture, cells.pitch, walls)
-    others = pieces_beside(walls, contour.exterior, cells.pitch)
+    contour = material_edge(picture, cells.pitch_px, walls)
+    others = pieces_beside(walls, contour.exterior, cells.pitch_px)
     on_stage("trace")
-    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch, contour, others=others)
+    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch_px, contour, light, others=others)
 
 
 def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:

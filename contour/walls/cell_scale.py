@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
-from contour.walls.comb_likeness import Comb, surely_comb
-from contour.walls.lattice_order import lattice_order, solidity
+from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s
+from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
 from contour.walls.wall_mask import wall_mask
-
-Gray = NDArray[np.uint8]
 
 _TILE_PX = 512
 _TILES = 4
@@ -32,14 +29,14 @@ _WIDE_WALL = 0.2
 
 
 @dataclass(frozen=True)
-class Cells:
+class CellScale:
     """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
     the part of the tile they fill, the wall contrast in grey levels, the share of the
     walls that hang together, the grey levels of walls and of cells' floors, the share of the cells with neighbours all
     around, and the share of its convex hull that a cell fills."""
 
-    pitch: float
-    wall: float
+    pitch_px: float
+    wall_px: float
     bright: bool
     count: int
     regularity: float
@@ -55,7 +52,7 @@ class Cells:
     def score(self) -> float:
         """Larger for a better comb: many cells, of one size, over most of the tile, with walls no wider than they."""
         # The light gaps of a comb of dark cells look like cells too, but leave less room between them.
-        thin = min(1.0, (_WIDEST_WALL - self.wall / self.pitch) / _WIDE_WALL)
+        thin = min(1.0, (_WIDEST_WALL - self.wall_px / self.pitch_px) / _WIDE_WALL)
         return self.regularity * self.filled * self.connected * thin * min(1.0, self.count / 12)
 
     @property
@@ -63,23 +60,30 @@ class Cells:
         """What tells a comb from other things that have patches side by side."""
         regular = self.regularity * self.filled
         return Comb(
-            self.pitch, self.wall, self.bright, self.count, self.score, regular, order=self.order, solid=self.solid
+            self.pitch_px,
+            self.wall_px,
+            self.bright,
+            self.count,
+            self.score,
+            regular,
+            order=self.order,
+            solid=self.solid,
         )
 
 
-def probe(light: Gray, polarity: str) -> Cells:
+def probe(light: Bytes, polarity: str) -> CellScale:
     """Cells in the most textured parts of the picture; polarity "auto", "bright" or "dark". Raises NoBlockFound.
 
     The busiest tile at full size is asked first, then the whole picture at a quarter of its size, where large cells are
     many, then further tiles. The first good answer is taken, else the best.
     """
     senses = [bright for bright in (True, False) if polarity != ("dark" if bright else "bright")]
-    best: Cells | None = None
+    best: CellScale | None = None
     for part, shrink in _parts(light):
         found = _part_cells(part, senses, _GUESSES if shrink == 1 else _GUESSES[:2])
         if found is None:
             continue
-        found = replace(found, pitch=found.pitch * shrink, wall=found.wall * shrink)
+        found = replace(found, pitch_px=found.pitch_px * shrink, wall_px=found.wall_px * shrink)
         if best is None or found.score > best.score:
             best = found
         if best.score > _GOOD_SCORE:
@@ -94,7 +98,7 @@ def probe(light: Gray, polarity: str) -> Cells:
     return best
 
 
-def _parts(light: Gray) -> Iterator[tuple[Gray, int]]:
+def _parts(light: Bytes) -> Iterator[tuple[Bytes, int]]:
     tiles = _busiest_tiles(light)
     yield from ((tile, 1) for tile in tiles[:1])
     if min(light.shape) >= 4 * 64:
@@ -103,7 +107,7 @@ def _parts(light: Gray) -> Iterator[tuple[Gray, int]]:
     yield from ((tile, 1) for tile in tiles[1:])
 
 
-def _busiest_tiles(light: Gray) -> list[Gray]:
+def _busiest_tiles(light: Bytes) -> list[Bytes]:
     """Tiles of up to 512 px with the most local contrast, busiest first, apart from each other."""
     block = 32
     sample = light[::4, ::4].astype(np.float32)
@@ -126,11 +130,11 @@ def _busiest_tiles(light: Gray) -> list[Gray]:
     return tiles
 
 
-def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> Cells | None:
+def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> CellScale | None:
     """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own
     pitch.
     """
-    best: Cells | None = None
+    best: CellScale | None = None
     for guess in guesses:
         for bright in senses:
             cells = cells_of(part, guess, bright=bright)
@@ -141,15 +145,15 @@ def _part_cells(part: Gray, senses: list[bool], guesses: tuple[float, ...]) -> C
             break
     if best is None:
         return None
-    again = cells_of(part, best.pitch, bright=best.bright)
+    again = cells_of(part, best.pitch_px, bright=best.bright)
     # Faint fine cells are seen better through a wide window.
-    same = again is None or abs(again.pitch - best.pitch) < _SAME_PITCH * best.pitch
+    same = again is None or abs(again.pitch_px - best.pitch_px) < _SAME_PITCH * best.pitch_px
     return best if again is None or (same and again.score < best.score) else again
 
 
-def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
-    """Cells enclosed by the wall mask of `light` made for `pitch`; None where fewer than six are."""
-    seen = wall_mask(light, pitch, bright=bright)
+def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None:
+    """Cells enclosed by the wall mask of `light` made for `pitch_px`; None where fewer than six are."""
+    seen = wall_mask(light, pitch_px, bright=bright)
     mask = seen.mask
     floor = cv2.bitwise_not(mask)
     _, labels, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
@@ -168,11 +172,7 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     if len(usual) < _LEAST_CELLS:
         return None
     inner = float(np.sqrt(2 / np.sqrt(3) * np.median(usual)))
-    # A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
-    side = max(3, round(0.7 * inner))
-    sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
-    walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
-    walls = walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
+    walls = _without_sheets(mask, max(3, round(0.7 * inner)))
     wall = wall_width(walls)
     size = inner + wall
     if wall > _WIDEST_WALL * size:
@@ -183,7 +183,7 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     filled = len(usual) * size * size * np.sqrt(3) / 2 / float(np.prod(spread))
     _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
     connected = float(pieces[1:, cv2.CC_STAT_AREA].max() / max(1, pieces[1:, cv2.CC_STAT_AREA].sum()))
-    return Cells(
+    return CellScale(
         size,
         wall,
         bright,
@@ -200,9 +200,17 @@ def cells_of(light: Gray, pitch: float, *, bright: bool) -> Cells | None:
     )
 
 
-def _enclosed(
-    stats: NDArray[np.int32], centroids: NDArray[np.float64], shape: tuple[int, ...]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.intp]]:
+def _without_sheets(mask: Bytes, side: int) -> Bytes:
+    """The mask without what squares of `side` pixels fit into, unless that is most of it.
+
+    A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
+    """
+    sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
+    return walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
+
+
+def _enclosed(stats: Int32s, centroids: Float64s, shape: tuple[int, ...]) -> tuple[Float64s, Float64s, Indices]:
     """Areas (N,), centroids (N, 2) and labels (N,) of the pieces that lie within the part and are no slivers."""
     left, top, wide, high, area = (stats[:, column] for column in range(5))
     within = (left > 0) & (top > 0) & (left + wide < shape[1]) & (top + high < shape[0])
@@ -211,7 +219,7 @@ def _enclosed(
     return area[chosen].astype(np.float64), centroids[chosen], chosen + 1
 
 
-def wall_width(mask: Gray) -> float:
+def wall_width(mask: Bytes) -> float:
     """Mean wall width of a mask, pixels: area over half its boundary length (Cauchy-Crofton: π/4 of its crossings)."""
     crossings = np.count_nonzero(mask[1:] != mask[:-1]) + np.count_nonzero(mask[:, 1:] != mask[:, :-1])
     return float(2 * np.count_nonzero(mask) / max(1.0, np.pi / 4 * crossings))

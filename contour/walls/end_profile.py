@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Float64s
 from contour.image.pixel_sampling import sample_at
-
-Gray = NDArray[np.uint8]
-Points = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 _STEP = 0.5
 _TURNS = 4
@@ -29,17 +25,17 @@ class FittedEnds:
     level above background (N,), standard deviation across the outline (N,), residual in grey levels (N,).
     """
 
-    point: Points
-    axis: Points
-    blur: Vector
-    height: Vector
-    sigma: Vector
-    residual: Vector
+    point: Float64s
+    axis: Float64s
+    blur: Float64s
+    height: Float64s
+    sigma: Float64s
+    residual: Float64s
 
 
 def centred_axes(
-    light: Gray, tip: Points, axis: Points, *, wall: float, straight: Vector, sign: float
-) -> tuple[Points, Points]:
+    light: Bytes, tip: Float64s, axis: Float64s, *, wall: float, straight: Float64s, sign: float
+) -> tuple[Float64s, Float64s]:
     """Tips and axes moved onto the wall's centre line: (N, 2), (N, 2), picture pixels.
 
     Cross profiles at five places from a third of a wall's width behind the tip to `straight` (N,) pixels give the
@@ -86,7 +82,7 @@ class EndModel:
     blur_free: bool = False
 
 
-def fit_ends(light: Gray, tip: Points, axis: Points, normal: Points, model: EndModel) -> FittedEnds:
+def fit_ends(light: Bytes, tip: Float64s, axis: Float64s, normal: Float64s, model: EndModel) -> FittedEnds:
     """Ends of walls fitted by background + height · Φ((end − s)/blur) to the profile over the wall's width.
 
     The half-height point of this model is the cut itself, also when the cut runs askew: wall and cut are both
@@ -118,14 +114,14 @@ def fit_ends(light: Gray, tip: Points, axis: Points, normal: Points, model: EndM
 class _Steps:
     """Fitted steps: where, how wide, how high (N,), variance of the place for unit noise (N,), residuals (N, S)."""
 
-    end: Vector
-    spread: Vector
-    height: Vector
-    variance: Vector
-    residual: NDArray[np.float64]
+    end: Float64s
+    spread: Float64s
+    height: Float64s
+    variance: Float64s
+    residual: Float64s
 
 
-def _fit(profile: NDArray[np.float64], along: Vector, spread: Vector, model: EndModel) -> _Steps:
+def _fit(profile: Float64s, along: Float64s, spread: Float64s, model: EndModel) -> _Steps:
     """Least squares of background + height · Φ((end − s)/spread) to each profile (N, S), by Gauss-Newton on all at
     once.
     """
@@ -166,9 +162,7 @@ def _fit(profile: NDArray[np.float64], along: Vector, spread: Vector, model: End
     return _Steps(end, spread, top - bottom, variance, residual)
 
 
-def sample_across(
-    light: Gray, tip: Points, axis: Points, along: NDArray[np.float64], across: Vector
-) -> NDArray[np.float64]:
+def sample_across(light: Bytes, tip: Float64s, axis: Float64s, along: Float64s, across: Float64s) -> Float64s:
     """Grey levels at tip + along · axis + across · normal, shape (N, S, A), for along (N, S, 1) or (N, S, A), across
     (A,).
     """
@@ -178,14 +172,14 @@ def sample_across(
     return sample_at(light, x, y)
 
 
-def _line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Vector, Vector]:
+def _line(x: Float64s, y: Float64s) -> tuple[Float64s, Float64s]:
     """Slope and value at 0 of the line through (x[n], y[n]) for each n."""
     centre = x - x.mean(axis=1, keepdims=True)
     slope = (y * centre).sum(axis=1) / (centre * centre).sum(axis=1)
     return slope, y.mean(axis=1) - slope * x.mean(axis=1)
 
 
-def _crossing(profile: NDArray[np.float64], along: Vector, level: Vector) -> Vector:
+def _crossing(profile: Float64s, along: Float64s, level: Float64s) -> Float64s:
     """Where each profile last falls through its level going outwards, shape (N,)."""
     above = profile >= level[:, None]
     falls = above[:, :-1] & ~above[:, 1:]
@@ -197,7 +191,7 @@ def _crossing(profile: NDArray[np.float64], along: Vector, level: Vector) -> Vec
     return np.where(falls.any(axis=1), along[index] + part * _STEP, 0.0)
 
 
-def _normal_cdf(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normal_cdf(x: Float64s) -> Float64s:
     """Standard normal distribution function, within 1e-5 (Abramowitz and Stegun 26.2.16)."""
     size = np.abs(x)
     t = 1 / (1 + 0.33267 * size)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Gray = NDArray[np.uint8]
+from contour.geometry.arrays import Bools, Bytes
+from contour.image.pixel_grid import averaged, enlarged
 
 _SAMPLES_PER_PITCH = 6.5
 _COVERAGE = 0.12
@@ -16,15 +16,15 @@ _REACH_PITCHES = 0.7
 _STRAND_PITCHES = (0.8, 6.0)
 
 
-def with_faint_links(mask: Gray, faint: Gray, pitch: float) -> Gray:
+def with_faint_links(mask: Bytes, faint: Bytes, pitch_px: float) -> Bytes:
     """The wall mask (H, W), uint8, with the walls of `faint`, a mask by a lower threshold, that lead from its largest
     piece to strands beside it.
 
     Foils differ in brightness by a factor of three, and where a dim one ends at the cut, the bright walls of the
     outermost cells would hang on nothing and be taken for chips.
     """
-    step = max(1, round(pitch / _SAMPLES_PER_PITCH))
-    samples = pitch / step
+    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
+    samples = pitch_px / step
     walls, all_walls = _coarse(mask, step), _coarse(faint, step)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
     if count < 3:
@@ -45,18 +45,14 @@ def with_faint_links(mask: Gray, faint: Gray, pitch: float) -> Gray:
     count, parts = cv2.connectedComponents((strands | links).astype(np.uint8), connectivity=8)
     leads = np.isin(np.arange(count), np.unique(parts[strands]))
     links &= (joined == joined[main][0]) & leads[parts]
-    where = np.repeat(np.repeat(links, step, axis=0), step, axis=1)[: mask.shape[0], : mask.shape[1]]
-    return np.asarray(np.where(where, mask | faint, mask), np.uint8)
+    return np.asarray(np.where(enlarged(links, step, mask.shape), mask | faint, mask), np.uint8)
 
 
-def _coarse(mask: Gray, step: int) -> Gray:
+def _coarse(mask: Bytes, step: int) -> Bytes:
     """1 where an eighth of a square of `step` pixels is wall, the last squares filled up."""
-    wide, high = -mask.shape[1] % step, -mask.shape[0] % step
-    even = cv2.copyMakeBorder(mask, 0, high, 0, wide, cv2.BORDER_CONSTANT, value=0)
-    small = cv2.resize(even, (even.shape[1] // step, even.shape[0] // step), interpolation=cv2.INTER_AREA)
-    return np.asarray((small > 255 * _COVERAGE).astype(np.uint8), np.uint8)
+    return (averaged(mask, step) > 255 * _COVERAGE).astype(np.uint8)
 
 
-def _within(places: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
+def _within(places: Bools, radius: float) -> Bools:
     """Where a sample of `places` lies within `radius` samples."""
     return np.asarray(cv2.distanceTransform((~places).astype(np.uint8), cv2.DIST_L2, 3) <= radius, np.bool_)

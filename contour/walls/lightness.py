@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import PictureError
+from contour.geometry.arrays import Bytes, Float64s
 
 LUMA = np.array([0.114, 0.587, 0.299])
 """Weights of blue, green and red in lightness (ITU-R BT.601)."""
@@ -24,7 +24,7 @@ _LEAST_COLOUR = 25.0
 _CELLS_NEAR = 12
 
 
-def wall_light(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def wall_light(picture: Bytes) -> Bytes:
     """One channel, shape (H, W), uint8, linear in the picture's channels so that edges stay where they are.
 
     A grey picture is returned as it is. For BGR the direction with the most local contrast is compared with lightness.
@@ -44,9 +44,7 @@ def wall_light(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return _projected(picture, direction)
 
 
-def light_from_table(
-    picture: NDArray[np.uint8], light: NDArray[np.uint8], mask: NDArray[np.uint8], hop: int
-) -> NDArray[np.uint8] | None:
+def light_from_table(picture: Bytes, light: Bytes, mask: Bytes, hop: int) -> Bytes | None:
     """A channel in which walls stand out from the table as well as from cells; None where `light` already serves.
 
     `mask`, 255 on walls, was seen in `light`, both every `hop`-th pixel of the picture both ways; cells are what it
@@ -83,7 +81,7 @@ def light_from_table(
     return _projected(picture, direction / length)
 
 
-def _projected(picture: NDArray[np.uint8], direction: NDArray[np.float64]) -> NDArray[np.uint8]:
+def _projected(picture: Bytes, direction: Float64s) -> Bytes:
     """Weighted sum of the channels, scaled and shifted so that every colour fits into a byte."""
     low, high = 255.0 * np.minimum(direction, 0).sum(), 255.0 * np.maximum(direction, 0).sum()
     gain = 255.0 / (high - low)
@@ -91,7 +89,7 @@ def _projected(picture: NDArray[np.uint8], direction: NDArray[np.float64]) -> ND
     return np.asarray(cv2.transform(picture, weights), np.uint8)
 
 
-def _contrast_direction(picture: NDArray[np.uint8]) -> NDArray[np.float64] | None:
+def _contrast_direction(picture: Bytes) -> Float64s | None:
     """Unit weights of B, G, R with the most local contrast, or None where lightness has nearly as much."""
     # Means over 3 × 3 pixels: noise, which lightness has much of in a JPEG and colours little, counts a ninth.
     first = np.arange(0, picture.shape[0] - 2, max(3, picture.shape[0] // _SAMPLE_ROWS))
@@ -103,5 +101,5 @@ def _contrast_direction(picture: NDArray[np.uint8]) -> NDArray[np.float64] | Non
     luma = LUMA / np.linalg.norm(LUMA)
     if values[-1] < _COLOUR_GAIN * float(luma @ covariance @ luma):
         return None
-    best: NDArray[np.float64] = vectors[:, -1]
+    best: Float64s = vectors[:, -1]
     return best if best @ LUMA >= 0 else -best

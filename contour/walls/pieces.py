@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bools, Bytes
 from contour.geometry.rings import Ring
-from contour.walls.coarse_block import CoarseBlock
-
-Gray = NDArray[np.uint8]
+from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
+from contour.walls.coarse_rings import CoarseBlock
 
 _SAMPLES_PER_PITCH = 6.5
 _WALL_COVERAGE = 0.12
@@ -44,7 +43,7 @@ class Piece:
         return Piece(self.area_px2, (left + x, top + y, right + x, bottom + y), self.outline_px + np.array([x, y]))
 
 
-def pieces_beside(mask: Gray, exterior: Ring, pitch_px: float, scale: int = 1) -> tuple[Piece, ...]:
+def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) -> tuple[Piece, ...]:
     """Pieces of comb outside `exterior`, largest first, in a wall mask (H, W), uint8, 255 on walls.
 
     `exterior` and `pitch_px` are in the mask's pixels, the result in those of a picture `scale` times as large. A piece
@@ -52,10 +51,8 @@ def pieces_beside(mask: Gray, exterior: Ring, pitch_px: float, scale: int = 1) -
     """
     step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
     samples = pitch_px / step
-    size = (max(1, mask.shape[1] // step), max(1, mask.shape[0] // step))
-    small = cv2.resize(mask[: size[1] * step, : size[0] * step], size, interpolation=cv2.INTER_AREA)
-    walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
-    outline = np.rint((exterior + 0.5) / step - 0.5).astype(np.int32)
+    walls = (whole_averaged(mask, step) > 255 * _WALL_COVERAGE).astype(np.uint8)
+    outline = np.rint(samples_of(exterior, step)).astype(np.int32)
     cv2.fillPoly(walls, [outline], 0)
     cv2.polylines(walls, [outline], True, 0, max(1, round(2 * _MARGIN_PITCHES * samples)))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
@@ -68,12 +65,12 @@ def pieces_beside(mask: Gray, exterior: Ring, pitch_px: float, scale: int = 1) -
         if filled is not None:
             whole = step * scale
             box = (x * whole, y * whole, (x + w) * whole, (y + h) * whole)
-            ring = (_outline(filled) + (x, y) + 0.5) * whole - 0.5
+            ring = pixels_of(_outline(filled) + np.array([x, y]), whole)
             found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring))
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
 
 
-def reaches_frame(mask: Gray, block: CoarseBlock) -> bool:
+def reaches_frame(mask: Bytes, block: CoarseBlock) -> bool:
     """Whether a wall of the block lies in the last two pixels of its wall mask (H, W), uint8."""
     walls, step = block.unpadded(block.walls), block.step
     sides = (
@@ -85,13 +82,13 @@ def reaches_frame(mask: Gray, block: CoarseBlock) -> bool:
     return any(bool((line[samples.repeat(step)[: len(line)] > 0] > 0).any()) for line, samples in sides)
 
 
-def _outline(filled: NDArray[np.bool_]) -> Ring:
+def _outline(filled: Bools) -> Ring:
     """The outermost samples of the largest part, shape (N, 2)."""
     rings, _ = cv2.findContours(filled.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     return np.asarray(max(rings, key=cv2.contourArea), dtype=np.float64).reshape(-1, 2)
 
 
-def _filled(walls: NDArray[np.bool_], samples: float) -> NDArray[np.bool_] | None:
+def _filled(walls: Bools, samples: float) -> Bools | None:
     """A piece with walls `walls` (h, w), its cells filled; None where it has too few cells of its own."""
     cell = samples**2 / _HEXAGON
     pad = round(_CLOSING_PITCHES * samples) + 2

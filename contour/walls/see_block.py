@@ -1,105 +1,80 @@
-"""Witnesses of a block's outline: from a picture to where its material ends, wall by wall."""
+"""A block in a picture: its cells, walls and coarse rings, and what its walls say of the outline."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
-from contour.walls.cell_scale import Cells, probe
-from contour.walls.coarse_block import CoarseBlock, coarse_block
-from contour.walls.dark_material import dark_beyond, dark_edge, midway_to_table
-from contour.walls.end_profile import EndModel, centred_axes, fit_ends, true_width
+from contour.geometry.arrays import Bytes
+from contour.image.pixel_grid import pixels_of
+from contour.walls.cell_scale import probe
+from contour.walls.coarse_block import coarse_block
+from contour.walls.coarse_rings import CoarseBlock
+from contour.walls.dark_material import dark_edge, midway_to_table
 from contour.walls.faint_links import with_faint_links
-from contour.walls.lightness import light_from_table, wall_light
+from contour.walls.lightness import light_from_table
 from contour.walls.pieces import pieces_beside, reaches_frame
-from contour.walls.wall_ends import Chains, edge_chains, find_ends, outermost
-from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WallPoints, WitnessKind
+from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import FINE_PITCH, WallMask, wall_mask, without_specks
-from contour.walls.wall_parallax import Parallax, parallax
-
-Gray = NDArray[np.uint8]
-Points = NDArray[np.float64]
-Vector = NDArray[np.float64]
+from contour.walls.wall_witnesses import block_evidence
 
 # Noise alone reaches a score of 0.18.
 _ORDERLY = 0.35
 _HALF_SIZE_ABOVE_PX = 6_000_000
-# Sharpest and softest blur that a lens in use leaves; outside of it the fit has seen something else.
-_BLUR_PX = (0.4, 3.0)
-_USUAL_BLUR_PX = 0.9
-# A second witness within this of another says nothing new.
-_LONELY_PITCHES = 0.3
-_MOST_SIGMA_PX = 1.0
-# Of the usual height: fainter ends are not ends of walls.
-_LEAST_HEIGHT = 0.4
-# What blunter things than noise do to clean ends and to blunt ones, and to sides fitted and not.
-_MODEL_SIGMA_PX = (0.2, 0.3)
-_SIDE_SIGMA_PX = (0.5, 1.0)
-_NEAR_PX = 1.5
-_FAINT_HEIGHT = 0.45
-_FAINT_SIGMA_PX = 3.0
-# How far the edge of dark material is looked for from the last wall seen in it, and how near is the wall's own edge.
-_DARK_PITCHES = 4.0
-_INSIDE_PITCHES, _ENDS_INSIDE_PITCHES = 0.4, 0.25
-_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES = 1.0, 0.07
-# What the mask's own light blur (3 × 3) adds.
-_MASK_BLUR_PX = 0.8
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
 _SUBSAMPLED_PITCH = 20.0
-_WALL_POINTS_PER_PITCH, _DARK_POINTS_PER_PITCH = 8, 4
+_DARK_POINTS_PER_PITCH = 4
 # A horn that hangs on nothing reaches no farther from the block.
 _STRANDS_PITCHES = 5.0
-# Walls farther inside than this are no part of the boundary towards the table, the dents of open cells included.
-_WALLS_INSIDE = 1.1
 
 
-def see_block(picture: NDArray[np.uint8], polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
+def see_block(picture: Bytes, light: Bytes, polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
     """Witnesses of the largest block in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `on_mask` is called when the wall mask is made. Raises PictureError, NoBlockFound.
+    `light` is its `wall_light`. `on_mask` is called when the wall mask is made. Raises NoBlockFound.
     """
-    light = wall_light(picture)
     cells = probe(light, polarity)
     if picture.ndim == 3:
-        hop = 2 if cells.pitch > _SUBSAMPLED_PITCH else 1
+        hop = 2 if cells.pitch_px > _SUBSAMPLED_PITCH else 1
         sample = np.ascontiguousarray(light[::hop, ::hop])
-        walls = wall_mask(sample, cells.pitch / hop, bright=cells.bright, contrast=cells.contrast).mask
+        walls = wall_mask(sample, cells.pitch_px / hop, bright=cells.bright, contrast=cells.contrast).mask
         coloured = light_from_table(picture, sample, walls, hop)
         if coloured is not None:
             light, cells = coloured, probe(coloured, "bright")
-    scale = 2 if light.size > _HALF_SIZE_ABOVE_PX and cells.pitch > 20 and cells.wall > 2.5 else 1
+    scale = 2 if light.size > _HALF_SIZE_ABOVE_PX and cells.pitch_px > 20 and cells.wall_px > 2.5 else 1
     small = (
         light
         if scale == 1
         else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
     )
-    seen = wall_mask(small, cells.pitch / scale, bright=cells.bright, contrast=cells.contrast, wall=cells.wall / scale)
-    if cells.pitch < FINE_PITCH and seen.may_be_noise and cells.score < _ORDERLY:
+    seen = wall_mask(
+        small, cells.pitch_px / scale, bright=cells.bright, contrast=cells.contrast, wall=cells.wall_px / scale
+    )
+    if cells.pitch_px < FINE_PITCH and seen.may_be_noise and cells.score < _ORDERLY:
         raise NoBlockFound(
-            f"no block found: cells of {cells.pitch:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
+            f"no block found: cells of {cells.pitch_px:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
             "like noise. Check the light, and that a block lies in view"
         )
-    seen = without_specks(seen, cells.pitch / scale, cells.wall / scale)
+    seen = without_specks(seen, cells.pitch_px / scale, cells.wall_px / scale)
     midway = None if cells.bright else midway_to_table(small, cells.level, seen.contrast)
     if midway is not None:
         # Such a block is told from the table by its darkness: fainter walls would be more of its cells' own shades.
         seen = _darker_than_table(seen, small, midway)
     else:
-        seen = replace(seen, mask=with_faint_links(seen.mask, seen.faint, cells.pitch / scale))
+        seen = replace(seen, mask=with_faint_links(seen.mask, seen.faint, cells.pitch_px / scale))
     on_mask()
-    coarse = coarse_block(seen.mask, small, cells.pitch / scale)
-    others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch / scale, scale)
-    evidence = _evidence(light, seen, coarse, cells, scale, midway)
+    coarse = coarse_block(seen.mask, small, cells.pitch_px / scale)
+    others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch_px / scale, scale)
+    evidence = block_evidence(light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
 
 
-def _darker_than_table(seen: WallMask, light: Gray, midway: float) -> WallMask:
+def _darker_than_table(seen: WallMask, light: Bytes, midway: float) -> WallMask:
     """The mask without what is lighter than midway from dark walls to the table.
 
     Cells of a black block are nearly as dark as its walls. Against so small a contrast the table's own shades, beside a
@@ -110,187 +85,14 @@ def _darker_than_table(seen: WallMask, light: Gray, midway: float) -> WallMask:
 
 
 def _with_beside(
-    evidence: BlockEvidence, light: Gray, coarse: CoarseBlock, scale: int, midway: float | None
+    evidence: BlockEvidence, light: Bytes, coarse: CoarseBlock, scale: int, midway: float | None
 ) -> BlockEvidence:
     """The evidence with strands that hang on nothing and, where `midway` is given, the edge of dark material."""
-    pitch = evidence.pitch_px / scale
-    beside = coarse.strands_near(_STRANDS_PITCHES * pitch)
+    pitch_px = evidence.pitch_px / scale
+    beside = coarse.strands_near(_STRANDS_PITCHES * pitch_px)
     if midway is not None:
-        edge = dark_edge(light, coarse, pitch, midway)[:: max(1, round(pitch / _DARK_POINTS_PER_PITCH))]
+        edge = dark_edge(light, coarse, pitch_px, midway)[:: max(1, round(pitch_px / _DARK_POINTS_PER_PITCH))]
         beside = np.concatenate([beside, edge])
-    ring, points = coarse.feet(beside)[0], (beside + 0.5) * scale - 0.5
+    ring, points = coarse.feet(beside)[0], pixels_of(beside, scale)
     rings = tuple(replace(one, beside=points[ring == number]) for number, one in enumerate(evidence.rings))
     return replace(evidence, rings=rings)
-
-
-@dataclass(frozen=True)
-class _Ends:
-    """Ends in picture pixels before they are fitted: tip, axis and outward normal (N, 2), straight wall behind (N,)."""
-
-    tip: Points
-    axis: Points
-    normal: Points
-    straight: Vector
-
-
-@dataclass(frozen=True)
-class _Witnesses:
-    points: Points
-    kind: NDArray[np.int8]
-    sigma: Vector
-
-
-def _evidence(
-    light: Gray, seen: WallMask, coarse: CoarseBlock, cells: Cells, scale: int, midway: float | None
-) -> BlockEvidence:
-    pitch, wall = cells.pitch / scale, max(1.0, cells.wall / scale)
-    chains = edge_chains(seen.mask, coarse, pitch)
-    found = find_ends(chains, coarse, pitch, wall)
-    outer = chains.points[outermost(chains, coarse, pitch)]
-    sign = 1.0 if cells.bright else -1.0
-    straight = found.straight * scale
-    tip, axis = centred_axes(
-        light, (found.tip + 0.5) * scale - 0.5, found.axis, wall=cells.wall, straight=straight, sign=sign
-    )
-    depth = parallax(light, tip, axis, straight=straight, wall=cells.wall, sign=sign)
-    if depth.width is not None:
-        # The top is the half of the band that lies away from the picture's middle.
-        across = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
-        tip = tip + 0.5 * depth.across(tip, across)[:, None] * across
-    ends = _Ends(tip, axis, coarse.feet(found.tip)[2], straight)
-    model = _learnt(light, ends, cells, depth.width or cells.wall, seen)
-    tips = _tips(light, ends, cells, model)
-    if midway is not None:
-        normal = coarse.feet((tips.points + 0.5) / scale - 0.5)[2]
-        # A clean end is where the wall ends; what is dark beyond it is the block's shadow.
-        faded = (depth.across(tips.points, normal) >= 0.0) & (tips.kind != WitnessKind.CLEAN)
-        least = np.where(faded, _ENDS_INSIDE_PITCHES * cells.pitch, np.inf)
-        tips = _to_the_table(light, tips, tips.points, normal, least, cells.pitch, midway)
-    tips = replace(tips, points=_raised(tips.points, coarse.feet((tips.points + 0.5) / scale - 0.5)[2], depth))
-    outer = outer[_nearest(outer, (tips.points + 0.5) / scale - 0.5) > _LONELY_PITCHES * pitch]
-    normal, place = coarse.feet(outer)[2], (outer + 0.5) * scale - 0.5
-    sides = _sides(light, place, normal, depth.width or cells.wall, model)
-    if midway is not None:
-        faint = (sides.sigma >= _FAINT_SIGMA_PX) & (depth.across(place, normal) >= 0.0)
-        least = np.where(faint, _INSIDE_PITCHES * cells.pitch, np.inf)
-        sides = _to_the_table(light, sides, place, normal, least, cells.pitch, midway)
-    sides = replace(sides, points=_raised(sides.points, normal, depth))
-    polarity = "bright" if cells.bright else "dark"
-    return BlockEvidence(
-        _rings(coarse, tips, sides, _walls(chains, coarse, pitch), depth, scale),
-        cells.pitch,
-        cells.wall,
-        polarity,
-        model.blur,
-        seen.noise,
-        seen.contrast,
-        coarse.leaves,
-    )
-
-
-def _learnt(light: Gray, ends: _Ends, cells: Cells, wall: float, seen: WallMask) -> EndModel:
-    """What the straightest ends say of all: blur, usual height, and the true width of walls that measure `wall`."""
-    model = EndModel(
-        width=true_width(wall, float(np.hypot(_USUAL_BLUR_PX, _MASK_BLUR_PX))),
-        blur=_USUAL_BLUR_PX,
-        height=None,
-        noise=seen.noise,
-        reach=float(np.clip(0.3 * cells.pitch, 2.5, 2 * cells.wall + 4)),
-        out=float(np.clip(0.25 * cells.pitch, 3.0, 6.0)),
-        sign=1.0 if cells.bright else -1.0,
-    )
-    longest = np.argsort(-ends.straight)[: max(5, min(64, len(ends.tip) // 2))]
-    if not len(longest):
-        return replace(model, height=max(seen.contrast, 1.0))
-    free = fit_ends(light, ends.tip[longest], ends.axis[longest], ends.normal[longest], replace(model, blur_free=True))
-    blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
-    width = true_width(wall, float(np.hypot(blur, _MASK_BLUR_PX)))
-    return replace(model, width=width, blur=blur, height=max(float(np.median(free.height)), 1.0))
-
-
-def _tips(light: Gray, ends: _Ends, cells: Cells, model: EndModel) -> _Witnesses:
-    """Fitted wall ends; those too faint or too unsure are left out."""
-    fitted = fit_ends(light, ends.tip, ends.axis, ends.normal, model)
-    good = (fitted.sigma < _MOST_SIGMA_PX) & (fitted.height > _LEAST_HEIGHT * (model.height or 1.0))
-    clean = ends.straight > 2 * cells.wall + 2
-    sigma = np.hypot(np.where(clean, *_MODEL_SIGMA_PX), fitted.sigma)
-    kind = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
-    return _Witnesses(fitted.point[good], kind[good], sigma[good])
-
-
-def _sides(light: Gray, place: Points, normal: Points, wall: float, model: EndModel) -> _Witnesses:
-    """Outermost wall points, moved along the outline's normal to half height where that is near; `wall` is the width
-    of walls at half height.
-    """
-    across = replace(model, width=1.0, reach=min(model.reach, wall))
-    fitted = fit_ends(light, place, normal, normal, across)
-    near = np.abs(((fitted.point - place) * normal).sum(axis=1)) < _NEAR_PX
-    # Beside a thin wall half height lies outside of it, at its corners and ends inside: a third of the way is left.
-    fat = (wall - model.width) / 6
-    points = np.where(near[:, None], fitted.point, place) - fat * normal
-    sigma = np.where(near, *_SIDE_SIGMA_PX)
-    # The outer side of the block, where it is in view below its top, is fainter than any wall.
-    sigma = np.where(fitted.height < _FAINT_HEIGHT * (model.height or 1.0), _FAINT_SIGMA_PX, sigma)
-    kind = np.full(len(place), WitnessKind.OUTERMOST, np.int8)
-    return _Witnesses(points, kind, sigma)
-
-
-def _to_the_table(
-    light: Gray,
-    seen: _Witnesses,
-    place: Points,
-    normal: Points,
-    least: Vector,
-    pitch: float,
-    midway: float,
-) -> _Witnesses:
-    """Witnesses at `place`, with those that lie inside of dark material by `least` (N,) pixels or more, where its walls
-    show no more, moved out to its edge.
-    """
-    beyond = dark_beyond(light, place, normal, midway=midway, reach=_DARK_PITCHES * pitch)
-    moved = (beyond > least) & np.isfinite(beyond)
-    edge = place + np.where(moved, beyond, 0.0)[:, None] * normal
-    points = np.where(moved[:, None], edge, seen.points)
-    sigma = np.where(moved, max(_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES * pitch), seen.sigma)
-    return _Witnesses(points, np.where(moved, np.int8(WitnessKind.OUTERMOST), seen.kind), sigma)
-
-
-def _raised(points: Points, normal: Points, depth: Parallax) -> Points:
-    """Points moved from the lower edge of the block's outer side up to its top, where that side is in view."""
-    return (
-        points + np.minimum(depth.across(points, normal), 0.0)[:, None] * normal if depth.width is not None else points
-    )
-
-
-def _nearest(points: Points, others: Points) -> Vector:
-    """Distance from each of `points` (N, 2) to the nearest of `others` (M, 2), shape (N,); inf where there is none."""
-    if not len(others) or not len(points):
-        return np.full(len(points), np.inf)
-    square = ((points[:, None, :] - others[None, :, :]) ** 2).sum(axis=2)
-    return np.asarray(np.sqrt(square.min(axis=1)), np.float64)
-
-
-def _walls(chains: Chains, coarse: CoarseBlock, pitch: float) -> Points:
-    """Points of the walls' boundary near the coarse edge, shape (K, 2), mask pixels."""
-    points = chains.points[:: max(1, round(pitch / _WALL_POINTS_PER_PITCH))]
-    return points[coarse.depth_at(points) < _WALLS_INSIDE * pitch]
-
-
-def _rings(
-    coarse: CoarseBlock, tips: _Witnesses, sides: _Witnesses, walls: Points, depth: Parallax, scale: int
-) -> tuple[RingEvidence, ...]:
-    """All witnesses, each at its nearest ring, in order along it, and the walls about it."""
-    points = np.concatenate([tips.points, sides.points])
-    kind, sigma = np.concatenate([tips.kind, sides.kind]), np.concatenate([tips.sigma, sides.sigma])
-    ring, arc, normal = coarse.feet((points + 0.5) / scale - 0.5)
-    beside, foot, across = coarse.feet(walls)
-    wall_points = WallPoints(_raised((walls + 0.5) * scale - 0.5, across, depth), foot * scale, across)
-    evidence = []
-    for number, one in enumerate(coarse.rings):
-        mine = np.flatnonzero(ring == number)
-        mine = mine[np.argsort(arc[mine], kind="stable")]
-        vertices = (one.vertices + 0.5) * scale - 0.5
-        arcs = arc[mine] * scale
-        seen = (points[mine], arcs, normal[mine], sigma[mine], kind[mine], wall_points.take(beside == number))
-        evidence.append(RingEvidence(vertices, one.is_hole, *seen))
-    return tuple(evidence)

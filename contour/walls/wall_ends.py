@@ -6,12 +6,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from contour.walls.coarse_block import CoarseBlock
-
-Gray = NDArray[np.uint8]
-Points = NDArray[np.float64]
+from contour.geometry.arrays import Bytes, Float64s, Int64s
+from contour.walls.coarse_rings import CoarseBlock
 
 _BAND_PITCHES = 1.25
 _DEPTH_PITCHES = 0.9
@@ -23,36 +20,36 @@ class WallEnds:
     (N,).
     """
 
-    tip: Points
-    axis: Points
-    straight: NDArray[np.float64]
+    tip: Float64s
+    axis: Float64s
+    straight: Float64s
 
 
 @dataclass(frozen=True)
 class Chains:
     """Boundary chains one after the other: points (N, 2), first index and length of each point's chain, both (N,)."""
 
-    points: Points
-    first: NDArray[np.int64]
-    length: NDArray[np.int64]
+    points: Float64s
+    first: Int64s
+    length: Int64s
 
-    def shifted(self, steps: int, at: NDArray[np.int64]) -> NDArray[np.int64]:
+    def shifted(self, steps: int, at: Int64s) -> Int64s:
         """Index of the point `steps` further along the own closed chain of each point `at`."""
         first = self.first[at]
         return first + (at - first + steps) % self.length[at]
 
-    def free_side(self, at: NDArray[np.int64], arm: int) -> Points:
+    def free_side(self, at: Int64s, arm: int) -> Float64s:
         """Vector towards the side without wall, as long as the points `arm` steps ahead and back of `at` are apart."""
         # findContours runs with the free side at (−dy, dx) of its direction, for outer boundaries and inner ones alike.
         ahead, back = self.points[self.shifted(arm, at)], self.points[self.shifted(-arm, at)]
         return np.stack([(back - ahead)[:, 1], (ahead - back)[:, 0]], axis=1)
 
 
-def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
+def edge_chains(mask: Bytes, coarse: CoarseBlock, pitch_px: float) -> Chains:
     """Boundary chains of the walls within about a pitch of the coarse edge."""
     # A sample's margin around the block's own walls keeps chips that lie beside it out, and their thin ends in.
     own = cv2.dilate(coarse.walls, np.ones((3, 3), np.uint8))
-    band = ((np.abs(coarse.depth) < _BAND_PITCHES * pitch) & (own > 0)).astype(np.uint8) * 255
+    band = ((np.abs(coarse.depth) < _BAND_PITCHES * pitch_px) & (own > 0)).astype(np.uint8) * 255
     chains, _ = cv2.findContours(
         cv2.bitwise_and(mask, coarse.enlarged(band, mask.shape)), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE
     )
@@ -65,9 +62,9 @@ def edge_chains(mask: Gray, coarse: CoarseBlock, pitch: float) -> Chains:
     return Chains(points, np.repeat(starts, sizes), np.repeat(sizes, sizes))
 
 
-def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) -> WallEnds:
+def find_ends(chains: Chains, coarse: CoarseBlock, pitch_px: float, wall: float) -> WallEnds:
     """Points where the two arms along the chain lie about a wall's width apart and the point sticks out of them."""
-    arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch)))
+    arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch_px)))
     everywhere = np.arange(len(chains.points))
     gap, stick, out = _arms(chains, everywhere, arm)
     # A sharp corner of a small cell has close arms too, but sticks out into the wall. A wall one pixel wide has none
@@ -76,9 +73,9 @@ def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) ->
     candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm) & (free > -0.5)
     peak = _peaks(chains, np.where(candidate, stick - 0.5 * gap, -np.inf), arm)
     depth = coarse.depth_at(chains.points[peak])
-    peak = peak[np.abs(depth) < _DEPTH_PITCHES * pitch]
+    peak = peak[np.abs(depth) < _DEPTH_PITCHES * pitch_px]
     # The arms are let out for as long as they stay a wall's width apart: that much of the wall is straight.
-    longest = max(arm + 1, round(0.55 * pitch))
+    longest = max(arm + 1, round(0.55 * pitch_px))
     straight, axis = np.full(len(peak), float(arm)), _arms(chains, peak, arm)[2]
     still = np.ones(len(peak), np.bool_)
     for length in range(arm + 1, longest + 1):
@@ -89,7 +86,7 @@ def find_ends(chains: Chains, coarse: CoarseBlock, pitch: float, wall: float) ->
     return WallEnds(chains.points[peak], axis, straight)
 
 
-def _arms(chains: Chains, at: NDArray[np.int64], arm: int) -> tuple[NDArray[np.float64], NDArray[np.float64], Points]:
+def _arms(chains: Chains, at: Int64s, arm: int) -> tuple[Float64s, Float64s, Float64s]:
     """Distance of the points `arm` steps back and ahead of `at`, how far each sticks out of their middle, and where
     to.
     """
@@ -100,7 +97,7 @@ def _arms(chains: Chains, at: NDArray[np.int64], arm: int) -> tuple[NDArray[np.f
     return gap, stick, out / np.maximum(stick, 1e-9)[:, None]
 
 
-def _peaks(chains: Chains, score: NDArray[np.float64], reach: int) -> NDArray[np.int64]:
+def _peaks(chains: Chains, score: Float64s, reach: int) -> Int64s:
     """Middle of each run of best scores that no score within `reach` steps along the chain exceeds."""
     best = np.flatnonzero(np.isfinite(score))
     for step in range(1, reach + 1):
@@ -109,18 +106,18 @@ def _peaks(chains: Chains, score: NDArray[np.float64], reach: int) -> NDArray[np
     return best
 
 
-def outermost(chains: Chains, coarse: CoarseBlock, pitch: float) -> NDArray[np.int64]:
+def outermost(chains: Chains, coarse: CoarseBlock, pitch_px: float) -> Int64s:
     """Indices of the chain points that reach further out of the block than all within 0.4 pitch along their chain.
 
     The wall must lie behind them, seen from outside, and no other such point within a pitch may reach a third of a
     pitch further out: that one would hide it from the cut.
     """
-    near = np.abs(coarse.depth_at(chains.points)) < 0.5 * pitch
+    near = np.abs(coarse.depth_at(chains.points)) < 0.5 * pitch_px
     height = np.where(near, coarse.height_at(chains.points), -np.inf)
-    peak = _peaks(chains, height, max(2, round(0.4 * pitch)))
+    peak = _peaks(chains, height, max(2, round(0.4 * pitch_px)))
     _, _, normal = coarse.feet(chains.points[peak])
     peak = peak[(chains.free_side(peak, 3) * normal).sum(axis=1) > 0]
     points, level = chains.points[peak], height[peak]
-    close = ((points[:, None, :] - points[None, :, :]) ** 2).sum(axis=2) < pitch * pitch
+    close = ((points[:, None, :] - points[None, :, :]) ** 2).sum(axis=2) < pitch_px * pitch_px
     envelope = np.where(close, level[None, :], -np.inf).max(axis=1) if len(peak) else level
-    return np.asarray(peak[level > envelope - pitch / 3], np.int64)
+    return np.asarray(peak[level > envelope - pitch_px / 3], np.int64)

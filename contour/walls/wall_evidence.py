@@ -10,6 +10,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bools, Float64s, Indices
 from contour.geometry.rings import Ring
 from contour.walls.comb_likeness import Comb
 from contour.walls.pieces import Piece
@@ -30,11 +31,11 @@ class WallPoints:
     outward normals at their feet on the coarse ring (K, 2), arc lengths of the feet (K,), pixels.
     """
 
-    points: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
-    position: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    normal: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    points: Float64s = field(default_factory=lambda: np.empty((0, 2)))
+    position: Float64s = field(default_factory=lambda: np.empty(0))
+    normal: Float64s = field(default_factory=lambda: np.empty((0, 2)))
 
-    def take(self, index: NDArray[np.bool_] | NDArray[np.intp]) -> WallPoints:
+    def take(self, index: Bools | Indices) -> WallPoints:
         """The points at `index`."""
         return WallPoints(self.points[index], self.position[index], self.normal[index])
 
@@ -56,13 +57,13 @@ class RingEvidence:
 
     coarse: Ring
     is_hole: bool
-    points: NDArray[np.float64]
-    position: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    sigma: NDArray[np.float64]
+    points: Float64s
+    position: Float64s
+    normal: Float64s
+    sigma: Float64s
     kind: NDArray[np.int8]
     walls: WallPoints = field(default_factory=WallPoints)
-    beside: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    beside: Float64s = field(default_factory=lambda: np.empty((0, 2)))
 
 
 @dataclass(frozen=True)

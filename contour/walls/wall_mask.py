@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Gray = NDArray[np.uint8]
-Float = NDArray[np.float32]
+from contour.geometry.arrays import Bytes, Float32s
+
 AnyFloat = NDArray[np.floating[Any] | np.integer[Any]]
-Levels = NDArray[np.uint8] | NDArray[np.uint16]
+Levels = Bytes | NDArray[np.uint16]
 L = TypeVar("L", bound=NDArray[Any])
 
 # Standard deviations above the level that walls stand on, itself about 1.5 below the mean where there is nothing but
@@ -53,10 +53,10 @@ class WallMask:
     faint: the mask at a lower threshold.
     """
 
-    mask: Gray
+    mask: Bytes
     noise: float
     contrast: float
-    faint: Gray
+    faint: Bytes
 
     @property
     def may_be_noise(self) -> bool:
@@ -64,8 +64,8 @@ class WallMask:
         return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
-def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0, wall: float = 0.0) -> WallMask:
-    """Walls of `light` (H, W) where cells are about `pitch` pixels apart and walls are brighter (or darker) than cells.
+def wall_mask(light: Bytes, pitch_px: float, *, bright: bool, contrast: float = 0.0, wall: float = 0.0) -> WallMask:
+    """Walls of `light` (H, W) where cells are about `pitch_px` apart and walls are brighter (or darker) than cells.
 
     Walls are what stands out on both sides over less than a cell, whatever the light: a table as light as the walls is
     no wall, nor is the edge of a shadow or of a lamp's spot on it. The threshold lies at 0.44 of the local height of
@@ -74,20 +74,20 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0,
     of walls is known, `wall` in pixels, what is both wider and fainter than they is none: a table's light between its
     holes, or between a groove and the block.
     """
-    step = max(1, int(pitch / _MAP_SAMPLES))
+    step = max(1, int(pitch_px / _MAP_SAMPLES))
     smooth, unit = _smoothed(light, step, contrast)
     sign = 1 if bright else -1
-    beside = _beside(sign * _shrunk(smooth, step), pitch / step)
+    beside = _beside(sign * _shrunk(smooth, step), pitch_px / step)
     # Every step-th pixel, not their average: an average would take the walls' contrast away.
     height = np.maximum(sign * smooth[step // 2 :: step, step // 2 :: step].astype(np.float32) - beside, 0.0)
-    noise = _noise_level(smooth, pitch, unit)
-    walls, region, typical = _heights(height, beside, pitch / step)
-    share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch) / 8, 0, 1))
+    noise = _noise_level(smooth, pitch_px, unit)
+    walls, region, typical = _heights(height, beside, pitch_px / step)
+    share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch_px) / 8, 0, 1))
     rise = np.maximum(np.maximum(share * walls, _REGION_RISE * region), _PICTURE_RISE * contrast * unit)
     least = NOISE_FLOOR * noise
     size = _odd(_WIDE_WALLS * wall + _HALO_PX)
     wide = np.zeros_like(beside)
-    if wall and size < _BESIDE_PITCHES * pitch:
+    if wall and size < _BESIDE_PITCHES * pitch_px:
         wide = np.minimum(sign * _shrunk(_opened(smooth, size, closed=not bright), step) - beside, _TALL * region)
     mask, faint = (
         _standing_out(
@@ -103,7 +103,7 @@ def wall_mask(light: Gray, pitch: float, *, bright: bool, contrast: float = 0.0,
     return WallMask(mask, noise / unit, _typical(typical) / unit, faint)
 
 
-def _standing_out(smooth: Levels, threshold: Float, unit: int, *, bright: bool) -> Gray:
+def _standing_out(smooth: Levels, threshold: Float32s, unit: int, *, bright: bool) -> Bytes:
     """Where the picture is brighter (or darker) than the threshold, a coarser map, in `unit`s a grey level."""
     level = np.clip(threshold, 0, 255 * unit)
     levels: Levels = level.astype(np.uint8) if unit == 1 else level.astype(np.uint16)
@@ -113,17 +113,17 @@ def _standing_out(smooth: Levels, threshold: Float, unit: int, *, bright: bool) 
     return np.asarray(mask, np.uint8)
 
 
-def without_specks(seen: WallMask, pitch: float, wall: float) -> WallMask:
+def without_specks(seen: WallMask, pitch_px: float, wall: float) -> WallMask:
     """The mask without pieces smaller than a stub of wall 0.15 pitch long, where there may be noise among them."""
     if seen.contrast > _CLEAR_OF_NOISE * seen.noise:
         return seen
     _, labels, stats, _ = cv2.connectedComponentsWithStats(seen.mask, connectivity=8)
-    kept = (stats[:, cv2.CC_STAT_AREA] > max(4.0, _SPECK_LENGTH * pitch * wall)).astype(np.uint8) * np.uint8(255)
+    kept = (stats[:, cv2.CC_STAT_AREA] > max(4.0, _SPECK_LENGTH * pitch_px * wall)).astype(np.uint8) * np.uint8(255)
     kept[0] = 0
     return replace(seen, mask=kept[labels])
 
 
-def _smoothed(light: Gray, step: int, contrast: float) -> tuple[Levels, int]:
+def _smoothed(light: Bytes, step: int, contrast: float) -> tuple[Levels, int]:
     """Lightly blurred picture, filled up to a multiple of `step` both ways, and its units a grey level.
 
     Grey levels are kept in 1/32 where steps of one would show in the threshold; bytes are faster for the rest.
@@ -134,18 +134,18 @@ def _smoothed(light: Gray, step: int, contrast: float) -> tuple[Levels, int]:
     return np.asarray(cv2.GaussianBlur(even.astype(np.uint16) * np.uint16(32), (3, 3), 0), np.uint16), 32
 
 
-def _shrunk(smooth: Levels, step: int) -> Float:
+def _shrunk(smooth: Levels, step: int) -> Float32s:
     size = (smooth.shape[1] // step, smooth.shape[0] // step)
     return (cv2.resize(smooth, size, interpolation=cv2.INTER_AREA) if step > 1 else smooth).astype(np.float32)
 
 
-def _beside(small: Float, pitch: float) -> Float:
+def _beside(small: Float32s, samples: float) -> Float32s:
     """The level on which walls stand: what stays of `small` when all is taken away that is narrower than a cell.
 
     A morphological opening (Matheron): the highest of the lowest levels of all squares that hold a sample. A table's
     edge of light or shadow stays, for it stands out on one side only.
     """
-    return _opened(small, _odd(_BESIDE_PITCHES * pitch - 1))
+    return _opened(small, _odd(_BESIDE_PITCHES * samples - 1))
 
 
 def _opened(light: L, size: int, *, closed: bool = False) -> L:
@@ -154,15 +154,15 @@ def _opened(light: L, size: int, *, closed: bool = False) -> L:
     return cast(L, cv2.morphologyEx(light, way, square, borderType=cv2.BORDER_REFLECT))
 
 
-def _typical(span: Float) -> float:
+def _typical(span: Float32s) -> float:
     """Median of the wall contrast where there is any to speak of."""
     strong = span[span > 0.5 * np.quantile(span[::4, ::4], 0.98)]
     return float(np.median(strong[:: max(1, strong.size // 4096)])) if strong.size else 0.0
 
 
-def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
+def _noise_level(smooth: Levels, pitch_px: float, unit: int) -> float:
     """Standard deviation of what varies within the quietest tiles, each about a third of a pitch wide."""
-    tile = max(3, round(pitch / 3))
+    tile = max(3, round(pitch_px / 3))
     hop = max(1, round(np.sqrt(smooth.size / 2e5)))
     rows = smooth[: smooth.shape[0] // tile * tile].reshape(-1, tile, smooth.shape[1])[::hop]
     columns = smooth.shape[1] // tile
@@ -171,7 +171,7 @@ def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
         return 0.3 * unit
     # Of noise alone, after the light blur, a fifth of all tiles of n pixels show no more than 1 − 1.5 / n.
     quiet = float(np.quantile(tiles.astype(np.float32).std(axis=(1, 3)), 0.2)) / (1 - 1.5 / tile)
-    if pitch < FINE_PITCH:
+    if pitch_px < FINE_PITCH:
         # No tile of fine cells is quiet, but second differences both ways see little of a blurred structure, and keep
         # the noise that the light blur left as it is.
         part = smooth[: 1 << 9, : 1 << 9].astype(np.float32)
@@ -183,32 +183,32 @@ def _noise_level(smooth: Levels, pitch: float, unit: int) -> float:
     return max(quiet, 0.3 * unit)
 
 
-def _heights(height: Float, beside: Float, pitch: float) -> tuple[Float, Float, Float]:
+def _heights(height: Float32s, beside: Float32s, samples: float) -> tuple[Float32s, Float32s, Float32s]:
     """How far walls near each sample rise above the level beside it, how far walls of the wider region, and the walls
     near it, rise above what lies beside themselves.
 
-    `pitch` in samples of `height`. Beside a light table the first is less than the last: walls end at the same level.
-    The region spans a dozen pitches: on the table beside a block it still holds the height of the block's walls, so
-    that the table's own texture stays below the threshold.
+    `samples` is the pitch in samples of `height`. Beside a light table the first is less than the last: walls end at
+    the same level. The region spans a dozen pitches: on the table beside a block it still holds the height of the
+    block's walls, so that the table's own texture stays below the threshold.
     """
     # Glints and dust would raise the threshold around them and wipe out faint walls nearby.
-    height = np.minimum(height, _typical_peak(height, pitch))
-    coarse = max(1, round(pitch / 2))
+    height = np.minimum(height, _typical_peak(height, samples))
+    coarse = max(1, round(samples / 2))
     grid = (max(1, height.shape[1] // coarse), max(1, height.shape[0] // coarse))
     weight, square = (cv2.resize(part, grid, interpolation=cv2.INTER_AREA) for part in (height, height * height))
     region = cv2.resize(
-        _ratio(square, weight, _odd(12 * pitch / coarse)),
+        _ratio(square, weight, _odd(12 * samples / coarse)),
         (height.shape[1], height.shape[0]),
         interpolation=cv2.INTER_LINEAR,
     )
-    window = _odd(1.3 * pitch)
+    window = _odd(1.3 * samples)
     own = _ratio(height * height, height, window)
     return own + _ratio(beside * height, height, window) - beside, np.asarray(region, np.float32), own
 
 
-def _typical_peak(local: Float, pitch: float) -> float:
+def _typical_peak(local: Float32s, samples: float) -> float:
     """What half of the walls' peaks over tiles of a pitch stay below."""
-    size = max(2, round(pitch))
+    size = max(2, round(samples))
     rows, columns = local.shape[0] // size, local.shape[1] // size
     if rows < 2 or columns < 2:
         return float(local.max())
@@ -217,7 +217,7 @@ def _typical_peak(local: Float, pitch: float) -> float:
     return float(np.quantile(walls, 0.5)) if walls.size else 0.0
 
 
-def _ratio(square: AnyFloat, weight: AnyFloat, window: int) -> Float:
+def _ratio(square: AnyFloat, weight: AnyFloat, window: int) -> Float32s:
     """Mean over a window of values weighted by themselves, from their squares and themselves; 0 where they vanish."""
     size = (window, window)
     return np.asarray(cv2.blur(square, size) / np.maximum(cv2.blur(weight, size), 1e-3), np.float32)

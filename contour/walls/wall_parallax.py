@@ -10,13 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from contour.geometry.arrays import Bytes, Float64s
 from contour.walls.end_profile import sample_across
-
-Gray = NDArray[np.uint8]
-Points = NDArray[np.float64]
-Vector = NDArray[np.float64]
 
 _ROUNDS = 8
 _LEAST_ENDS = 16
@@ -34,17 +30,17 @@ class Parallax:
     """
 
     share: float
-    middle: Points
+    middle: Float64s
     width: float | None
 
-    def across(self, points: Points, direction: Points) -> Vector:
+    def across(self, points: Float64s, direction: Float64s) -> Float64s:
         """Displacement along unit vectors `direction` (N, 2) at `points` (N, 2), positive away from the middle,
         pixels.
         """
         return np.asarray(self.share * ((points - self.middle) * direction).sum(axis=1), np.float64)
 
 
-def parallax(light: Gray, tip: Points, axis: Points, *, straight: Vector, wall: float, sign: float) -> Parallax:
+def parallax(light: Bytes, tip: Float64s, axis: Float64s, *, straight: Float64s, wall: float, sign: float) -> Parallax:
     """Parallax that the ends `tip` (N, 2) with unit `axis` (N, 2) and `straight` (N,) pixels of wall behind them
     show.
     """
@@ -68,7 +64,7 @@ def parallax(light: Gray, tip: Points, axis: Points, *, straight: Vector, wall: 
     return Parallax(share, middle + factors[2:] / share, float(factors[0]))
 
 
-def _fitted(lever: Vector, normal: Points, width: Vector) -> tuple[Vector, float]:
+def _fitted(lever: Float64s, normal: Float64s, width: Float64s) -> tuple[Float64s, float]:
     """Top width, share and displacement (x, y) at the picture's middle, and the share's standard deviation.
 
     width = top + |share · lever − normal · displacement|: linear once the signs are known, which the last turn gives. A
@@ -76,8 +72,8 @@ def _fitted(lever: Vector, normal: Points, width: Vector) -> tuple[Vector, float
     """
     side = np.sign(lever)
     weight = np.ones_like(width)
-    factors: Vector = np.zeros(4)
-    covariance: NDArray[np.float64] = np.eye(4)
+    factors: Float64s = np.zeros(4)
+    covariance: Float64s = np.eye(4)
     spread = 1.0
     for _ in range(_ROUNDS):
         terms = np.stack([np.ones_like(lever), side * lever, -side * normal[:, 0], -side * normal[:, 1]], axis=1)
@@ -93,7 +89,7 @@ def _fitted(lever: Vector, normal: Points, width: Vector) -> tuple[Vector, float
     return factors, spread * float(np.sqrt(covariance[1, 1]))
 
 
-def _widths(light: Gray, tip: Points, axis: Points, *, straight: Vector, wall: float, sign: float) -> Vector:
+def _widths(light: Bytes, tip: Float64s, axis: Float64s, *, straight: Float64s, wall: float, sign: float) -> Float64s:
     """Width at half height a little behind each end, nan where the profile does not fall off on both sides."""
     half = np.ceil(1.2 * wall + 3)
     across = np.arange(-half, half + 0.1, 0.25)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from contour.polygon.start_vertex import Start
-from contour.tracing.tracing import Method
+from contour.tracing.trace import Method
 from service.config.values import FilePath, Model, Number, Point
 
 DEFAULT_METHOD: Method = "wall-tips"

@@ -101,7 +101,7 @@ def _numbers(result: CameraResult, board: Board, setup: Setup, sentinels: Sentin
         ("board", f"{board.kind}, {board.name_of_size} squares of {board.square_mm:g} mm"),
         ("board's pattern above the table", f"{setup.board_thickness_mm:g} mm"),
         ("views", f"{len(result.views)} used, turned against each other by up to {result.turn_deg:.0f}°"),
-        ("corners enclose", verdict.zones.told),
+        ("corners enclose", verdict.zones.text),
         (
             "contours outside of what corners enclose",
             "are taken, too" if sure.covered_px is None else "are refused (115 outside_work_area)",

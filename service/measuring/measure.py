@@ -10,16 +10,23 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.acceptance.acceptance import Finding, Limits, judge, judge_table, judge_without_block, other_blocks
+from contour.acceptance.acceptance import View, judge, judge_without_block
+from contour.acceptance.block_findings import other_blocks
 from contour.acceptance.error_budget import ErrorBudget, error_budget
+from contour.acceptance.findings import Finding, Limits
+from contour.acceptance.picture_findings import judge_table
+from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
+from contour.geometry.rectifier import CroppedRectifier, Rectifier
 from contour.geometry.rings import Contour, Ring, densified
+from contour.image.picture_check import check_picture
 from contour.image.region import Region
 from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
-from contour.tracing.tracing import Trace, TraceSettings, check_picture, trace
+from contour.tracing.trace import Trace, TraceSettings
+from contour.tracing.tracing import trace
 from service.config.recipes import Recipe
 from service.measuring.calibration_guard import CalibrationGuard, Rejection
 from service.measuring.measurement import Measurement
@@ -142,15 +149,16 @@ class Measurer:
             picture = look.picture
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
-        traced: Trace = trace(picture, trace_settings(recipe), region=region, rectifier=rectifier, on_stage=watch.lap)
+        checked = _checked_trace(picture, recipe, region, rectifier, watch)
+        traced = checked.trace
         result = replace(
-            result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour, quality=traced.quality
+            result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour, quality=checked.quality
         )
         polygon = self._polygon(traced.contour, recipe, thickness_mm, watch)
         sure_px = _uncertainty_px(traced, polygon)
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
         limits = self._limits(recipe)
-        findings = judge(polygon, (width, height), limits, traced=traced, region=region, budget=budget, picture=picture)
+        findings = judge(polygon, View((width, height), region, picture), limits, traced=checked, budget=budget)
         watch.lap("judge")
         return replace(
             result,
@@ -231,6 +239,20 @@ def _uncertainty_px(traced: Trace, polygon: Polygon) -> float | None:
     if traced.uncertainty_px is None:
         return None
     return float(np.hypot(traced.uncertainty_px, polygon.shift_px)) + polygon.given_up_px
+
+
+def _checked_trace(
+    picture: NDArray[np.uint8], recipe: Recipe, region: Region | None, rectifier: Rectifier | None, watch: _Stopwatch
+) -> CheckedTrace:
+    """The block traced in the region alone, and checked there, in pixels of the whole picture."""
+    if region is None:
+        traced = trace(picture, trace_settings(recipe), rectifier=rectifier, on_stage=watch.lap)
+        checked = check_trace(picture, traced, rectifier)
+        watch.lap("quality")
+        return checked
+    part, first = region.cut(picture)
+    within = None if rectifier is None else CroppedRectifier(rectifier, first)
+    return _checked_trace(part, recipe, None, within, watch).moved(first)
 
 
 def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from contour.errors import PictureError
+from contour.image.picture_check import check_picture
 from contour.image.taught_table import TaughtTable
-from contour.tracing.tracing import check_picture
 from service.atomic_file import write_whole
 
 VERSION = 1

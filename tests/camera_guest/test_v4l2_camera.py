@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from drivers.camera import CameraTimeout, CameraUnavailable
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.camera.v4l2.listing import list_cameras

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from contour.acceptance.acceptance import Refusal
+from contour.acceptance.findings import Refusal
 from service.cli.main import main
 from service.reasons import Language, Outcome, Reason
 from service.reasons_doc import page

@@ -103,7 +103,7 @@ def _tell(result: CameraResult, gathered: Gathered, share: float) -> None:
     print(f"lens      {result.model.name}, corners within {result.noise_px:.3f} px (one standard deviation)")
     print(f"camera    {position[2]:.0f} mm above the table, {verdict.mm_per_px:.4f} mm a pixel in the middle")
     tell_lengths(result.lengths, share)
-    print(f"coverage  corners enclose {verdict.zones.told}{_told_use(verdict.uncertainty)}")
+    print(f"coverage  corners enclose {verdict.zones.text}{_told_use(verdict.uncertainty)}")
     print(f"halves    two independent halves differ by {verdict.halves_mm[0].mean():.3f} mm on the table (mean)")
     print(f"verdict   {verdict.sentence}")
 

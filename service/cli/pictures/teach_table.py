@@ -41,7 +41,8 @@ def run(args: argparse.Namespace) -> int:
     """Take, average, check, write."""
     from contour.errors import NoBlockFound, PictureError
     from contour.image.taught_table import teach
-    from contour.tracing.tracing import TraceSettings, trace
+    from contour.tracing.trace import TraceSettings
+    from contour.tracing.tracing import trace
     from service.cli.file_names import check_outputs
     from service.cli.options.measuring import load_config_or_default
     from service.measuring.table_file import TableFileError, TableRecord, save_table

@@ -4,18 +4,20 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.acceptance.acceptance import Finding, Limits, Refusal, judge, judge_without_block
+from contour.acceptance.acceptance import View, judge, judge_without_block
 from contour.acceptance.error_budget import ErrorBudget
+from contour.acceptance.findings import Finding, Limits, Refusal
 from contour.acceptance.quality import Quality
+from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.rings import Contour
 from contour.image.region import Region
 from contour.polygon.polygon import Polygon
-from contour.tracing.tracing import Trace
+from contour.tracing.trace import Trace
 from contour.walls.comb_likeness import Comb
 from contour.walls.pieces import Piece
 from tests.support.pictures.rings import SQUARE
 
-FRAME = (640, 480)
+FRAME = View((640, 480))
 LIMITS = Limits(min_area_mm2=1000, max_area_mm2=20_000, max_vertices=10)
 
 
@@ -148,9 +150,11 @@ def test_an_uncertainty_that_nobody_knows_is_not_within_a_limit() -> None:
     assert judge(polygon(SQUARE * 10 + 100, mm_per_px=None), FRAME, limits) == ()
 
 
-def traced(**changes: object) -> Trace:
+def traced(quality: Quality | None = None, **changes: object) -> CheckedTrace:
     """A good trace of the good polygon."""
-    return replace(Trace("wall-tips", "bright", 24.0, GOOD.pixels), **changes)
+    return CheckedTrace(
+        replace(Trace("wall-tips", "bright", 24.0, GOOD.pixels, np.zeros((480, 640), np.uint8)), **changes), quality
+    )
 
 
 def test_a_contour_that_is_not_sure_within_two_cells_is_refused_whatever_the_recipe_allows() -> None:
@@ -168,11 +172,11 @@ def test_the_ring_that_the_polygon_was_made_of_must_keep_off_the_frame_too() -> 
 
 
 def test_a_contour_at_the_regions_edge_is_told_as_such() -> None:
-    (finding,) = judge(GOOD, FRAME, LIMITS, region=Region.of_box(50, 50, 201, 400))
+    (finding,) = judge(GOOD, replace(FRAME, region=Region.of_box(50, 50, 201, 400)), LIMITS)
     assert finding.refusal == Refusal.TOUCHES_BORDER
     assert "1.5 px" in finding.text
     assert "region of interest" in finding.text
-    assert judge(GOOD, FRAME, LIMITS, region=Region.of_box(50, 50, 202, 400)) == ()
+    assert judge(GOOD, replace(FRAME, region=Region.of_box(50, 50, 202, 400)), LIMITS) == ()
 
 
 def test_a_bad_picture_is_told_before_what_was_traced_in_it() -> None:
@@ -215,10 +219,11 @@ def test_where_cells_are_none_the_picture_is_judged_as_a_whole() -> None:
     blurred = np.zeros((300, 400), np.uint8)
     blurred[:, 200:] = 120
     blurred = np.asarray(cv2.GaussianBlur(blurred, (0, 0), 7.0), np.uint8)
+    view = replace(FRAME, picture=blurred)
     scattered = traced(comb=Comb(67.0, 18.0, True, 9, 0.15, 0.2))
-    reasons = [finding.refusal for finding in judge(GOOD, FRAME, LIMITS, traced=scattered, picture=blurred)]
+    reasons = [finding.refusal for finding in judge(GOOD, view, LIMITS, traced=scattered)]
     assert reasons == [Refusal.IMAGE_QUALITY, Refusal.NO_BLOCK_FOUND]
-    assert judge(GOOD, FRAME, LIMITS, traced=traced(), picture=blurred) == ()
+    assert judge(GOOD, view, LIMITS, traced=traced()) == ()
 
 
 def test_what_is_no_comb_is_no_block() -> None:

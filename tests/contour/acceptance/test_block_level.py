@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contour.acceptance.block_level import told_by_level
+from contour.acceptance.block_level import exclusive_levels
 
 SIDE = 60
 
@@ -25,7 +25,7 @@ def noise(low: int, high: int, seed: int, channels: tuple[int, ...] = ()) -> NDA
 
 def test_levels_apart_are_told() -> None:
     level, block, table = halves(noise(40, 60, 1), noise(120, 140, 2))
-    only_block, only_table = told_by_level(level, block, table)
+    only_block, only_table = exclusive_levels(level, block, table)
     assert np.mean(only_block[:, :SIDE] > 0) > 0.85
     assert np.mean(only_table[:, SIDE:] > 0) > 0.85
     assert not only_block[:, SIDE:].any()
@@ -34,14 +34,14 @@ def test_levels_apart_are_told() -> None:
 
 def test_levels_that_both_have_are_told_of_neither() -> None:
     level, block, table = halves(noise(40, 140, 1), noise(40, 140, 2))
-    assert not any(np.mean(mask > 0) > 0.02 for mask in told_by_level(level, block, table))
+    assert not any(np.mean(mask > 0) > 0.02 for mask in exclusive_levels(level, block, table))
 
 
 @pytest.mark.parametrize("channel", [0, 1, 2])
 def test_one_channel_of_colour_is_enough(channel: int) -> None:
     left, right = noise(90, 110, 1, (3,)), noise(90, 110, 2, (3,))
     right[..., channel] += 60
-    only_block, only_table = told_by_level(*halves(left, right))
+    only_block, only_table = exclusive_levels(*halves(left, right))
     assert np.mean(only_block[:, :SIDE] > 0) > 0.7
     assert np.mean(only_table[:, SIDE:] > 0) > 0.7
 
@@ -50,4 +50,4 @@ def test_hardly_a_sample_tells_nothing() -> None:
     level, block, _ = halves(noise(40, 60, 1), noise(120, 140, 2))
     few = np.zeros_like(block)
     few[0, -5:] = 255
-    assert not any(mask.any() for mask in told_by_level(level, block, few))
+    assert not any(mask.any() for mask in exclusive_levels(level, block, few))

@@ -16,6 +16,7 @@ from contour.acceptance.quality import (
     picture_faults,
     quality_faults,
 )
+from contour.walls.lightness import wall_light
 from tests.support.pictures.small_scenes import block
 
 LIMITS = QualityLimits()
@@ -24,7 +25,7 @@ GOOD = Quality(level=180.0, contrast=120.0, noise=1.5, blur_px=1.4, pitch_px=24.
 
 def measured(picture: np.ndarray, name: str = "rectangle", kind: str = "easy") -> Quality:
     rendered = block(name, kind)
-    return block_quality(picture, rendered.truth_px, rendered.pitch_px)
+    return block_quality(picture, wall_light(picture), rendered.truth_px, rendered.pitch_px)
 
 
 @pytest.mark.parametrize("kind", ["easy", "shop", "dim", "dark"])
@@ -87,7 +88,7 @@ def test_the_size_of_the_picture_does_not_matter() -> None:
     twice = cv2.resize(rendered.picture, None, fx=2, fy=2, interpolation=cv2.INTER_CUBIC)
     small = measured(rendered.picture)
     scaled = type(rendered.truth_px)(rendered.truth_px.exterior * 2 + 0.5)
-    large = block_quality(twice, scaled, 2 * rendered.pitch_px)
+    large = block_quality(twice, wall_light(twice), scaled, 2 * rendered.pitch_px)
     assert large.contrast == pytest.approx(small.contrast, rel=0.15)
     assert large.blur_px / large.pitch_px == pytest.approx(small.blur_px / small.pitch_px, rel=0.5)
 

@@ -6,12 +6,14 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.acceptance.acceptance import Refusal, judge_table
+from contour.acceptance.findings import Refusal
+from contour.acceptance.picture_findings import judge_table
 from contour.errors import CalibrationError, PictureError
 from contour.geometry.rings import Contour, hausdorff
 from contour.image.taught_table import TableLimits, TaughtTable, look_at, teach
 from contour.synthetic import area_coverage
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from tests.support.pictures.small_scenes import block
 
 LIMITS = TableLimits()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from contour.outline.fit import fit_ring
 from contour.outline.uncertainty import LEAST_PX, Coefficients, bound, ring_stretches, uncertainty
-from contour.tracing.tracing import TraceSettings
+from contour.tracing.trace import TraceSettings
 from contour.tracing.wall_tips import wall_tips
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, blob, circle, perimeter, rectangle, witnesses

@@ -24,7 +24,7 @@ from contour.synthetic import (
     signed_distance,
     with_holes,
 )
-from contour.tracing.tracing import Trace, TraceSettings
+from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
 
 SETTINGS = TraceSettings(method="wall-tips")

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from contour.synthetic import render
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from contour.walls.coarse_block import coarse_block
 from contour.walls.dark_material import dark_beyond, dark_edge, midway_to_table
 from tests.support.scenes.metrics import agreement

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from contour.geometry.rings import Contour, area
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from contour.walls.pieces import pieces_beside
 from tests.support.pictures.small_scenes import block
 

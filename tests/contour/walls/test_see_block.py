@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, PictureError
 from contour.synthetic import (
@@ -29,7 +30,7 @@ from contour.walls.cell_scale import probe
 from contour.walls.coarse_block import coarse_block
 from contour.walls.lightness import wall_light
 from contour.walls.see_block import see_block
-from contour.walls.wall_evidence import WitnessKind
+from contour.walls.wall_evidence import BlockEvidence, WitnessKind
 from contour.walls.wall_mask import wall_mask
 
 
@@ -67,10 +68,15 @@ def picture(
     )
 
 
+def seen_in(picture: NDArray[np.uint8], polarity: str) -> BlockEvidence:
+    """The block as it is seen in the picture's own light."""
+    return see_block(picture, wall_light(picture), polarity)
+
+
 @pytest.mark.parametrize("pitch_mm", [3.0, 5.0, 8.0, 14.0, 22.0])
 def test_the_pitch_is_read_from_the_picture(pitch_mm: float) -> None:
     rendered = picture(pitch_mm)
-    assert probe(wall_light(rendered.picture), "auto").pitch == pytest.approx(rendered.pitch_px, rel=0.1)
+    assert probe(wall_light(rendered.picture), "auto").pitch_px == pytest.approx(rendered.pitch_px, rel=0.1)
 
 
 @pytest.mark.parametrize("dark", [False, True])
@@ -80,7 +86,7 @@ def test_bright_and_dark_walls_are_told_apart(dark: bool) -> None:
 
 def test_the_polarity_can_be_fixed() -> None:
     with pytest.raises(NoBlockFound):
-        see_block(picture().picture, "dark")
+        seen_in(picture().picture, "dark")
 
 
 def test_the_mask_of_the_inverted_picture_is_the_same() -> None:
@@ -101,7 +107,7 @@ def test_the_mask_does_not_follow_the_light() -> None:
 @pytest.mark.parametrize("kind", ["honeycomb", "irregular", "foam", "perforated"])
 def test_witnesses_lie_on_the_outline(kind: str) -> None:
     rendered = picture(9.0, kind)
-    ring = see_block(rendered.picture, "auto").rings[0]
+    ring = seen_in(rendered.picture, "auto").rings[0]
     off = signed_distance(rendered.truth_px, ring.points)
     assert len(ring.points) > 20
     assert abs(float(np.median(off))) < 0.3
@@ -110,7 +116,7 @@ def test_witnesses_lie_on_the_outline(kind: str) -> None:
 
 
 def test_witnesses_come_in_order_with_outward_normals() -> None:
-    ring = see_block(picture().picture, "auto").rings[0]
+    ring = seen_in(picture().picture, "auto").rings[0]
     assert (np.diff(ring.position) >= 0).all()
     assert np.allclose(np.linalg.norm(ring.normal, axis=1), 1.0)
     middle = ring.points.mean(axis=0)
@@ -121,14 +127,14 @@ def test_witnesses_come_in_order_with_outward_normals() -> None:
 
 def test_no_stretch_of_the_outline_is_without_witness() -> None:
     rendered = picture()
-    ring = see_block(rendered.picture, "auto").rings[0]
+    ring = seen_in(rendered.picture, "auto").rings[0]
     edge = rendered.truth_px.exterior
     nearest = np.sqrt(((edge[:, None] - ring.points[None]) ** 2).sum(axis=2)).min(axis=1)
     assert np.mean(nearest > 1.2 * rendered.pitch_px) < 0.02
 
 
 def test_rings_turn_with_the_material_on_their_left() -> None:
-    exterior, hole = see_block(picture(hole=True).picture, "auto").rings
+    exterior, hole = seen_in(picture(hole=True).picture, "auto").rings
     for ring, sign in ((exterior, 1.0), (hole, -1.0)):
         following = np.roll(ring.coarse, -1, axis=0)
         area = (ring.coarse[:, 0] * following[:, 1] - following[:, 0] * ring.coarse[:, 1]).sum()
@@ -139,7 +145,7 @@ def test_rings_turn_with_the_material_on_their_left() -> None:
 
 def test_chips_and_dust_beside_the_block_are_no_witnesses() -> None:
     rendered = picture(clutter=True)
-    ring = see_block(rendered.picture, "auto").rings[0]
+    ring = seen_in(rendered.picture, "auto").rings[0]
     assert np.mean(signed_distance(rendered.truth_px, ring.points) < -1.5) < 0.03
 
 
@@ -148,7 +154,7 @@ def test_a_bright_perforated_table_is_not_taken_for_walls() -> None:
         BLOCK, camera(), CellGeometry(pitch_mm=8.0, wall_mm=0.6), table=Table(level=0.3, perforation_pitch_mm=12.0)
     )
     rendered = render(scene)
-    ring = see_block(rendered.picture, "auto").rings[0]
+    ring = seen_in(rendered.picture, "auto").rings[0]
     assert np.mean(np.abs(signed_distance(rendered.truth_px, ring.points)) < 1.5) > 0.75
 
 
@@ -162,7 +168,7 @@ def test_walls_as_bright_as_the_table_are_seen_by_colour() -> None:
         sensor=Sensor(colour=True),
     )
     rendered = render(scene)
-    ring = see_block(rendered.picture, "auto").rings[0]
+    ring = seen_in(rendered.picture, "auto").rings[0]
     assert np.mean(np.abs(signed_distance(rendered.truth_px, ring.points)) < 1.0) > 0.8
 
 
@@ -177,7 +183,7 @@ def test_outermost_walls_of_a_thick_dark_block_are_not_drawn_in_by_the_sides_it_
             table=Table(level=0.72),
         )
     )
-    ring = see_block(rendered.picture, "dark").rings[0]
+    ring = seen_in(rendered.picture, "dark").rings[0]
     outermost = ring.points[ring.kind == WitnessKind.OUTERMOST]
     assert abs(np.median(signed_distance(rendered.truth_px, outermost))) < 0.6
 
@@ -190,4 +196,4 @@ def test_an_empty_mask_is_no_block() -> None:
 @pytest.mark.parametrize("shape", [(600, 800, 4), (8, 800), (600,)])
 def test_an_unusable_array_is_an_error_that_names_its_shape(shape: tuple[int, ...]) -> None:
     with pytest.raises(PictureError, match=str(shape[0])):
-        see_block(np.zeros(shape, np.uint8), "auto")
+        seen_in(np.zeros(shape, np.uint8), "auto")

@@ -13,9 +13,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, Ring
 from contour.synthetic import densified
-from contour.tracing.tracing import Rectifier
 
 SPACING_PX = 0.5
 

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from contour.errors import ContourError
 from contour.geometry.rings import Contour
-from contour.tracing.tracing import TraceSettings, trace
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from tests.support.scenes.metrics import Agreement, agreement
 from tests.support.scenes.rivals import RIVALS, Hints, RivalFailed
 from tests.support.scenes.trials import OWN_METHODS, Stopwatch

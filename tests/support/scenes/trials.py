@@ -9,12 +9,14 @@ from typing import get_args
 
 import numpy as np
 
+from contour.acceptance.trace_check import check_trace
 from contour.calibration.calibration import CameraCalibration
 from contour.errors import ContourError, ParameterError
 from contour.geometry.rings import Contour
 from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import CameraModel, Rendered
-from contour.tracing.tracing import Method, TraceSettings, trace
+from contour.tracing.trace import Method, TraceSettings
+from contour.tracing.tracing import trace
 from tests.support.scenes.bench_scenes import BenchScene
 from tests.support.scenes.metrics import Agreement, agreement
 from tests.support.scenes.rivals import RIVALS, Hints, RivalFailed
@@ -89,6 +91,8 @@ def run_trial(scene: BenchScene, rendered: Rendered, method: str) -> Trial:
     watch.restart()
     try:
         found = trace(rendered.picture, settings, rectifier=rectifier, on_stage=watch.lap)
+        check_trace(rendered.picture, found, rectifier)
+        watch.lap("quality")
         polygon = cutting_polygon(
             found.contour,
             calibration,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.walls.coarse_threads import without_threads
+from contour.walls.coarse_block import without_threads
 
 
 def filled() -> np.ndarray:

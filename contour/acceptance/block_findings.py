@@ -1,0 +1,151 @@
+"""What speaks against a traced block: no comb, not all in view, not alone, or another than the picture shows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contour.acceptance.findings import Finding, Limits, Refusal
+from contour.acceptance.quality import QualityLimits, lost_in_noise
+from contour.acceptance.trace_check import CheckedTrace
+from contour.geometry.rings import Ring, area
+from contour.image.region import Region
+from contour.tracing.trace import Trace
+from contour.walls.comb_likeness import unlike_comb
+from contour.walls.pieces import Piece
+
+# Of what contour and busy region may be apart in one place, the share that they may be apart everywhere. Of 500
+# traceable scenes none lies farther outside than 0.19 pitches; outlines a cell too fat lie 0.33 or more in 98 of 100.
+_EVERYWHERE = 0.125
+# Cell pitches. As much as contour and busy part of the picture may be apart.
+_SURE_WITHIN_PITCHES = 2.0
+# Of two blocks whose areas differ by less than this the larger one is a matter of chance.
+_EQUAL_SHARE = 0.8
+
+
+def no_walls(traced: CheckedTrace | None, limits: QualityLimits) -> Finding | None:
+    """Walls that stand out too little from noise to be walls."""
+    if traced is None or traced.quality is None:
+        return None
+    why = lost_in_noise(traced.quality, limits)
+    return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
+
+
+def no_comb(traced: Trace | None) -> Finding | None:
+    """Cells that look like something else than a cut comb."""
+    if traced is None or traced.comb is None:
+        return None
+    why = unlike_comb(traced.comb)
+    return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
+
+
+def reaches_frame(traced: Trace | None) -> Finding | None:
+    """Walls in the last pixels of what was looked at."""
+    if traced is None or not traced.reaches_frame:
+        return None
+    return Finding(
+        Refusal.TOUCHES_BORDER,
+        "The block's walls go on to the last pixels of what was looked at: part of it may lie outside. Move the block "
+        "so that all of it is in view.",
+    )
+
+
+def touches_border(outlines: list[Ring], frame_size: tuple[int, int], border_px: float) -> Finding | None:
+    """Outlines within `border_px` of the picture's edges; `frame_size` is (width, height)."""
+    # Pixel (0, 0) is a centre: the frame's edges lie half a pixel outside the first and last ones. A ring reaches
+    # farthest at a vertex; the polygon leaves some out, so the ring that it was made of counts too.
+    lowest = np.min([outline.min(axis=0) for outline in outlines], axis=0)
+    highest = np.max([outline.max(axis=0) for outline in outlines], axis=0)
+    low, high = lowest + 0.5, np.asarray(frame_size) - 0.5 - highest
+    sides = {"left": low[0], "top": low[1], "right": high[0], "bottom": high[1]}
+    side = min(sides, key=lambda name: float(sides[name]))
+    if sides[side] > border_px:
+        return None
+    return Finding(
+        Refusal.TOUCHES_BORDER,
+        f"The contour comes within {max(float(sides[side]), 0.0):.1f} px of the picture's {side} edge, at least "
+        f"{border_px:g} px are needed. Move the block so that all of it is in view.",
+    )
+
+
+def touches_region(outlines: list[Ring], region: Region | None, border_px: float) -> Finding | None:
+    """Outlines within `border_px` of the region's border."""
+    if region is None:
+        return None
+    # A block that goes on outside of the region is cut by its border, along the last pixels' centres.
+    margin = min(region.margin(outline) for outline in outlines) + 0.5
+    if margin > border_px:
+        return None
+    return Finding(
+        Refusal.TOUCHES_BORDER,
+        f"The contour comes within {max(margin, 0.0):.1f} px of the edge of the region of interest, at least "
+        f"{border_px:g} px are needed. Move the block so that all of it lies in the region, or correct roi_px or "
+        "roi_mm.",
+    )
+
+
+def other_blocks(traced: Trace, limits: Limits) -> list[Piece]:
+    """The pieces beside the traced block for which it is refused, largest first."""
+    share = max(limits.block_share, _EQUAL_SHARE) if limits.pieces == "largest" else limits.block_share
+    return [piece for piece in traced.others if piece.area_px2 >= share * area(traced.contour)]
+
+
+def several_blocks(traced: Trace | None, limits: Limits) -> Finding | None:
+    """Another block beside the traced one."""
+    blocks = [] if traced is None else other_blocks(traced, limits)
+    if traced is None or not blocks:
+        return None
+    own = area(traced.contour)
+    left, top, right, bottom = blocks[0].box_px
+    seen = (
+        f"Beside the traced block of {own:.0f} px² lies another of {blocks[0].area_px2:.0f} px² "
+        f"(x {left} to {right}, y {top} to {bottom} px)" + (f", and {len(blocks) - 1} more" if blocks[1:] else "")
+    )
+    if limits.pieces == "largest":
+        return Finding(
+            Refusal.SEVERAL_BLOCKS,
+            f"{seen}. For pieces: largest others may reach {100 * _EQUAL_SHARE:.0f} % of it, else the largest is a "
+            "guess. Take one of them away.",
+        )
+    return Finding(
+        Refusal.SEVERAL_BLOCKS,
+        f"{seen}. The recipe allows one, and offcuts up to {100 * limits.block_share:g} % of it. Leave one block on "
+        "the table, or use a recipe with pieces: largest.",
+    )
+
+
+def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | None:
+    """Contour and busy part of the picture farther apart than `limit` pitches."""
+    if traced is None or traced.disagreement is None or limit is None:
+        return None
+    apart = traced.disagreement
+    advice = "Look at the overlay; check light and table, and that nothing lies against the block."
+    if apart.pitches > limit:
+        what = "takes for block what looks like table" if apart.claimed else "leaves out what looks like block"
+        x, y = apart.place_px
+        return Finding(
+            Refusal.METHODS_DISAGREE,
+            f"The contour {what} near ({x:.0f}, {y:.0f}) px, by {apart.pitches:.1f} cells, {limit:g} are allowed. "
+            f"{advice}",
+        )
+    if apart.outside_pitches > _EVERYWHERE * limit:
+        return Finding(
+            Refusal.METHODS_DISAGREE,
+            f"Most of the contour lies outside of what looks like block, by {apart.outside_pitches:.2f} cells, "
+            f"{_EVERYWHERE * limit:g} are allowed. {advice}",
+        )
+    return None
+
+
+def vague(traced: Trace | None) -> Finding | None:
+    """Whatever the recipe allows: beyond some cells it is not known which of them belong to the block."""
+    if traced is None or traced.uncertainty_px is None or not traced.pitch_px:
+        return None
+    cells = traced.uncertainty_px / traced.pitch_px
+    if cells <= _SURE_WITHIN_PITCHES:
+        return None
+    return Finding(
+        Refusal.UNCERTAINTY_TOO_LARGE,
+        f"The contour is sure within {traced.uncertainty_px:.1f} px only, {cells:.1f} cells, {_SURE_WITHIN_PITCHES:g} "
+        "are allowed: walls end far away from it. Look at the overlay; check light and table, and that no straight "
+        "light lines or cables lie in view.",
+    )

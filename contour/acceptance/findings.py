@@ -1,0 +1,63 @@
+"""Why a contour is refused, by the protocol's codes, and the limits it is held against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Literal
+
+from contour.acceptance.quality import QualityLimits
+from contour.calibration.position_uncertainty import PositionUncertainty
+from contour.geometry.rings import Ring
+
+
+class Refusal(IntEnum):
+    """Why a contour is refused; names and codes are the protocol's reject reasons."""
+
+    IMAGE_QUALITY = 102
+    SCENE_MOVED = 103
+    NO_BLOCK_FOUND = 110
+    TOUCHES_BORDER = 111
+    AREA_OUT_OF_LIMITS = 112
+    METHODS_DISAGREE = 113
+    UNCERTAINTY_TOO_LARGE = 114
+    OUTSIDE_WORK_AREA = 115
+    SEVERAL_BLOCKS = 116
+    TOO_MANY_POINTS = 130
+    SELF_INTERSECTING = 131
+
+    @property
+    def reason(self) -> str:
+        """The protocol's name, such as "no_block_found"."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a contour must keep to. Limits in millimetres do not apply without a calibration.
+
+    `work_area_mm` is a polygon in the machine frame, `sure` states the part of the picture that the calibration covers;
+    None = not checked, as are `max_uncertainty_mm` and `max_disagreement_pitches`.
+    `pieces` one: no other block may be in view; largest: a smaller one may. `block_share` of the traced block's area
+    makes another piece of comb a block, below that it is an offcut.
+    """
+
+    min_area_mm2: float = 0.0
+    max_area_mm2: float = float("inf")
+    max_vertices: int = 4000
+    border_px: float = 2.0
+    work_area_mm: Ring | None = None
+    sure: PositionUncertainty | None = None
+    max_uncertainty_mm: float | None = None
+    max_disagreement_pitches: float | None = None
+    pieces: Literal["one", "largest"] = "one"
+    block_share: float = 0.04
+    quality: QualityLimits = field(default_factory=QualityLimits)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One reason to refuse, and a sentence with what was seen, what is expected and what to do."""
+
+    refusal: Refusal
+    text: str

@@ -1,0 +1,55 @@
+"""What a picture says of a contour that was traced in it: how well it shows the walls, and where it says otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from contour.acceptance.disagreement import Disagreement, disagreement
+from contour.acceptance.quality import Quality, block_quality
+from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.rectifier import Rectifier
+from contour.geometry.rings import Contour, densified
+from contour.tracing.trace import Trace
+
+# A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
+_BENT_PITCHES = 5.0
+
+
+@dataclass(frozen=True)
+class CheckedTrace:
+    """A trace with what its picture says of it.
+
+    `quality` says how well its walls are seen. `disagreement` is the widest one with the busy part of the picture, None
+    without a pitch.
+    """
+
+    trace: Trace
+    quality: Quality | None = None
+    disagreement: Disagreement | None = None
+
+    def moved(self, first: Float64s) -> CheckedTrace:
+        """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
+        x, y = first.astype(int).tolist()
+        apart = None if self.disagreement is None else self.disagreement.moved(x, y)
+        return replace(self, trace=self.trace.moved(first), disagreement=apart)
+
+
+def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> CheckedTrace:
+    """The trace with its quality and its disagreement with the picture, (H, W) grey or (H, W, 3) BGR, uint8.
+
+    `picture` and `rectifier` are those it was traced with.
+    """
+    quality = block_quality(picture, traced.light, traced.contour, traced.pitch_px)
+    apart = None
+    if traced.pitch_px is not None:
+        apart = disagreement(picture, _bent(traced, traced.pitch_px, rectifier), traced.pitch_px)
+    return CheckedTrace(traced, quality, apart)
+
+
+def _bent(traced: Trace, pitch_px: float, rectifier: Rectifier | None) -> Contour:
+    """The contour with vertices every few cells, on the curves that a lens makes of its straight edges."""
+    if rectifier is None or traced.method != "wall-tips":
+        return traced.contour
+    step = _BENT_PITCHES * pitch_px
+    exterior, *holes = (rectifier.unrectify(densified(rectifier.rectify(ring), step)) for ring in traced.contour.rings)
+    return Contour(exterior, tuple(holes))

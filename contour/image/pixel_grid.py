@@ -1,0 +1,48 @@
+"""Pixels of a picture and samples of a coarser grid over it, each of which covers `step` x `step` pixels.
+
+Pixel (0, 0) and sample (0, 0) are centres: sample 0 covers pixels 0 to step − 1, so its centre lies between them.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import cv2
+import numpy as np
+
+from contour.geometry.arrays import Bools, Bytes, Float64s, Int64s
+
+Values = TypeVar("Values", Bytes, Bools)
+
+
+def pixels_of(samples: Float64s | Int64s, step: int) -> Float64s:
+    """Places in pixels of places in samples, any shape."""
+    return np.asarray((samples + 0.5) * step - 0.5, np.float64)
+
+
+def samples_of(pixels: Float64s, step: int) -> Float64s:
+    """Places in samples of places in pixels, any shape."""
+    return np.asarray((pixels + 0.5) / step - 0.5, np.float64)
+
+
+def averaged(picture: Bytes, step: int, border: int = cv2.BORDER_CONSTANT) -> Bytes:
+    """Mean over the pixels of each sample, (H, W); the last ones are filled up by a border of OpenCV's, constant 0."""
+    wide, high = -picture.shape[1] % step, -picture.shape[0] % step
+    even = cv2.copyMakeBorder(picture, 0, high, 0, wide, border, value=0)
+    size = (even.shape[1] // step, even.shape[0] // step)
+    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def whole_averaged(picture: Bytes, step: int) -> Bytes:
+    """Mean over the pixels of each sample, (H, W) or (H, W, 3), of those that lie in the picture whole."""
+    if step == 1:
+        return picture
+    size = (max(1, picture.shape[1] // step), max(1, picture.shape[0] // step))
+    # A whole number of pixels each: averaging them is several times faster then.
+    whole = picture[: size[1] * step, : size[0] * step]
+    return np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def enlarged(grid: Values, step: int, shape: tuple[int, ...]) -> Values:
+    """The grid's value at each pixel of a picture of `shape` (H, W)."""
+    return np.repeat(np.repeat(grid, step, axis=0), step, axis=1)[: shape[0], : shape[1]]

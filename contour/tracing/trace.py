@@ -1,0 +1,58 @@
+"""What to trace with, and what a method has traced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.rings import Contour
+from contour.image.region import shifted
+from contour.walls.comb_likeness import Comb
+from contour.walls.pieces import Piece
+
+Method = Literal["wall-tips", "sliding-matrix", "direct-scan", "find-contours"]
+Polarity = Literal["bright", "dark"]
+OnStage = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class TraceSettings:
+    """What to trace with. Sizes left at None follow from the picture's own cell pitch."""
+
+    method: Method = "wall-tips"
+    polarity: Literal["auto", "bright", "dark"] = "auto"
+    binarize: Literal["flat", "otsu"] | int = "flat"
+    edge: Literal["cut", "cells"] = "cut"
+    core_px: int | None = None
+    step_px: int | None = None
+    threshold: float | None = None
+    max_gap_px: int | None = None
+    min_width_px: int | None = None
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A traced contour in pixels: exterior counter-clockwise as seen in the work frame, so negative by the shoelace.
+
+    `light` is the channel in which its walls were seen, (H, W), uint8, of what was looked at. `others` are pieces of
+    comb beside it, `comb` what a cut block's cells look like (None where no method looked).
+    `reaches_frame`: its walls go on to the last pixels of what was looked at.
+    """
+
+    method: Method
+    polarity: Polarity
+    pitch_px: float | None
+    contour: Contour
+    light: Bytes = field(compare=False, repr=False)
+    uncertainty_px: float | None = None
+    others: tuple[Piece, ...] = ()
+    comb: Comb | None = None
+    reaches_frame: bool = False
+
+    def moved(self, first: Float64s) -> Trace:
+        """The trace in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
+        x, y = first.astype(int).tolist()
+        others = tuple(piece.moved(x, y) for piece in self.others)
+        return replace(self, contour=shifted(self.contour, first), others=others)

@@ -1,0 +1,222 @@
+"""Witnesses of a block's outline: where its material ends, wall by wall, to a fraction of a pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry.arrays import Bytes, Float64s
+from contour.image.pixel_grid import pixels_of, samples_of
+from contour.walls.cell_scale import CellScale
+from contour.walls.coarse_rings import CoarseBlock
+from contour.walls.dark_material import dark_beyond
+from contour.walls.end_profile import EndModel, centred_axes, fit_ends, true_width
+from contour.walls.wall_ends import Chains, edge_chains, find_ends, outermost
+from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WallPoints, WitnessKind
+from contour.walls.wall_mask import WallMask
+from contour.walls.wall_parallax import Parallax, parallax
+
+# Sharpest and softest blur that a lens in use leaves; outside of it the fit has seen something else.
+_BLUR_PX = (0.4, 3.0)
+_USUAL_BLUR_PX = 0.9
+# A second witness within this of another says nothing new.
+_LONELY_PITCHES = 0.3
+_MOST_SIGMA_PX = 1.0
+# Of the usual height: fainter ends are not ends of walls.
+_LEAST_HEIGHT = 0.4
+# What blunter things than noise do to clean ends and to blunt ones, and to sides fitted and not.
+_MODEL_SIGMA_PX = (0.2, 0.3)
+_SIDE_SIGMA_PX = (0.5, 1.0)
+_NEAR_PX = 1.5
+_FAINT_HEIGHT = 0.45
+_FAINT_SIGMA_PX = 3.0
+# How far the edge of dark material is looked for from the last wall seen in it, and how near is the wall's own edge.
+_DARK_PITCHES = 4.0
+_INSIDE_PITCHES, _ENDS_INSIDE_PITCHES = 0.4, 0.25
+_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES = 1.0, 0.07
+# What the mask's own light blur (3 × 3) adds.
+_MASK_BLUR_PX = 0.8
+_WALL_POINTS_PER_PITCH = 8
+# Walls farther inside than this are no part of the boundary towards the table, the dents of open cells included.
+_WALLS_INSIDE = 1.1
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """Ends in picture pixels before they are fitted: tip, axis and outward normal (N, 2), straight wall behind (N,)."""
+
+    tip: Float64s
+    axis: Float64s
+    normal: Float64s
+    straight: Float64s
+
+
+@dataclass(frozen=True)
+class _Witnesses:
+    points: Float64s
+    kind: NDArray[np.int8]
+    sigma: Float64s
+
+
+def block_evidence(
+    light: Bytes, seen: WallMask, coarse: CoarseBlock, cells: CellScale, scale: int, midway: float | None
+) -> BlockEvidence:
+    """What the walls of a block say of its outline, in picture pixels.
+
+    `light` is the picture's, `seen` and `coarse` are of one `scale` times smaller. `midway`: as `midway_to_table` says.
+    """
+    pitch_px, wall = cells.pitch_px / scale, max(1.0, cells.wall_px / scale)
+    chains = edge_chains(seen.mask, coarse, pitch_px)
+    found = find_ends(chains, coarse, pitch_px, wall)
+    outer = chains.points[outermost(chains, coarse, pitch_px)]
+    sign = 1.0 if cells.bright else -1.0
+    straight = found.straight * scale
+    tip, axis = centred_axes(
+        light, pixels_of(found.tip, scale), found.axis, wall=cells.wall_px, straight=straight, sign=sign
+    )
+    depth = parallax(light, tip, axis, straight=straight, wall=cells.wall_px, sign=sign)
+    if depth.width is not None:
+        # The top is the half of the band that lies away from the picture's middle.
+        across = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
+        tip = tip + 0.5 * depth.across(tip, across)[:, None] * across
+    ends = _Ends(tip, axis, coarse.feet(found.tip)[2], straight)
+    model = _learnt(light, ends, cells, depth.width or cells.wall_px, seen)
+    tips = _tips(light, ends, cells, model)
+    dark = None if midway is None else _Dark(light, midway, cells.pitch_px)
+    if dark is not None:
+        normal = coarse.feet(samples_of(tips.points, scale))[2]
+        # A clean end is where the wall ends; what is dark beyond it is the block's shadow.
+        faded = (depth.across(tips.points, normal) >= 0.0) & (tips.kind != WitnessKind.CLEAN)
+        least = np.where(faded, _ENDS_INSIDE_PITCHES * cells.pitch_px, np.inf)
+        tips = _to_the_table(dark, tips, tips.points, normal, least)
+    tips = replace(tips, points=_raised(tips.points, coarse.feet(samples_of(tips.points, scale))[2], depth))
+    outer = outer[_nearest(outer, samples_of(tips.points, scale)) > _LONELY_PITCHES * pitch_px]
+    normal, place = coarse.feet(outer)[2], pixels_of(outer, scale)
+    sides = _sides(light, place, normal, depth.width or cells.wall_px, model)
+    if dark is not None:
+        faint = (sides.sigma >= _FAINT_SIGMA_PX) & (depth.across(place, normal) >= 0.0)
+        least = np.where(faint, _INSIDE_PITCHES * cells.pitch_px, np.inf)
+        sides = _to_the_table(dark, sides, place, normal, least)
+    sides = replace(sides, points=_raised(sides.points, normal, depth))
+    polarity = "bright" if cells.bright else "dark"
+    return BlockEvidence(
+        _rings(coarse, tips, sides, _walls(chains, coarse, pitch_px), depth, scale),
+        cells.pitch_px,
+        cells.wall_px,
+        polarity,
+        model.blur,
+        seen.noise,
+        seen.contrast,
+        coarse.leaves,
+    )
+
+
+def _learnt(light: Bytes, ends: _Ends, cells: CellScale, wall: float, seen: WallMask) -> EndModel:
+    """What the straightest ends say of all: blur, usual height, and the true width of walls that measure `wall`."""
+    model = EndModel(
+        width=true_width(wall, float(np.hypot(_USUAL_BLUR_PX, _MASK_BLUR_PX))),
+        blur=_USUAL_BLUR_PX,
+        height=None,
+        noise=seen.noise,
+        reach=float(np.clip(0.3 * cells.pitch_px, 2.5, 2 * cells.wall_px + 4)),
+        out=float(np.clip(0.25 * cells.pitch_px, 3.0, 6.0)),
+        sign=1.0 if cells.bright else -1.0,
+    )
+    longest = np.argsort(-ends.straight)[: max(5, min(64, len(ends.tip) // 2))]
+    if not len(longest):
+        return replace(model, height=max(seen.contrast, 1.0))
+    free = fit_ends(light, ends.tip[longest], ends.axis[longest], ends.normal[longest], replace(model, blur_free=True))
+    blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
+    width = true_width(wall, float(np.hypot(blur, _MASK_BLUR_PX)))
+    return replace(model, width=width, blur=blur, height=max(float(np.median(free.height)), 1.0))
+
+
+def _tips(light: Bytes, ends: _Ends, cells: CellScale, model: EndModel) -> _Witnesses:
+    """Fitted wall ends; those too faint or too unsure are left out."""
+    fitted = fit_ends(light, ends.tip, ends.axis, ends.normal, model)
+    good = (fitted.sigma < _MOST_SIGMA_PX) & (fitted.height > _LEAST_HEIGHT * (model.height or 1.0))
+    clean = ends.straight > 2 * cells.wall_px + 2
+    sigma = np.hypot(np.where(clean, *_MODEL_SIGMA_PX), fitted.sigma)
+    kind = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
+    return _Witnesses(fitted.point[good], kind[good], sigma[good])
+
+
+def _sides(light: Bytes, place: Float64s, normal: Float64s, wall: float, model: EndModel) -> _Witnesses:
+    """Outermost wall points, moved along the outline's normal to half height where that is near; `wall` is the width
+    of walls at half height.
+    """
+    across = replace(model, width=1.0, reach=min(model.reach, wall))
+    fitted = fit_ends(light, place, normal, normal, across)
+    near = np.abs(((fitted.point - place) * normal).sum(axis=1)) < _NEAR_PX
+    # Beside a thin wall half height lies outside of it, at its corners and ends inside: a third of the way is left.
+    fat = (wall - model.width) / 6
+    points = np.where(near[:, None], fitted.point, place) - fat * normal
+    sigma = np.where(near, *_SIDE_SIGMA_PX)
+    # The outer side of the block, where it is in view below its top, is fainter than any wall.
+    sigma = np.where(fitted.height < _FAINT_HEIGHT * (model.height or 1.0), _FAINT_SIGMA_PX, sigma)
+    kind = np.full(len(place), WitnessKind.OUTERMOST, np.int8)
+    return _Witnesses(points, kind, sigma)
+
+
+@dataclass(frozen=True)
+class _Dark:
+    """Dark material: the light it is seen in, the level midway from it to the table, its cells' pitch."""
+
+    light: Bytes
+    midway: float
+    pitch_px: float
+
+
+def _to_the_table(dark: _Dark, seen: _Witnesses, place: Float64s, normal: Float64s, least: Float64s) -> _Witnesses:
+    """Witnesses at `place`, with those that lie inside of dark material by `least` (N,) pixels or more, where its walls
+    show no more, moved out to its edge.
+    """
+    beyond = dark_beyond(dark.light, place, normal, midway=dark.midway, reach=_DARK_PITCHES * dark.pitch_px)
+    moved = (beyond > least) & np.isfinite(beyond)
+    edge = place + np.where(moved, beyond, 0.0)[:, None] * normal
+    points = np.where(moved[:, None], edge, seen.points)
+    sigma = np.where(moved, max(_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES * dark.pitch_px), seen.sigma)
+    return _Witnesses(points, np.where(moved, np.int8(WitnessKind.OUTERMOST), seen.kind), sigma)
+
+
+def _raised(points: Float64s, normal: Float64s, depth: Parallax) -> Float64s:
+    """Points moved from the lower edge of the block's outer side up to its top, where that side is in view."""
+    return (
+        points + np.minimum(depth.across(points, normal), 0.0)[:, None] * normal if depth.width is not None else points
+    )
+
+
+def _nearest(points: Float64s, others: Float64s) -> Float64s:
+    """Distance from each of `points` (N, 2) to the nearest of `others` (M, 2), shape (N,); inf where there is none."""
+    if not len(others) or not len(points):
+        return np.full(len(points), np.inf)
+    square = ((points[:, None, :] - others[None, :, :]) ** 2).sum(axis=2)
+    return np.asarray(np.sqrt(square.min(axis=1)), np.float64)
+
+
+def _walls(chains: Chains, coarse: CoarseBlock, pitch_px: float) -> Float64s:
+    """Points of the walls' boundary near the coarse edge, shape (K, 2), mask pixels."""
+    points = chains.points[:: max(1, round(pitch_px / _WALL_POINTS_PER_PITCH))]
+    return points[coarse.depth_at(points) < _WALLS_INSIDE * pitch_px]
+
+
+def _rings(
+    coarse: CoarseBlock, tips: _Witnesses, sides: _Witnesses, walls: Float64s, depth: Parallax, scale: int
+) -> tuple[RingEvidence, ...]:
+    """All witnesses, each at its nearest ring, in order along it, and the walls about it."""
+    points = np.concatenate([tips.points, sides.points])
+    kind, sigma = np.concatenate([tips.kind, sides.kind]), np.concatenate([tips.sigma, sides.sigma])
+    ring, arc, normal = coarse.feet(samples_of(points, scale))
+    beside, foot, across = coarse.feet(walls)
+    wall_points = WallPoints(_raised(pixels_of(walls, scale), across, depth), foot * scale, across)
+    evidence = []
+    for number, one in enumerate(coarse.rings):
+        mine = np.flatnonzero(ring == number)
+        mine = mine[np.argsort(arc[mine], kind="stable")]
+        vertices = pixels_of(one.vertices, scale)
+        arcs = arc[mine] * scale
+        seen = (points[mine], arcs, normal[mine], sigma[mine], kind[mine], wall_points.take(beside == number))
+        evidence.append(RingEvidence(vertices, one.is_hole, *seen))
+    return tuple(evidence)

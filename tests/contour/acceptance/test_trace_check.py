@@ -1,0 +1,60 @@
+"""What a picture says of a trace, in the pixels that the trace is in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contour.acceptance.disagreement import disagreement
+from contour.acceptance.quality import block_quality
+from contour.acceptance.trace_check import check_trace
+from contour.geometry.rectifier import CroppedRectifier
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
+from tests.support.pictures.small_scenes import block
+
+
+class Magnifier:
+    """A plane twice as large as the picture."""
+
+    def rectify(self, points_px: np.ndarray) -> np.ndarray:
+        return 2.0 * points_px
+
+    def unrectify(self, points: np.ndarray) -> np.ndarray:
+        return 0.5 * points
+
+
+def test_a_trace_is_checked_by_quality_and_disagreement_of_its_own_picture() -> None:
+    picture = block("rectangle").picture
+    traced = trace(picture, TraceSettings())
+    checked = check_trace(picture, traced, None)
+    assert checked.trace is traced
+    assert checked.quality == block_quality(picture, picture, traced.contour, traced.pitch_px)
+    assert traced.pitch_px is not None
+    assert checked.disagreement == disagreement(picture, traced.contour, traced.pitch_px)
+
+
+def test_without_a_pitch_there_is_no_second_account() -> None:
+    picture = block("rectangle").picture
+    checked = check_trace(picture, replace(trace(picture, TraceSettings()), pitch_px=None), None)
+    assert checked.quality is not None
+    assert checked.disagreement is None
+
+
+def test_moved_moves_the_contour_and_the_place_of_disagreement() -> None:
+    picture = block("rectangle").picture
+    checked = check_trace(picture, trace(picture, TraceSettings()), None)
+    moved = checked.moved(np.array([30.0, 20.0]))
+    assert checked.disagreement is not None
+    assert moved.disagreement is not None
+    assert np.allclose(np.subtract(moved.disagreement.place_px, checked.disagreement.place_px), [30, 20])
+    assert np.array_equal(moved.trace.contour.exterior, checked.trace.contour.exterior + np.array([30.0, 20.0]))
+    assert moved.quality == checked.quality
+
+
+def test_a_cropped_rectifier_counts_pixels_from_the_parts_first_one() -> None:
+    points = np.array([[3.0, 4.0], [5.5, 6.0]])
+    part = CroppedRectifier(Magnifier(), np.array([10.0, 20.0]))
+    assert part.rectify(points).tolist() == [[26.0, 48.0], [31.0, 52.0]]
+    assert part.unrectify(part.rectify(points)).tolist() == points.tolist()

@@ -20,6 +20,7 @@ from contour.acceptance.quality import Quality
 from contour.geometry.rings import Contour
 from drivers.camera import Frame
 from drivers.controller.mailbox.mailbox import Page
+from drivers.controller.mailbox.page_text import pages_from_text
 from service.config.mistakes import describe
 from service.config.recipes import Recipe
 from service.link.contour_message import Envelope
@@ -31,7 +32,7 @@ from service.measuring.table_file import TableFileError, TableRecord, load_table
 from service.reasons import Reason
 from service.records.archive import DRAFT, PLAIN_FRAME, TABLES, document_of, folder_of
 from service.records.evidence import FRAME, VERSION, Evidence
-from service.records.journal import Job, pages_from_text
+from service.records.journal import Job
 
 LARGEST_DOCUMENT = 200_000_000
 

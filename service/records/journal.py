@@ -10,23 +10,19 @@ import json
 import os
 import secrets
 import sqlite3
-import sys
 import threading
-from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from drivers.controller.mailbox.mailbox import Page, ServiceBlock
+from drivers.controller.mailbox.page_text import pages_from_text, pages_to_text
 from service.reasons import Outcome, Reason
 from service.records.journal_schema import COLUMNS, SCHEMA_VERSION, TABLES, migration
 
-HEADER_REGISTERS = 31
-PAYLOAD_LENGTH = 6  # where a header, which begins with offset 1, says how many registers of payload follow
 LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
 LARGEST_OWNER = 0xFFFF
 LATER = 32768  # a trigger counter that is less ahead than this is later, one that is more is earlier
@@ -557,32 +553,3 @@ def _fields(text: str | None) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise ValueError(f"{text!r} has no fields")
     return found
-
-
-def pages_to_text(pages: tuple[Page, ...]) -> str:
-    """Pages one after the other, header then payload, four hexadecimal digits a register."""
-    registers = array("H", chain.from_iterable(chain(page.header, page.payload) for page in pages))
-    if sys.byteorder == "little":
-        registers.byteswap()
-    return registers.tobytes().hex()
-
-
-def pages_from_text(text: str) -> tuple[Page, ...]:
-    """The pages that `pages_to_text` wrote; each header says where its page ends. None where the text was damaged."""
-    try:
-        registers = array("H", bytes.fromhex(text))
-    except ValueError:
-        return ()
-    if sys.byteorder == "little":
-        registers.byteswap()
-    pages, start = [], 0
-    while start < len(registers):
-        body = start + HEADER_REGISTERS
-        if body > len(registers):
-            return ()
-        end = body + registers[start + PAYLOAD_LENGTH]
-        if end > len(registers):
-            return ()
-        pages.append(Page(tuple(registers[start:body]), tuple(registers[body:end])))
-        start = end
-    return tuple(pages)

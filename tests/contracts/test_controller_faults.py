@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 import socket
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -22,7 +21,6 @@ from drivers.controller import (
     ServiceBlock,
 )
 from drivers.controller.modbus.client import ModbusTcpController, RequestLimits
-from drivers.controller.modbus.library_log import LIBRARY_LOGGER
 from drivers.controller.modbus.request_queue import Connection
 from tests.support.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 
@@ -443,10 +441,9 @@ async def test_the_queue_behind_a_failed_request_fails_too_and_sends_nothing(
     assert len(server.requests) == 1
 
 
-async def test_the_library_does_not_dump_frames_into_the_log(
+async def test_faults_are_raised_and_not_logged(
     connect: Callable, server: MisbehavingServer, caplog: pytest.LogCaptureFixture
 ) -> None:
-    logging.getLogger(LIBRARY_LOGGER).setLevel(logging.NOTSET)  # as before any driver was made
     controller = await connect(timeout_s=IMPATIENT_S)
     server.behave = server.be_silent
     with pytest.raises(ControllerTimeout):

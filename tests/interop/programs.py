@@ -107,6 +107,15 @@ def pymodbustcp(registers: int = 10_000) -> Iterator[tuple[subprocess.Popen[str]
 
 
 @contextlib.contextmanager
+def pymodbus(
+    way: str = "tcp", device: str = "-", registers: int = 10_000
+) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A pymodbus server: "tcp" or "rtu-over-tcp" on loopback, and its port, or "rtu" on the serial port `device`."""
+    with running(sys.executable, HERE / "pymodbus_server.py", way, device, str(registers)) as started:
+        yield started
+
+
+@contextlib.contextmanager
 def modbus_serial(registers: int = 10_000) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """A server of npm's modbus-serial on loopback, and its port."""
     node = need_program("node", NODE_INSTALL)
@@ -118,7 +127,12 @@ def modbus_serial(registers: int = 10_000) -> Iterator[tuple[subprocess.Popen[st
         yield started
 
 
-TCP_SERVERS = {"libmodbus": libmodbus_tcp, "pyModbusTCP": pymodbustcp, "modbus-serial": modbus_serial}
+TCP_SERVERS = {
+    "libmodbus": libmodbus_tcp,
+    "pyModbusTCP": pymodbustcp,
+    "modbus-serial": modbus_serial,
+    "pymodbus": pymodbus,
+}
 
 
 def mbpoll_reads(address: int, count: int, *where: str) -> list[int]:

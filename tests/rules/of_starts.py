@@ -18,6 +18,7 @@ from tests.rules.rule import (
     JOURNAL,
     LINK,
     OWNERSHIP,
+    PAGE_TEXT,
     TRANSFER,
     Rule,
 )
@@ -33,10 +34,10 @@ RULES = (
     ),
     Rule(
         "Own start: sent again bit-identical where the journal holds the pages",
-        f"{JOURNAL}::pages_from_text",
+        f"{PAGE_TEXT}::pages_from_text",
         f"{IN_RESUMING}::test_a_sent_job_is_sent_again_bit_identical",
-        "end = body + registers[start + PAYLOAD_LENGTH]",
-        "end = body + registers[start + PAYLOAD_LENGTH] - 1",
+        'end = body + header_value(header, "payload_length")',
+        'end = body + header_value(header, "payload_length") - 1',
     ),
     Rule(
         "Own start: a withdrawal that was cut short is finished, with its first reason",

@@ -12,9 +12,9 @@ from drivers.camera.v4l2 import kernel_interface as v4l2
 from drivers.camera.v4l2.controls import apply_controls, exposure_s
 from drivers.camera.v4l2.device import TELL_WHAT_IT_IS, Device
 from drivers.camera.v4l2.exposure import STAMP_ARRIVAL, FrameTiming
-from drivers.camera.v4l2.formats import PictureFormat, set_format, set_frame_rate
+from drivers.camera.v4l2.formats import set_format, set_frame_rate
 from drivers.camera.v4l2.identity import CameraIdentity, identify
-from drivers.camera.v4l2.pixels import bytes_needed, to_pixels
+from drivers.camera.v4l2.pixels import PictureFormat, bytes_needed, to_pixels
 from drivers.camera.v4l2.signal_input import select_input
 from drivers.camera.v4l2.stream import BUFFERS, Filled, Stream
 

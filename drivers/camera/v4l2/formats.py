@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from drivers.camera import CameraRefused
 from drivers.camera.v4l2 import kernel_interface as v4l2
 from drivers.camera.v4l2.device import Device, enumerated
-from drivers.camera.v4l2.pixels import LAYOUTS
+from drivers.camera.v4l2.pixels import LAYOUTS, PictureFormat
 
 RATE_TOLERANCE = 0.01  # drivers round 29.97 to 30
 
@@ -39,17 +39,6 @@ class FormatInfo:
     def usable(self) -> bool:
         """True where frames of this format can be turned into pixels here."""
         return self.code in LAYOUTS
-
-
-@dataclass(frozen=True)
-class PictureFormat:
-    """The format that the device was set to. bytes_per_line: distance of two rows; 0 = compressed."""
-
-    code: str
-    width: int
-    height: int
-    bytes_per_line: int
-    bytes_per_picture: int
 
 
 def list_formats(device: Device) -> list[FormatInfo]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mmap
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -12,9 +11,6 @@ from numpy.typing import NDArray
 
 from drivers.camera import FrameUnusable
 from drivers.camera.files.decode import decode_picture
-
-if TYPE_CHECKING:
-    from drivers.camera.v4l2.formats import PictureFormat
 
 
 @dataclass(frozen=True)
@@ -37,6 +33,17 @@ LAYOUTS = {
     "MJPG": Layout(0),
     "JPEG": Layout(0),
 }
+
+
+@dataclass(frozen=True)
+class PictureFormat:
+    """The format that the device was set to. bytes_per_line: distance of two rows; 0 = compressed."""
+
+    code: str
+    width: int
+    height: int
+    bytes_per_line: int
+    bytes_per_picture: int
 
 
 def bytes_needed(layout: PictureFormat) -> int:

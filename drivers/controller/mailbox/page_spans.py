@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Sequence
 
-from drivers.controller.mailbox.pages import HEADER_FIELDS, HEADER_REGISTERS, REGISTERS_PER_POINT
+from drivers.controller.mailbox.pages import HEADER_FIELDS, HEADER_REGISTERS, REGISTERS_PER_POINT, header_value
 
 PAYLOAD_OFFSET = 1 + HEADER_REGISTERS
 _HEADER_STARTS = [field.offset for field in HEADER_FIELDS if field.name not in ("min_y", "max_y")]
@@ -17,8 +17,8 @@ def page_starts(header: Sequence[int], payload_length: int) -> list[int]:
     header: offsets 1…31. Where it contradicts itself, as a torn one that was read back does, the payload rules.
     """
     end = PAYLOAD_OFFSET + payload_length
-    page, ring_count = header[3], header[5]
-    table_end = min(end, PAYLOAD_OFFSET + (2 * ring_count if page == 1 else 0))
+    table_length = 2 * header_value(header, "ring_count") if header_value(header, "page") == 1 else 0
+    table_end = min(end, PAYLOAD_OFFSET + table_length)
     table = range(PAYLOAD_OFFSET, table_end, 2)
     return [*_HEADER_STARTS, *table, *range(table_end, end, REGISTERS_PER_POINT), end]
 
@@ -26,7 +26,7 @@ def page_starts(header: Sequence[int], payload_length: int) -> list[int]:
 def header_spans(longest: int) -> list[tuple[int, int]]:
     """Offset and count of the requests that read the header, `transfer` with it; every count is even.
 
-    `line_check.py` tells its own reads from these by their odd counts.
+    `late_replies.py` tells its own reads from these by their odd counts.
     """
     return spans([0, *_HEADER_STARTS, PAYLOAD_OFFSET], longest // 2 * 2)
 

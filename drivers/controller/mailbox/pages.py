@@ -74,6 +74,7 @@ HEADER_FIELDS = fields(
 )
 HEADER_NAMES = tuple(field.name for field in HEADER_FIELDS)
 _UNPACK_HEADER = Unpacking(HEADER_FIELDS)
+_PLACES = {field.name: slice(field.offset - 1, field.offset - 1 + field.width) for field in HEADER_FIELDS}
 
 
 def micrometres(ring_mm: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -126,18 +127,27 @@ def withdrawal(job_id: int, session: int, word_order: WordOrder) -> Page:
 def crc32_of(header: Sequence[int], payload: Sequence[int]) -> int:
     """CRC-32 (IEEE 802.3, as zlib's) of a page: its header with the CRC's own two registers as 0, then its payload.
 
-    header: 31 registers, so offset n stands at n − 1. Each register goes in big-endian, in address order.
+    header: 31 registers, offsets 1…31. Each register goes in big-endian, in address order.
     """
     if len(header) != HEADER_REGISTERS:
         raise MailboxError(f"a header has {len(header)} registers, expected {HEADER_REGISTERS} (offsets 1 to 31)")
     registers = np.asarray([*header, *payload], dtype=">u2")
-    registers[7:9] = 0
+    registers[_PLACES["crc32"]] = 0
     return zlib.crc32(registers.tobytes())
 
 
 def decode_header(page: Page, word_order: WordOrder) -> dict[str, int]:
     """The values of a page's header by name."""
     return _UNPACK_HEADER((0, *page.header), word_order)
+
+
+def header_value(header: Sequence[int], name: str) -> int:
+    """The value of one register by its name, from a header that may be torn.
+
+    header: 31 registers, offsets 1…31. ValueError: the value takes two registers, whose order is another matter.
+    """
+    (value,) = header[_PLACES[name]]
+    return value
 
 
 def _check_ring(ring: NDArray[np.integer], number: int) -> None:

@@ -8,7 +8,7 @@ import select
 import time
 from collections.abc import Callable
 
-from drivers.controller.modbus.looking import LOOK_S, Looking
+from drivers.controller.modbus.reply_waiting import SPIN_S, Spinning
 
 # A reply has at most 260 bytes. asyncio's own transports ask for 256 KiB at each read: 10 µs more a request.
 CHUNK = 4096
@@ -36,7 +36,7 @@ class ByteChannel:
         self._closed = False
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(descriptor, self._read)
-        self._looking = Looking()
+        self._spinning = Spinning()
         self._poll = select.poll()
         self._poll.register(descriptor, select.POLLIN)
 
@@ -61,17 +61,17 @@ class ByteChannel:
         """True where something came within `longest_s`, which the receiver has by then. It holds the event loop."""
         if self._closed or self._unsent:
             return False
-        if not (self._looking.worth() and self._looked()) and not self._poll.poll(1000 * longest_s):
+        if not (self._spinning.worth() and self._spun()) and not self._poll.poll(1000 * longest_s):
             return False
         self._read()
         return True
 
-    def _looked(self) -> bool:
+    def _spun(self) -> bool:
         poll, monotonic = self._poll.poll, time.monotonic
-        until = monotonic() + LOOK_S
+        until = monotonic() + SPIN_S
         while not (came := bool(poll(0))) and monotonic() < until:
             pass
-        self._looking.ended(came)
+        self._spinning.ended(came)
         return came
 
     def close(self) -> None:

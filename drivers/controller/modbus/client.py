@@ -20,8 +20,7 @@ from drivers.controller.mailbox.mailbox import (
     encode_service,
 )
 from drivers.controller.mailbox.page_spans import PAYLOAD_OFFSET, header_spans, page_starts, spans
-from drivers.controller.modbus.late_replies import check_line
-from drivers.controller.modbus.library_log import cap_library_log
+from drivers.controller.modbus.late_replies import outlast_late_replies
 from drivers.controller.modbus.request_queue import Connection
 from drivers.controller.modbus.requests import (
     Request,
@@ -34,7 +33,7 @@ from drivers.controller.modbus.requests import (
     write_registers,
 )
 from drivers.controller.modbus.serial_line import Rs485, SerialLine
-from drivers.controller.modbus.transports import RtuOverTcpWire, RtuWire, TcpWire, Wire
+from drivers.controller.modbus.transports import RtuOverTcpTransport, RtuTransport, TcpTransport, Transport
 
 __all__ = [
     "MailboxLayout",
@@ -53,11 +52,11 @@ LATE_REPLIES = 4  # that one `connect` gets out of the way
 
 
 class ModbusController:
-    """The Controller role over `wire`; see `Controller` for what is raised."""
+    """The Controller role over `transport`; see `Controller` for what is raised."""
 
     def __init__(
         self,
-        wire: Wire,
+        transport: Transport,
         device_id: int = 1,
         layout: MailboxLayout | None = None,
         timeout_s: float = 1.0,
@@ -68,9 +67,8 @@ class ModbusController:
 
         Both it and `device_id` may be changed; another device id counts from the next connection on.
         """
-        cap_library_log()
-        wire.frames(device_id)  # MailboxError: a device id that none can have
-        self._wire = wire
+        transport.framing(device_id)  # MailboxError: a device id that none can have
+        self._transport = transport
         self.device_id = device_id
         self._layout = layout or MailboxLayout()
         self._read_link = (read_registers(self._layout.link_address, BLOCK_REGISTERS),)
@@ -78,8 +76,8 @@ class ModbusController:
         self._timeout_s = timeout_s
         self.single_write = single_write
         self._limits = limits or RequestLimits()
-        if wire.pace.byte_s:
-            self._limits = self._limits.within(LONGEST_EXCHANGE_S / wire.pace.byte_s)
+        if transport.timing.byte_s:
+            self._limits = self._limits.within(LONGEST_EXCHANGE_S / transport.timing.byte_s)
         self._connecting = asyncio.Lock()
         self._connection: Connection | None = None
         self._opening: Connection | None = None
@@ -87,7 +85,7 @@ class ModbusController:
         self._barriers = secrets.randbelow(1000)  # another place in their row than that of a process just killed
 
     def __str__(self) -> str:
-        return f"{self._wire.name} device {self.device_id}"
+        return f"{self._transport.name} device {self.device_id}"
 
     @property
     def connected(self) -> bool:
@@ -112,7 +110,7 @@ class ModbusController:
     @property
     def serial(self) -> bool:
         """True on a line, where device id 0 is a broadcast."""
-        return self._wire.serial
+        return self._transport.serial
 
     @property
     def layout(self) -> MailboxLayout:
@@ -188,19 +186,21 @@ class ModbusController:
     async def _checked(self, closings: int) -> Connection:
         """A new connection on which no late reply can come."""
         for left in reversed(range(LATE_REPLIES)):
-            connection = Connection(self._wire, await self._wire.open(self._timeout_s), self.device_id, self._timeout_s)
+            descriptor = await self._transport.open(self._timeout_s)
+            connection = Connection(self._transport, descriptor, self.device_id, self._timeout_s)
             self._opening = connection
             try:
                 self._check_still_wanted(closings)
-                if self._wire.serial:
+                if self._transport.serial:
                     self._barriers += 1
-                    await check_line(connection, self._layout.contour_address, self._barriers, self._timeout_s)
+                    contour = self._layout.contour_address
+                    await outlast_late_replies(connection, contour, self._barriers, self._timeout_s)
                 return connection
             except ControllerNonsense:
                 if not left:
                     raise
             except BaseException:
-                connection.end(ControllerUnavailable(f"{self._wire.name}: not connected"))
+                connection.end(ControllerUnavailable(f"{self._transport.name}: not connected"))
                 raise
             finally:
                 self._opening = None
@@ -208,13 +208,13 @@ class ModbusController:
 
     def _check_still_wanted(self, closings: int) -> None:
         if closings != self._closings:
-            raise ControllerUnavailable(f"{self._wire.name}: closed while connecting")
+            raise ControllerUnavailable(f"{self._transport.name}: closed while connecting")
 
     def _held(self) -> Connection:
         if self._connection is None:
             # A job meets this while the connection is opened anew: it is read by people, in log and journal.
             raise ControllerUnavailable(
-                f"{self._wire.name}: no connection stands. Check that the controller is on, and its cable"
+                f"{self._transport.name}: no connection stands. Check that the controller is on, and its cable"
             )
         return self._connection
 
@@ -261,7 +261,7 @@ class ModbusTcpController(ModbusController):
         limits: RequestLimits | None = None,
         single_write: SingleWrite = "fc6",
     ) -> None:
-        super().__init__(TcpWire(host, port), device_id, layout, timeout_s, limits, single_write)
+        super().__init__(TcpTransport(host, port), device_id, layout, timeout_s, limits, single_write)
 
 
 class ModbusRtuController(ModbusController):
@@ -276,7 +276,7 @@ class ModbusRtuController(ModbusController):
         limits: RequestLimits | None = None,
         single_write: SingleWrite = "fc6",
     ) -> None:
-        super().__init__(RtuWire(line), device_id, layout, timeout_s, limits, single_write)
+        super().__init__(RtuTransport(line), device_id, layout, timeout_s, limits, single_write)
 
 
 class ModbusRtuOverTcpController(ModbusController):
@@ -293,4 +293,4 @@ class ModbusRtuOverTcpController(ModbusController):
         single_write: SingleWrite = "fc6",
         baudrate: int = 9600,
     ) -> None:
-        super().__init__(RtuOverTcpWire(host, port, baudrate), device_id, layout, timeout_s, limits, single_write)
+        super().__init__(RtuOverTcpTransport(host, port, baudrate), device_id, layout, timeout_s, limits, single_write)

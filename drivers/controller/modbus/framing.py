@@ -1,14 +1,13 @@
 """PDUs in frames, TCP's and RTU's: what is sent for a request, and which bytes are its reply.
 
-The library's framers build the frames; the reply is judged on its bytes in `replies.py`.
+Of the Modbus library only the CRC is used; the reply is judged on its bytes in `replies.py`.
 """
 
 from __future__ import annotations
 
 from typing import Protocol
 
-from pymodbus.framer import FramerRTU, FramerSocket
-from pymodbus.pdu import DecodePDU
+from pymodbus.framer import FramerRTU
 
 from drivers.controller.errors import MailboxError
 from drivers.controller.modbus.replies import MBAP_HEADER, check_rtu, check_tcp
@@ -18,7 +17,7 @@ LAST_TRANSACTION = 0xFFFF
 RTU_OVERHEAD = 3  # bytes: unit and CRC
 
 
-class Frames(Protocol):
+class Framing(Protocol):
     """One connection's frames, to one device; one request at a time."""
 
     def request(self, request: Request) -> bytes:
@@ -31,13 +30,12 @@ class Frames(Protocol):
         """Bytes of the request's frame and of its reply's."""
 
 
-class TcpFrames:
+class TcpFraming:
     """Modbus TCP: the MBAP header in front, a new transaction for each request."""
 
     def __init__(self, device_id: int, transaction: int = 0) -> None:
         """transaction: the number before the first one's."""
         self._device_id = _checked(device_id, 0)
-        self._library = FramerSocket(DecodePDU(False))
         self._transaction = transaction
         self._request = NOTHING
         self._head = b""
@@ -53,7 +51,7 @@ class TcpFrames:
         return MBAP_HEADER.pack(self._transaction, 0, 1 + len(request.pdu), self._device_id) + request.pdu
 
     def reply(self, received: bytes) -> bytes | None:
-        """The reply's PDU; see `Frames`."""
+        """The reply's PDU; see `Framing`."""
         if len(received) == self._length and received.startswith(self._head):
             return received[MBAP_HEADER.size :]
         return check_tcp(self._request, self._transaction, self._device_id, received)
@@ -63,21 +61,21 @@ class TcpFrames:
         return 2 * MBAP_HEADER.size + len(request.pdu) + request.reply_length
 
 
-class RtuFrames:
+class RtuFraming:
     """Modbus RTU: the device id in front, a CRC behind. Nothing says which request a reply belongs to."""
 
     def __init__(self, device_id: int) -> None:
         self._device_id = _checked(device_id, 1)
-        self._library = FramerRTU(DecodePDU(False))
         self._request = NOTHING
 
     def request(self, request: Request) -> bytes:
         """The frame to send."""
         self._request = request
-        return self._library.encode(request.pdu, self._device_id, 0)
+        frame = bytes((self._device_id,)) + request.pdu
+        return frame + FramerRTU.compute_CRC(frame).to_bytes(2, "big")
 
     def reply(self, received: bytes) -> bytes | None:
-        """The reply's PDU; see `Frames`."""
+        """The reply's PDU; see `Framing`."""
         return check_rtu(self._request, self._device_id, received)
 
     def wire_length(self, request: Request) -> int:

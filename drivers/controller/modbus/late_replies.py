@@ -18,7 +18,7 @@ SILENCE_S = 0.05
 BARRIER_COUNTS = tuple(range(1, SHORTEST_LIMIT, 2))
 
 
-async def check_line(connection: Connection, contour_address: int, turn: int, timeout_s: float) -> None:
+async def outlast_late_replies(connection: Connection, contour_address: int, turn: int, timeout_s: float) -> None:
     """Return when no reply to an earlier request can come any more.
 
     turn: another one at each call, so that the reply to an earlier barrier is none to this one.

@@ -50,7 +50,7 @@ def check_rtu(request: Request, device_id: int, received: bytes) -> bytes | None
     """The PDU of the reply to `request`; None while `received` is the beginning of its frame.
 
     ControllerNonsense: it is not, and cannot become, the reply. An RTU frame does not say which request it answers:
-    the reply to an earlier one of the same kind passes, so none may be under way (see `line_check.py`).
+    the reply to an earlier one of the same kind passes, so none may be under way (see `late_replies.py`).
     """
     if not received:
         return None

@@ -16,9 +16,9 @@ from drivers.controller.errors import (
     ControllerUnavailable,
 )
 from drivers.controller.modbus.byte_channel import ByteChannel
-from drivers.controller.modbus.reply_waiting import WAIT_S, Promptness
+from drivers.controller.modbus.reply_waiting import WAIT_S, InPlaceWaiting
 from drivers.controller.modbus.requests import EXCEPTION, READ_REGISTERS, Request
-from drivers.controller.modbus.transports import Descriptor, Wire
+from drivers.controller.modbus.transports import Descriptor, Transport
 
 EXCEPTION_NAMES = {
     1: "illegal function",
@@ -62,19 +62,19 @@ class _Exchange:
 
 
 class Connection:
-    """An open wire, from here to its first fault.
+    """An open transport, from here to its first fault.
 
     Callers take turns, one request each, and who has a single one goes before who has a row of them: a heartbeat waits
     for one request of a page, never for a whole page. A row's next request goes out from within the arrival of the
     reply to the one before: a page costs one wake-up of its task, not 17.
     """
 
-    def __init__(self, wire: Wire, descriptor: Descriptor, device_id: int, timeout_s: float) -> None:
-        self.name = wire.name
+    def __init__(self, transport: Transport, descriptor: Descriptor, device_id: int, timeout_s: float) -> None:
+        self.name = transport.name
         self.fault: ControllerUnavailable | None = None
-        self._wire = wire
-        self._pace = wire.pace
-        self._frames = wire.frames(device_id)
+        self._transport = transport
+        self._timing = transport.timing
+        self._framing = transport.framing(device_id)
         self._timeout_s = timeout_s
         self._loop = asyncio.get_running_loop()
         self._singles: deque[_Exchange] = deque()
@@ -90,8 +90,8 @@ class Connection:
         self._rest: asyncio.Handle | None = None
         self._listening = False
         self._sent_at = 0.0
-        self._promptness = Promptness()
-        self._in_place = bool(wire.pace.silence_s)  # a serial line is never prompt
+        self._waiting_in_place = InPlaceWaiting()
+        self._in_place = bool(transport.timing.silence_s)  # a serial line is never prompt
         self._channel = ByteChannel(*descriptor, self._receive, self._lost)
 
     def end(self, fault: ControllerUnavailable) -> None:
@@ -142,7 +142,7 @@ class Connection:
             or self._under_way
             or self.fault
             or self._in_place
-            or not self._promptness.worth(self._loop.time())
+            or not self._waiting_in_place.worth(self._loop.time())
         ):
             return None
         exchange = _Exchange((request,), self._loop.create_future())
@@ -180,7 +180,7 @@ class Connection:
         if self._under_way is not None or turns is None or self.fault is not None:
             return
         now = self._loop.time()
-        left = self._silent_from + self._pace.silence_s - now
+        left = self._silent_from + self._timing.silence_s - now
         if left > 0:
             if self._rest is None:
                 self._rest = self._rest_for(left)
@@ -188,14 +188,14 @@ class Connection:
         exchange = self._under_way = turns.popleft()
         self._singles_in_a_row = self._singles_in_a_row + 1 if turns is self._singles else 0
         request = exchange.request
-        data = self._frames.request(request)
+        data = self._framing.request(request)
         self._sent_at = now
-        self._deadline = now + self._timeout_s + self._pace.byte_s * self._frames.wire_length(request)
+        self._deadline = now + self._timeout_s + self._timing.byte_s * self._framing.wire_length(request)
         if self._alarm is None:
             self._alarm = self._loop.call_at(self._deadline, self._look_at_deadline)
-        if self._pace.silence_s:  # the reply to a write begins as the write does
+        if self._timing.silence_s:  # the reply to a write begins as the write does
             self._sent = data if request.pdu[0] == READ_REGISTERS else b""
-        if self._pace.echo:
+        if self._timing.echo:
             self._echo = data
         self._channel.write(data)
 
@@ -209,15 +209,15 @@ class Connection:
         return self._rows or None
 
     def _wait_in_place(self) -> None:
-        """Hold the event loop while replies come promptly, as long as `Promptness` allows."""
+        """Hold the event loop while replies come promptly, as long as `InPlaceWaiting` allows."""
         if self._in_place:
             return
         self._in_place = True
         came, begun = True, self._loop.time()
-        while came and self._under_way is not None and self._promptness.worth(begun):
+        while came and self._under_way is not None and self._waiting_in_place.worth(begun):
             came = self._channel.wait(WAIT_S)
             now = self._loop.time()
-            self._promptness.waited(now - begun, now, came)
+            self._waiting_in_place.waited(now - begun, now, came)
             begun = now
         self._in_place = False
 
@@ -242,15 +242,15 @@ class Connection:
         text = f"{self.name}: no reply to {self._under_way.request} in {self._timeout_s:g} s"
         if self._received:
             text += f", {len(self._received)} bytes of one"
-        self.end(ControllerTimeout(f"{text}. {self._wire.missing}"))
+        self.end(ControllerTimeout(f"{text}. {self._transport.missing}"))
 
     # --- receiving ----------------------------------------------------------------------------------------------
 
     def _receive(self, data: bytes) -> None:
-        if self._pace.silence_s:
+        if self._timing.silence_s:
             self._silent_from = self._loop.time()
         elif not self._in_place:
-            self._promptness.came_by_loop(self._loop.time() - self._sent_at)
+            self._waiting_in_place.came_by_loop(self._loop.time() - self._sent_at)
         if self._listening:
             return
         try:
@@ -260,7 +260,7 @@ class Connection:
                     return
             self._take(data)
         except ControllerNonsense as error:
-            next_step = HEARS_ITSELF if self._hears_itself() else self._wire.mismatch
+            next_step = HEARS_ITSELF if self._hears_itself() else self._transport.mismatch
             if error.answered_as is not None:
                 next_step = f"If that is the controller, set device_id: {error.answered_as}"
             self.end(ControllerNonsense(f"{self.name}: {error}. {next_step}", error.answered_as))
@@ -271,7 +271,7 @@ class Connection:
         if exchange is None:
             raise ControllerNonsense(f"{len(data)} bytes came though no request was pending")
         self._received += data
-        reply = self._frames.reply(self._received)
+        reply = self._framing.reply(self._received)
         if reply is None:
             return
         self._received = b""
@@ -311,7 +311,7 @@ class Connection:
 
     def _lost(self, reason: str) -> None:
         """The channel's word that the other end has gone."""
-        self.end(ControllerUnavailable(f"{self.name}: {self._wire.lost(reason)}"))
+        self.end(ControllerUnavailable(f"{self.name}: {self._transport.lost(reason)}"))
 
     def _refusal(self, code: int, request: Request) -> ControllerError:
         name = EXCEPTION_NAMES.get(code, "not a code of the standard")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.controller.errors import ControllerUnavailable
-from drivers.controller.modbus.framing import LAST_TRANSACTION, Frames, RtuFrames, TcpFrames
+from drivers.controller.modbus.framing import LAST_TRANSACTION, Framing, RtuFraming, TcpFraming
 from drivers.controller.modbus.name_lookup import addresses_of
 from drivers.controller.modbus.serial_line import SerialLine, open_serial
 
@@ -21,7 +21,7 @@ Descriptor = tuple[int, Callable[[], None]]
 
 
 @dataclass(frozen=True)
-class Pace:
+class LineTiming:
     """How fast bytes go, s. silence_s: what must lie between two frames. byte_s: one byte. echo: we hear ourselves."""
 
     silence_s: float = 0.0
@@ -29,7 +29,7 @@ class Pace:
     echo: bool = False
 
 
-class Wire(Protocol):
+class Transport(Protocol):
     """One way to the controller."""
 
     @property
@@ -37,7 +37,7 @@ class Wire(Protocol):
         """What people call it."""
 
     @property
-    def pace(self) -> Pace:
+    def timing(self) -> LineTiming:
         """How fast it is."""
 
     @property
@@ -55,7 +55,7 @@ class Wire(Protocol):
     def lost(self, reason: str) -> str:
         """That the other end has gone, and what to check."""
 
-    def frames(self, device_id: int) -> Frames:
+    def framing(self, device_id: int) -> Framing:
         """The frames of a new connection."""
 
     async def open(self, timeout_s: float) -> Descriptor:
@@ -63,7 +63,7 @@ class Wire(Protocol):
 
 
 @dataclass(frozen=True)
-class TcpWire:
+class TcpTransport:
     """Modbus TCP. begin: the number before a connection's first transaction.
 
     By default another one each time: the late reply to an earlier connection's request is then none to this one's.
@@ -83,25 +83,25 @@ class TcpWire:
         return f"{self.host}:{self.port}"
 
     @property
-    def pace(self) -> Pace:
+    def timing(self) -> LineTiming:
         """No pace of its own."""
-        return Pace()
+        return LineTiming()
 
-    def frames(self, device_id: int) -> Frames:
+    def framing(self, device_id: int) -> Framing:
         """MBAP frames."""
-        return TcpFrames(device_id, self.begin())
+        return TcpFraming(device_id, self.begin())
 
     async def open(self, timeout_s: float) -> Descriptor:
         """A new TCP connection."""
         return await _open_tcp(self.name, self.host, self.port, timeout_s, "the controller is on")
 
     def lost(self, reason: str) -> str:
-        """See `Wire`."""
+        """See `Transport`."""
         return f"the controller closed the connection ({reason})"
 
 
 @dataclass(frozen=True)
-class RtuOverTcpWire:
+class RtuOverTcpTransport:
     """RTU frames in a TCP connection to a serial server. baudrate: of the line behind it, for silence and time-outs."""
 
     host: str
@@ -118,26 +118,26 @@ class RtuOverTcpWire:
         return f"{self.host}:{self.port}"
 
     @property
-    def pace(self) -> Pace:
+    def timing(self) -> LineTiming:
         """That of the line behind the serial server, with the longest characters that it may have."""
         line = SerialLine("", self.baudrate, "E", 1)
-        return Pace(line.silence_s, line.byte_s)
+        return LineTiming(line.silence_s, line.byte_s)
 
-    def frames(self, device_id: int) -> Frames:
+    def framing(self, device_id: int) -> Framing:
         """RTU frames."""
-        return RtuFrames(device_id)
+        return RtuFraming(device_id)
 
     async def open(self, timeout_s: float) -> Descriptor:
         """A new TCP connection."""
         return await _open_tcp(self.name, self.host, self.port, timeout_s, "the serial server is on")
 
     def lost(self, reason: str) -> str:
-        """See `Wire`."""
+        """See `Transport`."""
         return f"the serial server closed the connection ({reason})"
 
 
 @dataclass(frozen=True)
-class RtuWire:
+class RtuTransport:
     """Modbus RTU on a serial port of this machine."""
 
     line: SerialLine
@@ -152,20 +152,20 @@ class RtuWire:
         return self.line.port
 
     @property
-    def pace(self) -> Pace:
+    def timing(self) -> LineTiming:
         """That of the line."""
-        return Pace(self.line.silence_s, self.line.byte_s, self.line.echo)
+        return LineTiming(self.line.silence_s, self.line.byte_s, self.line.echo)
 
-    def frames(self, device_id: int) -> Frames:
+    def framing(self, device_id: int) -> Framing:
         """RTU frames."""
-        return RtuFrames(device_id)
+        return RtuFraming(device_id)
 
     async def open(self, timeout_s: float) -> Descriptor:
         """The port, locked against other programs; opening does not block."""
         return open_serial(self.line)
 
     def lost(self, reason: str) -> str:
-        """See `Wire`."""
+        """See `Transport`."""
         return f"the port has gone ({reason}). Check that the adapter is plugged in"
 
 

@@ -25,15 +25,16 @@ from drivers.controller.errors import ControllerError
 from drivers.controller.mailbox.layout import REGISTERS, MailboxLayout
 from drivers.controller.simulated.contour import AcceptedContour
 from drivers.controller.simulated.faults import Fault, FaultPlan, targets_of
-from drivers.controller.simulated.frames import FramingName, Request
 from drivers.controller.simulated.memory import RetainedMemory
 from drivers.controller.simulated.program import (
     ControllerProgram,
     Judge,
     Pace,
+    ProgramStart,
     TriggerNotPossible,
     judge_by_geometry,
 )
+from drivers.controller.simulated.received import FramingName, ReceivedRequest
 from drivers.controller.simulated.server import RegisterServer
 from drivers.controller.simulated.verdict import Verdict
 from drivers.controller.simulated.watch import ClientWatch
@@ -182,7 +183,7 @@ class SimulatedController:
         if self._serial is None:
             await server.listen(self._host, port)
         else:
-            server.open_line(*self._serial)
+            await server.open_line(*self._serial)
 
     async def stop(self) -> None:
         """Stop the program and close every connection; nothing is left open. An error of `on_accepted` is raised."""
@@ -251,18 +252,10 @@ class SimulatedController:
     # --- inside -------------------------------------------------------------------------------------------------
 
     def _new_program(self) -> ControllerProgram:
-        return ControllerProgram(
-            self._registers,
-            self._layout,
-            self._memory,
-            self._watch,
-            new_session=self._session_source,
-            judge=self._judged,
-            has_clock=self._has_clock,
-            clock_start_ms=self._clock_start_ms,
-            first_trigger=self._first_trigger,
-            pace=self.pace,
+        start = ProgramStart(
+            self._session_source, self._judged, self._has_clock, self._clock_start_ms, self._first_trigger
         )
+        return ControllerProgram(self._registers, self._layout, self._memory, self._watch, start, self.pace)
 
     def _judged(self, contour: AcceptedContour) -> int:
         return self.judge(contour)
@@ -305,22 +298,22 @@ class SimulatedController:
 
     # --- what the server asks -----------------------------------------------------------------------------------
 
-    def addressed(self, request: Request) -> Request:
+    def addressed(self, request: ReceivedRequest) -> ReceivedRequest:
         """The request as to the device whose number its reply carries."""
         return request if self._limits.answer_as is None else replace(request, unit=self._limits.answer_as)
 
-    def answer(self, request: Request) -> bytes | None:
+    def answer(self, request: ReceivedRequest) -> bytes | None:
         """The PDU of the reply to a request; None where it is for another device on a line."""
         if request.unit != self._device_id:
             return None if self._framing == "rtu" else bytes([request.pdu[0] | 0x80, NO_SUCH_DEVICE])
         self.verdict.requests += 1
         return self._window.answer(request.pdu, self._now())
 
-    def answer_late(self, request: Request) -> None:
+    def answer_late(self, request: ReceivedRequest) -> None:
         """Do a write that the line or the server kept back: none of the client's doing, so nobody judges it."""
         self._window.store_late(request.pdu)
 
-    def strike(self, request: Request) -> Fault | None:
+    def strike(self, request: ReceivedRequest) -> Fault | None:
         """The fault that befalls the request."""
         if request.unit != self._device_id:
             return None
@@ -331,11 +324,11 @@ class SimulatedController:
             self._watch.excuse()
         return fault
 
-    def unanswered(self, request: Request) -> None:
+    def unanswered(self, request: ReceivedRequest) -> None:
         """The request's reply never leaves."""
         self._watch.unanswered(request.pdu[0], int.from_bytes(request.pdu[1:3], "big"))
 
-    def too_early(self, request: Request) -> None:
+    def too_early(self, request: ReceivedRequest) -> None:
         """The request came on a connection that owes a reply."""
         self._watch.too_early(request.pdu[0])
 

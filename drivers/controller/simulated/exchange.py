@@ -6,29 +6,31 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
+from pymodbus.framer import FramerBase, FramerRTU
+
 from drivers.controller.simulated.faults import Fault, FaultPlan, foreign
-from drivers.controller.simulated.frames import READ, FramingName, Request, new_framing
+from drivers.controller.simulated.received import READ, ReceivedRequest
 
 
 class Device(Protocol):
     """What stands behind the server."""
 
-    def answer(self, request: Request) -> bytes | None:
+    def answer(self, request: ReceivedRequest) -> bytes | None:
         """Do the request; the PDU of its reply, None where it is for another device on the line."""
 
-    def addressed(self, request: Request) -> Request:
+    def addressed(self, request: ReceivedRequest) -> ReceivedRequest:
         """The request as to the device whose number its reply carries."""
 
-    def answer_late(self, request: Request) -> None:
+    def answer_late(self, request: ReceivedRequest) -> None:
         """Do a write long after its client gave it up."""
 
-    def strike(self, request: Request) -> Fault | None:
+    def strike(self, request: ReceivedRequest) -> Fault | None:
         """The fault that befalls the request."""
 
-    def unanswered(self, request: Request) -> None:
+    def unanswered(self, request: ReceivedRequest) -> None:
         """The request's reply never leaves."""
 
-    def too_early(self, request: Request) -> None:
+    def too_early(self, request: ReceivedRequest) -> None:
         """The request came on a connection on which the reply to the one before has not been sent."""
 
     def connection(self, up: bool) -> None:
@@ -89,7 +91,7 @@ class Exchange:
     def __init__(
         self,
         device: Device,
-        framing: FramingName,
+        framer: FramerBase,
         faults: FaultPlan,
         later: Callable[[float, Callable[[], None]], None],
         *,
@@ -97,8 +99,8 @@ class Exchange:
         reset: Callable[[], None] | None,
     ) -> None:
         self._device = device
-        self._serial_frames = framing == "rtu"
-        self._framing = new_framing(framing)
+        self._serial_frames = isinstance(framer, FramerRTU)
+        self._framer = framer
         self._faults = faults
         self._later = later
         self._outlet = outlet
@@ -107,37 +109,29 @@ class Exchange:
         self._dead = False
         self._waiting = 0  # requests whose reply has not left
 
-    def receive(self, data: bytes) -> None:
-        """Take what came; raise BadFrame where it is no Modbus."""
+    def receive(self, received: ReceivedRequest) -> None:
+        """Take a request."""
         if self._dead:
             return
-        for request in map(self._device.addressed, self._framing.feed(data)):
-            if self._waiting and self._reset is not None:
-                self._device.too_early(request)
-            if not self._silenced():
-                self._serve(request)
-
-    def _silenced(self) -> bool:
-        return self._dead
-
-    def quiet(self) -> None:
-        """The line was silent for QUIET_S."""
-        self._framing.quiet()
-
-    def _serve(self, request: Request) -> None:
+        request = self._device.addressed(received)
+        if self._waiting and self._reset is not None:
+            self._device.too_early(request)
         fault = self._device.strike(request)
         if fault is None:
             self._reply(request, self._device.answer(request))
         else:
             self._befall(fault, request)
 
-    def _reply(self, request: Request, pdu: bytes | None) -> None:
+    def _reply(self, request: ReceivedRequest, pdu: bytes | None) -> None:
         if pdu is not None:
-            self._send(self._framing.frame(request, pdu))
+            self._send(self._frame(request, pdu))
+
+    def _frame(self, request: ReceivedRequest, pdu: bytes) -> bytes:
+        return self._framer.encode(pdu, request.unit, request.transaction)
 
     # --- faults -------------------------------------------------------------------------------------------------
 
-    def _befall(self, fault: Fault, request: Request) -> None:
+    def _befall(self, fault: Fault, request: ReceivedRequest) -> None:
         kind = fault.kind
         if kind in ("garbled-request", "garbled-reply") and not self._serial_frames:
             kind = "lost-request" if kind == "garbled-request" else "lost-reply"
@@ -158,10 +152,10 @@ class Exchange:
         if kind in ("reset-before", "reset-after") and self._reset is not None:
             self._reset()
 
-    def _spoil_reply(self, kind: str, fault: Fault, request: Request, pdu: bytes | None) -> None:
+    def _spoil_reply(self, kind: str, fault: Fault, request: ReceivedRequest, pdu: bytes | None) -> None:
         if pdu is None:
             return
-        frame = self._framing.frame(request, pdu)
+        frame = self._frame(request, pdu)
         if kind in ("lost-reply", "reset-after"):
             self._lose(request)
         elif kind == "garbled-reply":
@@ -169,7 +163,7 @@ class Exchange:
             self._send(self._faults.garbled(frame))
         elif kind == "foreign-reply":
             self._lose(request)
-            self._send(self._framing.frame(request, foreign(pdu)))
+            self._send(self._frame(request, foreign(pdu)))
         elif kind == "repeated-reply":
             self._send(frame)
             # On a line, where replies keep their order, the copy follows at once.
@@ -181,13 +175,13 @@ class Exchange:
     def _sent_late(self) -> None:
         self._waiting -= 1
 
-    def _refuse(self, fault: Fault, request: Request) -> None:
-        self._send(self._framing.frame(request, bytes([request.pdu[0] | 0x80, fault.code])))
+    def _refuse(self, fault: Fault, request: ReceivedRequest) -> None:
+        self._send(self._frame(request, bytes([request.pdu[0] | 0x80, fault.code])))
         if fault.code == 5 and request.pdu[0] != READ:
             self._device.unanswered(request)
             self._later(fault.delay_s, lambda: self._device.answer_late(request))
 
-    def _lose(self, request: Request) -> None:
+    def _lose(self, request: ReceivedRequest) -> None:
         self._waiting += 1
         self._device.unanswered(request)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from drivers.controller.mailbox.layout import MailboxLayout
-from drivers.controller.simulated.frames import READ, WRITE_MANY, WRITE_ONE
+from drivers.controller.simulated.received import READ, WRITE_MANY, WRITE_ONE
 
 FaultKind = Literal[
     "lost-request",

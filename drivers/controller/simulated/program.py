@@ -59,11 +59,26 @@ class Pace:
     torn: bool = False
 
 
+@dataclass(frozen=True)
+class ProgramStart:
+    """What the program is given at its start.
+
+    new_session: makes its session. judge: 1, 4 or 7 for a contour that is otherwise in order.
+    has_clock, clock_start_ms: whether `clock` runs, and from where. first_trigger: the first `trigger_counter`.
+    """
+
+    new_session: Callable[[], int]
+    judge: Judge
+    has_clock: bool = True
+    clock_start_ms: int = 0
+    first_trigger: int = 1
+
+
 class ControllerProgram:
     """One run of the controller's program over its registers, from the start sequence on.
 
     registers: all holding registers, changed in place. state: `controller_state` from the next scan on.
-    judge: 1, 4 or 7 for a contour that is otherwise in order. pace: see Pace; it may be changed between scans.
+    pace: see Pace; it may be changed between scans.
     """
 
     def __init__(
@@ -72,12 +87,7 @@ class ControllerProgram:
         layout: MailboxLayout,
         memory: RetainedMemory,
         watch: ClientWatch,
-        *,
-        new_session: Callable[[], int],
-        judge: Judge,
-        has_clock: bool = True,
-        clock_start_ms: int = 0,
-        first_trigger: int = 1,
+        start: ProgramStart,
         pace: Pace | None = None,
     ) -> None:
         self.state = READY
@@ -87,11 +97,7 @@ class ControllerProgram:
         self._layout = layout
         self._memory = memory
         self._watch = watch
-        self._new_session = new_session
-        self._judge = judge
-        self._has_clock = has_clock
-        self._clock_start_ms = clock_start_ms
-        self._first_trigger = first_trigger
+        self._startup = start
         self._scans = 0
         self._copied: list[int] = []
         self._to_copy = 0
@@ -160,8 +166,8 @@ class ControllerProgram:
         if not self._half_written:
             self._set(1, self._link(1) + 1)
         self._set(0, self.state)
-        if self._has_clock:
-            self._clock = (self._clock_start_ms + run_ms) % MODULUS
+        if self._startup.has_clock:
+            self._clock = (self._startup.clock_start_ms + run_ms) % MODULUS
             self._write32(14, self._clock)
         self._look_at_service()
         return self._look_at_contour()
@@ -175,7 +181,7 @@ class ControllerProgram:
             self._set(12, self._memory.last_result)
             self._write32(10, self._memory.last_job)
         else:
-            self._session = self._new_session()
+            self._session = self._startup.new_session()
             self._set(13, self._session)
 
     def _look_at_service(self) -> None:
@@ -216,7 +222,7 @@ class ControllerProgram:
             )
         self._set(3, recipe)
         self._set32(4, thickness_um)
-        counter = self._link(2) % 0xFFFF + 1 if self._link(2) else self._first_trigger
+        counter = self._link(2) % 0xFFFF + 1 if self._link(2) else self._startup.first_trigger
         self._set(2, counter)
         self._trigger_open, self._job_of_trigger = True, None
         return counter
@@ -326,7 +332,7 @@ class ControllerProgram:
         if contour is None:
             return Reply.ACCEPTED, None
         self._watch.contour(contour)
-        verdict = self._judge(contour)
+        verdict = self._startup.judge(contour)
         return verdict, contour if verdict == Reply.ACCEPTED else None
 
 

@@ -6,7 +6,7 @@ import struct
 from dataclasses import dataclass
 
 from drivers.controller.mailbox.layout import MailboxLayout
-from drivers.controller.simulated.frames import READ, WRITE_MANY, WRITE_ONE
+from drivers.controller.simulated.received import READ, WRITE_MANY, WRITE_ONE
 from drivers.controller.simulated.watch import LONGEST_WRITE, ClientWatch
 
 LONGEST_READ = 125

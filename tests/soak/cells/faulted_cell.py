@@ -25,7 +25,7 @@ from drivers.controller.simulated.controller import (
     TriggerNotPossible,
 )
 from drivers.controller.simulated.faults import Fault
-from drivers.controller.simulated.frames import FramingName
+from drivers.controller.simulated.received import FramingName
 from service import wiring
 from service.config.config import Config
 from service.daemon.daemon import Daemon, Parts

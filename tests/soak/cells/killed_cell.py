@@ -23,7 +23,7 @@ import numpy as np
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.simulated.controller import AcceptedContour, FaultPlan, SimulatedController, TriggerNotPossible
 from drivers.controller.simulated.faults import Fault, targets_of
-from drivers.controller.simulated.frames import Request
+from drivers.controller.simulated.received import ReceivedRequest
 from tests.soak.cells.crossed_line import crossed_line
 from tests.soak.cells.faulted_cell import Transport
 from tests.soak.promises import Evidence, Findings, Rings, Taken, acks, judge, logged_contours, micrometres
@@ -74,7 +74,7 @@ class Sniper(SimulatedController):
     armed: tuple[str, str, int] | None = None
     on_kill: Callable[[], None]
 
-    def strike(self, request: Request) -> Fault | None:
+    def strike(self, request: ReceivedRequest) -> Fault | None:
         if self.armed is None:
             return super().strike(request)
         step, moment, count = self.armed

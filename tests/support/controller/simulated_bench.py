@@ -9,7 +9,7 @@ import numpy as np
 from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, Page, crc32_of, encode_pages
 from drivers.controller.simulated.contour import AcceptedContour
 from drivers.controller.simulated.memory import RetainedMemory
-from drivers.controller.simulated.program import ControllerProgram, judge_by_geometry
+from drivers.controller.simulated.program import ControllerProgram, ProgramStart, judge_by_geometry
 from drivers.controller.simulated.verdict import Verdict
 from drivers.controller.simulated.watch import ClientWatch
 from tests.support.controller.protocol_decoder import Layout, Link, Service, encode_service
@@ -43,16 +43,8 @@ class Bench:
             self.scan(3)
 
     def restart(self, session: int) -> None:
-        self.program = ControllerProgram(
-            self.registers,
-            self.layout,
-            self.memory,
-            self.watch,
-            new_session=lambda: session,
-            judge=self.judge,
-            has_clock=self.has_clock,
-            clock_start_ms=self.clock_start_ms,
-        )
+        start = ProgramStart(lambda: session, self.judge, self.has_clock, self.clock_start_ms)
+        self.program = ControllerProgram(self.registers, self.layout, self.memory, self.watch, start)
         self.now_ms = 0
 
     def judge(self, contour: AcceptedContour) -> int:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from drivers.controller import ControllerNonsense, MailboxError
 from drivers.controller.mailbox.mailbox import decode_link, decode_service, encode_link, encode_service
 from drivers.controller.mailbox.page_spans import page_starts, spans
-from drivers.controller.modbus.framing import Frames, RtuFrames, TcpFrames
+from drivers.controller.modbus.framing import Framing, RtuFraming, TcpFraming
 from drivers.controller.modbus.requests import (
     LONGEST_READ,
     Request,
@@ -73,9 +73,9 @@ def rtu_frame(sent: bytes, pdu: bytes) -> bytes:
     return sent[:1] + pdu + crc16(sent[:1] + pdu)
 
 
-WAYS: tuple[tuple[type[TcpFrames | RtuFrames], Callable[[bytes, bytes], bytes]], ...] = (
-    (TcpFrames, tcp_frame),
-    (RtuFrames, rtu_frame),
+WAYS: tuple[tuple[type[TcpFraming | RtuFraming], Callable[[bytes, bytes], bytes]], ...] = (
+    (TcpFraming, tcp_frame),
+    (RtuFraming, rtu_frame),
 )
 
 
@@ -106,7 +106,7 @@ def received(draw: st.DrawFn, sent: bytes, request: Request, frame: Callable[[by
 def one_reply(data: st.DataObject) -> None:
     """A request, and whatever comes for it, in whatever pieces."""
     kind, frame = data.draw(st.sampled_from(WAYS))
-    frames: Frames = kind(DEVICE)
+    frames: Framing = kind(DEVICE)
     request = data.draw(requests())
     sent = frames.request(request)
     stream = data.draw(received(sent, request, frame))

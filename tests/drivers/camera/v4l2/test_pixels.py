@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from drivers.camera import FrameUnusable
 from drivers.camera.v4l2.exposure import FrameTiming
-from drivers.camera.v4l2.formats import PictureFormat
-from drivers.camera.v4l2.pixels import LAYOUTS, bytes_needed, to_pixels
+from drivers.camera.v4l2.pixels import LAYOUTS, PictureFormat, bytes_needed, to_pixels
 
 WIDTH, HEIGHT = 64, 48
 PADDING = 32

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller import ControllerNonsense
-from drivers.controller.modbus.framing import Frames, RtuFrames, TcpFrames
+from drivers.controller.modbus.framing import Framing, RtuFraming, TcpFraming
 from drivers.controller.modbus.requests import (
     Request,
     read_registers,
@@ -28,7 +28,7 @@ class Tcp:
     """A conversation over TCP: the driver's frames, and the server's."""
 
     def __init__(self, earlier: int = 0) -> None:
-        self.frames: Frames = TcpFrames(DEVICE, earlier)
+        self.frames: Framing = TcpFraming(DEVICE, earlier)
 
     def ask(self, request: Request) -> None:
         self.head = self.frames.request(request)[:4]
@@ -45,7 +45,7 @@ class Rtu:
     """A conversation over RTU."""
 
     def __init__(self) -> None:
-        self.frames: Frames = RtuFrames(DEVICE)
+        self.frames: Framing = RtuFraming(DEVICE)
 
     def ask(self, request: Request) -> None:
         sent = self.frames.request(request)

@@ -13,10 +13,10 @@ from collections.abc import AsyncIterator, Iterator
 import pytest
 
 from drivers.controller import ControllerUnavailable
-from drivers.controller.modbus.reply_waiting import Promptness
+from drivers.controller.modbus.reply_waiting import InPlaceWaiting
 from drivers.controller.modbus.request_queue import Connection
 from drivers.controller.modbus.requests import read_registers, registers_of
-from drivers.controller.modbus.transports import TcpWire
+from drivers.controller.modbus.transports import TcpTransport
 
 READ = read_registers(0, 1)
 
@@ -33,9 +33,9 @@ def far() -> Iterator[tuple[socket.socket, socket.socket]]:
 async def connection(
     far: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
 ) -> AsyncIterator[Connection]:
-    monkeypatch.setattr(Promptness, "worth", lambda *_: True)
+    monkeypatch.setattr(InPlaceWaiting, "worth", lambda *_: True)
     near, _ = far
-    opened = Connection(TcpWire("there", 502, begin=lambda: 0), (near.fileno(), near.close), 1, 5.0)
+    opened = Connection(TcpTransport("there", 502, begin=lambda: 0), (near.fileno(), near.close), 1, 5.0)
     yield opened
     opened.end(ControllerUnavailable("the test is over"))
 

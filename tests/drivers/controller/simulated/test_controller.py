@@ -197,13 +197,12 @@ async def test_stopping_while_a_connection_is_being_closed_is_no_error_in_the_lo
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     async with SimulatedController() as controller:
-        _, writer = await asyncio.open_connection("127.0.0.1", controller.port)
+        closing = await asyncio.open_connection("127.0.0.1", controller.port)
+        open_still = await asyncio.open_connection("127.0.0.1", controller.port)
         await asyncio.sleep(0.02)
-        (serving,) = controller._server._clients
-        serving.cancel()
-        await asyncio.sleep(0)  # now it waits for its connection to be closed
-        serving.cancel()
-        await asyncio.wait([serving])
-        await asyncio.sleep(0.01)
-        writer.close()
+        closing[1].close()
+        await asyncio.sleep(0)
+    assert await open_still[0].read() == b""
+    await asyncio.sleep(0.01)
+    open_still[1].close()
     assert caplog.text == ""

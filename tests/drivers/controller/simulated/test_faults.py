@@ -6,7 +6,7 @@ import asyncio
 import os
 import struct
 import tty
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
 import pytest
@@ -16,8 +16,10 @@ from hypothesis import strategies as st
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.simulated.controller import FaultPlan, SimulatedController
 from drivers.controller.simulated.faults import FAULT_KINDS, Fault, targets_of
-from drivers.controller.simulated.frames import QUIET_S, BadFrame, RtuFraming, TcpFraming, crc16
+from drivers.controller.simulated.received import FramingName, ReceivedRequest
+from drivers.controller.simulated.server import QUIET_S, RegisterServer
 from tests.support.controller.raw_client import Client, page, simulated
+from tests.support.controller.rtu_frames import frame
 
 pytestmark = pytest.mark.usefixtures("no_task_is_left")
 
@@ -177,7 +179,7 @@ async def heard(near: int, seconds: float = SILENCE_S) -> bytes:
 
 
 def rtu(pdu: bytes) -> bytes:
-    return b"\1" + pdu + crc16(b"\1" + pdu)
+    return frame(b"\1" + pdu)
 
 
 async def test_a_garbled_reply_has_a_wrong_crc_and_the_next_one_a_right_one(line: tuple[int, str]) -> None:
@@ -258,23 +260,75 @@ PDUS = st.one_of(
 )
 
 
+class Listener:
+    """A device that keeps what it is asked."""
+
+    def __init__(self) -> None:
+        self.heard: list[bytes] = []
+
+    def addressed(self, request: ReceivedRequest) -> ReceivedRequest:
+        return request
+
+    def strike(self, request: ReceivedRequest) -> None:
+        return None
+
+    def answer(self, request: ReceivedRequest) -> None:
+        self.heard.append(request.pdu)
+
+    def connection(self, up: bool) -> None:
+        """Nothing: it does not matter here."""
+
+
+class Nowhere(asyncio.Transport):
+    """A connection to nobody."""
+
+    def is_closing(self) -> bool:
+        return False
+
+    def write(self, data: object) -> None:
+        raise AssertionError("nothing is answered")
+
+    def abort(self) -> None:
+        """Nothing: the server hears no more from itself."""
+
+    close = abort
+
+
+async def heard_of(framing: FramingName, pieces: Iterable[bytes], after_silence: bytes = b"") -> list[bytes]:
+    """What a server makes of bytes that arrive in pieces, and of those that come after the line was silent."""
+    listener = Listener()
+    server = RegisterServer(listener, framing, FaultPlan())
+    await server.listen("127.0.0.1", 0)
+    connection = server._server.callback_new_connection()
+    connection.connection_made(Nowhere())
+    for piece in filter(None, pieces):
+        connection.data_received(piece)
+    if after_silence:
+        connection._fall_silent()
+        connection.data_received(after_silence)
+    await server.stop()
+    return listener.heard
+
+
 @given(st.lists(PDUS, max_size=4), st.lists(st.integers(0, 1000), max_size=8))
 def test_requests_are_the_same_however_the_bytes_arrive(pdus: list[bytes], cuts: list[int]) -> None:
     for framing, frames in (
-        (RtuFraming(), [rtu(pdu) for pdu in pdus]),
-        (TcpFraming(), [struct.pack(">HHHB", 7, 0, len(pdu) + 1, 1) + pdu for pdu in pdus]),
+        ("rtu", [rtu(pdu) for pdu in pdus]),
+        ("tcp", [struct.pack(">HHHB", 7, 0, len(pdu) + 1, 1) + pdu for pdu in pdus]),
     ):
         data = b"".join(frames)
         places = sorted({0, len(data), *(cut % (len(data) + 1) for cut in cuts)})
-        found = [request.pdu for a, b in pairwise(places) for request in framing.feed(data[a:b])]
-        assert found == pdus
+        assert asyncio.run(heard_of(framing, (data[a:b] for a, b in pairwise(places)))) == pdus
 
 
 @given(st.binary(max_size=300))
-def test_noise_on_the_line_is_no_crash(noise: bytes) -> None:
-    for framing in (RtuFraming(), TcpFraming()):
-        try:
-            framing.feed(noise)
-        except BadFrame:
-            continue
-        framing.quiet()
+def test_noise_on_the_line_is_no_crash_and_is_over_with_a_silence(noise: bytes) -> None:
+    asyncio.run(heard_of("tcp", [noise]))
+    assert asyncio.run(heard_of("rtu", [noise], rtu(COMMIT)))[-1:] == [COMMIT]
+
+
+@pytest.mark.parametrize("framing", ["rtu", "tcp"])
+def test_a_function_code_that_nobody_knows_is_a_request_too(framing: FramingName) -> None:
+    pdu = bytes([99, 1, 2, 3])
+    data = rtu(pdu) if framing == "rtu" else struct.pack(">HHHB", 7, 0, 5, 1) + pdu
+    assert asyncio.run(heard_of(framing, [data])) == [pdu]

@@ -26,8 +26,6 @@ from drivers.controller.modbus.library_log import LIBRARY_LOGGER
 from drivers.controller.modbus.request_queue import Connection
 from tests.support.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
 PATIENT_S = 60.0  # longer than any test: what fails then did not fail by its time-out
 IMPATIENT_S = 0.3  # waited out by the tests of time-outs; long enough for a busy machine to connect
 

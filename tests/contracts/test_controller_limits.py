@@ -25,8 +25,6 @@ from tests.support.controller.controller_cells import PATIENT_S, WAYS
 from tests.support.controller.pty_line import PtyLine
 from tests.support.controller.serial_server import SerialServer
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
 LAYOUT = MailboxLayout(payload_capacity=400)
 RING = np.array([[0, 0], [100, 0], [100, 50], [0, 50]], dtype=np.float64)
 HOLES = [np.array([[5 * k, 10], [5 * k, 20], [5 * k + 3, 20]], dtype=np.float64) for k in range(1, 18)]

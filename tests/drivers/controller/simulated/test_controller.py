@@ -14,9 +14,6 @@ from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
 from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
 from tests.support.controller.raw_client import SESSION, Client, page, simulated
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
-
 # --- its life ---------------------------------------------------------------------------------------------------------
 
 

@@ -19,8 +19,6 @@ from drivers.controller.simulated.faults import FAULT_KINDS, Fault, targets_of
 from drivers.controller.simulated.frames import QUIET_S, BadFrame, RtuFraming, TcpFraming, crc16
 from tests.support.controller.raw_client import Client, page, simulated
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
 READ_LINK = struct.pack(">BHH", 3, 0, 16)
 CLEAR = struct.pack(">BHH", 6, 32, 0)
 COMMIT = struct.pack(">BHH", 6, 32, 5)

@@ -13,8 +13,6 @@ from drivers.controller.simulated.controller import SimulatedController
 from drivers.controller.simulated.scenario import Event, MachineSettings, Play, Scenario, machine_options
 from tests.support.controller.raw_client import SESSION, Client, page
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
 
 @asynccontextmanager
 async def played(*events: Event, **machine: object) -> AsyncIterator[SimulatedController]:

@@ -15,9 +15,6 @@ from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
 from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.rtu_frames import crc16
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
-
 # --- Modbus RTU -------------------------------------------------------------------------------------------------------
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.camera_guest.vivid import BIND, CAPTURE, UNBIND, ctl, set_control
+from tests.support.camera.vivid import BIND, CAPTURE, UNBIND, ctl, set_control
 
 CONFIG = f"""
 camera: {{kind: v4l2, device: {CAPTURE}, width: 640, height: 360, frame_rate: 30, exposure_ms: 0, timeout_s: 2}}

@@ -16,7 +16,7 @@ from contour.tracing.tracing import TraceSettings, trace
 from drivers.camera import CameraTimeout, CameraUnavailable
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.camera.v4l2.listing import list_cameras
-from tests.camera_guest.vivid import (
+from tests.support.camera.vivid import (
     BIND,
     CAPTURE,
     OUTPUT,

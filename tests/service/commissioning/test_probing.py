@@ -17,10 +17,10 @@ from drivers.controller.simulated.controller import FaultPlan, Pace, ServerLimit
 from drivers.controller.simulated.faults import Fault, Target
 from service.commissioning.probing import LOOK_PERIOD_S, Finding, Probe
 from service.daemon.restart_watch import RestartWatch
-from tests.interop.programs import libmodbus_tcp
-from tests.interop.shifted_program import program
 from tests.support.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 from tests.support.controller.pty_line import PtyLine
+from tests.support.interop.programs import libmodbus_tcp
+from tests.support.interop.shifted_program import program
 
 FASTER = 8
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from pymodbus.client import ModbusTcpClient
 
-from tests.interop.programs import libmodbus_tcp
 from tests.support.controller.protocol_decoder import decode_contour
 from tests.support.controller.scanned_server import scanned_server
+from tests.support.interop.programs import libmodbus_tcp
 from tests.support.processes.processes import Process, combtrace, free_port, jobs, lines, until
 
 ROOT = Path(__file__).parents[3]

@@ -13,9 +13,9 @@ import pytest
 from drivers.controller import Page, ServiceBlock
 from drivers.controller.mailbox.mailbox import MailboxLayout
 from drivers.controller.modbus.client import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
-from tests.interop.programs import TCP_SERVERS, libmodbus_rtu, mbpoll_reads
 from tests.support.controller.protocol_decoder import decode_contour, decode_service
 from tests.support.controller.pty_line import PtyLine
+from tests.support.interop.programs import TCP_SERVERS, libmodbus_rtu, mbpoll_reads
 
 GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[3] / "docs" / "golden-vectors.json").read_text("utf-8"))
 CONTOURS = [contour for contour in GOLDEN["contours"] if contour["holes"]]

@@ -1,4 +1,7 @@
-"""What a test may leave open when it ends: nothing. Files, sockets and threads are counted, tasks looked at."""
+"""What a test may leave open when it ends: nothing, neither files, sockets and threads nor tasks.
+
+A conftest.py that imports the fixtures and the hook from here holds every test of its folder to that.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,9 @@ import time
 from collections import Counter
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
+
+import pytest
+from pytest_asyncio import is_async_test
 
 BOUND_S = 1.0  # what winds down by itself, a pool's thread or the other end of a connection, has this long
 PAUSE_S = 0.005
@@ -40,6 +46,27 @@ async def no_task_left() -> AsyncIterator[None]:
     while (more := asyncio.all_tasks() - before - {asyncio.current_task()}) and time.monotonic() < give_up_at:
         await asyncio.sleep(PAUSE_S)
     assert not more, f"left running: {', '.join(map(str, more))}"
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_left() -> Iterator[None]:
+    """Set up after what a module keeps open and before all that is the test's own, its event loop too."""
+    with nothing_left():
+        yield
+
+
+@pytest.fixture
+async def no_task_is_left() -> AsyncIterator[None]:
+    async with no_task_left():
+        yield
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests with an event loop of their own are asked for tasks too: after their fixtures, before the loop ends."""
+    for item in items:
+        names = item.fixturenames if is_async_test(item) and isinstance(item, pytest.Function) else []
+        if "nothing_is_left" in names and "no_task_is_left" not in names:
+            names.insert(names.index("nothing_is_left") + 1, "no_task_is_left")
 
 
 def _open_files() -> Counter[str]:

@@ -177,7 +177,7 @@ def test_a_camera_whose_driver_is_unbound_is_gone_and_comes_back_with_it():
         unbinding.start()
         with pytest.raises(CameraUnavailable):
             grab_on(camera, 50)
-        unbinding.join(10)
+        unbinding.join(60)
         with pytest.raises(CameraUnavailable, match="No such file"):
             camera.open()
         BIND.write_text("vivid.0")

@@ -357,7 +357,7 @@ async def test_a_session_that_a_restart_does_not_change_is_told(changes: bool) -
     async with SimulatedController(scan_s=0.005, session_source=lambda: next(sessions)) as simulated:
         controller = ModbusTcpController("127.0.0.1", simulated.port, timeout_s=5)
         watch = RestartWatch(controller)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(60):
             while not simulated.registers(13, 1)[0]:
                 await asyncio.sleep(0.01)
             await asyncio.sleep(0.3)

@@ -221,7 +221,7 @@ async def test_the_end_never_comes_before_the_acknowledgement(tmp_path: Path) ->
 
     def slow(text: str) -> None:
         if text.startswith("ACK"):
-            assert over.wait(5)
+            assert over.wait(60)
             time.sleep(0.1)
         write(text)
 

@@ -42,7 +42,7 @@ class Scene:
         return next(self.exposed_at_s[n] for n in recent if n % GREYS == number)
 
 
-def node_of_the_webcam(within_s=10.0):
+def node_of_the_webcam(within_s=60.0):
     began = time.monotonic()
     while time.monotonic() - began < within_s:
         for name in sorted(Path("/sys/class/video4linux").glob("video*")):

@@ -104,7 +104,7 @@ def jobs(journal: Path) -> list[dict[str, Any]]:
     """All jobs of a journal, read by SQLite's own hands while the service may be writing."""
     if not journal.exists():
         return []
-    database = sqlite3.connect(f"file:{journal}?mode=ro", uri=True, timeout=5)
+    database = sqlite3.connect(f"file:{journal}?mode=ro", uri=True, timeout=60)
     try:
         database.row_factory = sqlite3.Row
         return [dict(row) for row in database.execute("SELECT * FROM jobs ORDER BY job_id")]

@@ -151,7 +151,7 @@ async def test_a_request_for_a_measurement_stands_in_the_registers() -> None:
     async with simulated() as controller, Client(controller.port) as client:
         await client.until_started()
         await client.write(16, *encode_service(ServiceBlock(service_state=5), "big"))
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while not controller.can_request:
                 await asyncio.sleep(0.001)
         assert controller.request_measurement(recipe=3, thickness_um=70_000) == 1

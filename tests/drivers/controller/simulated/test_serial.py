@@ -37,7 +37,7 @@ class Line:
 
     async def receive(self, length: int) -> bytes:
         received = b""
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while len(received) < length:
                 try:
                     received += os.read(self.near, 512)

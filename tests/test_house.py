@@ -42,6 +42,11 @@ def test_benchmarks_take_of_tests_only_what_is_for_all() -> None:
     assert [(file, name) for file, name in taken if name.split(".")[1:2] != ["support"]] == []
 
 
+def test_no_test_is_imported_by_another() -> None:
+    """What two of them need lies in tests.support."""
+    assert [(file, name) for part in PARTS for file, name in imports(part) if ".test_" in name] == []
+
+
 @pytest.mark.parametrize("part", ["tests", "benchmarks"])
 def test_no_room_has_more_files_than_can_be_overlooked(part: str) -> None:
     files = Counter(file.parent for file in (ROOT / part).rglob("*.py") if file.name != "__init__.py")

@@ -9,7 +9,7 @@ import socket
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -21,14 +21,17 @@ PARTS = ("benchmarks", "contour", "controllers", "drivers", "packaging", "servic
 MOST_FILES = 15
 
 
-def imports(part: str) -> Iterator[tuple[Path, str]]:
+@cache
+def imports(part: str) -> list[tuple[Path, str]]:
     """Each file of the part, and each module that it imports anywhere."""
+    found = []
     for file in (ROOT / part).rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom):
-                yield file, node.module or "."
+                found.append((file, node.module or "."))
             elif isinstance(node, ast.Import):
-                yield from ((file, alias.name) for alias in node.names)
+                found += [(file, alias.name) for alias in node.names]
+    return found
 
 
 def test_nothing_imports_benchmarks() -> None:

@@ -50,7 +50,7 @@ bench-page: install
 accuracy: install
 	$(BIN)/python -m benchmarks.accuracy --random 300 --first 998000 --write
 
-# Every figure and table of docs/methods.md; a test redraws them.
+# Every figure and table of docs/reports/methods.md; a test redraws them.
 methods: install
 	$(BIN)/python -m benchmarks.methods
 

@@ -1,4 +1,4 @@
-"""Sections of pages that commands write: of docs/accuracy.md by others than the bench, kept when it is written anew."""
+"""Sections of pages that commands write, kept when the page is written anew: of docs/reports/accuracy.md by default."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-PAGE = Path(__file__).resolve().parent.parent / "docs" / "accuracy.md"
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "reports" / "accuracy.md"
 
 
 def put_section(name: str, text: str, page: Path = PAGE) -> None:

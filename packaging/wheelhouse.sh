@@ -15,7 +15,7 @@ pip="$work/venv/bin/python -m pip --disable-pip-version-check --quiet"
 (cd "$here" && tar -cf - pyproject.toml README.md LICENSE contour drivers service) | (mkdir "$work/sources" && cd "$work/sources" && tar -xf -)
 $pip wheel --no-deps --wheel-dir "$folder" "$work/sources"
 wheel=$(ls -t "$folder"/combtrace-*.whl | head -n 1)
-$pip download --only-binary :all: --constraint "$here/constraints.txt" --dest "$folder" "${wheel}[metrics,page,export]"
+$pip download --only-binary :all: --constraint "$here/constraints.txt" --dest "$folder" "${wheel}[metrics,page,export,hil]"
 cp "$here/constraints.txt" "$folder/"
 cat > "$folder/install.sh" <<'INSTALL'
 #!/bin/sh
@@ -26,7 +26,7 @@ target=${1:-/opt/combtrace}
 python=${PYTHON:-python3}
 "$python" -m venv "$target"
 "$target/bin/python" -m pip --disable-pip-version-check --quiet install --no-index --find-links "$here" \
-    --constraint "$here/constraints.txt" 'combtrace[metrics,page,export]'
+    --constraint "$here/constraints.txt" 'combtrace[metrics,page,export,hil]'
 "$target/bin/combtrace" --version
 INSTALL
 chmod +x "$folder/install.sh"

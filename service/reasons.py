@@ -1,7 +1,7 @@
 """Why a job was not accepted: name, code, outcome, what it means, and what a person does next, in each language.
 
-The one table behind registers, journal, serial replies, log, commands and docs/reasons.md
-(`python -m service.reasons_doc docs/reasons.md`); codes and names are the protocol's.
+The one table behind registers, journal, serial replies, log, commands and docs/reference/reasons.md
+(`python -m service.reasons_doc docs/reference/reasons.md`); codes and names are the protocol's.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""docs/reasons.md, made from the one table of reasons: `python -m service.reasons_doc docs/reasons.md`."""
+"""The page of all reasons, made from their one table: `python -m service.reasons_doc docs/reference/reasons.md`."""
 
 from __future__ import annotations
 

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.calibration.calibration import Calibration
 from drivers.camera import Camera
 from drivers.camera.averaging import AveragingCamera
 from drivers.camera.files.camera import FileCamera
@@ -25,19 +24,13 @@ from drivers.controller.modbus import client as modbus
 from drivers.trigger import LineTrigger, PulseTrigger
 from drivers.trigger.pulses import SerialBytes, SerialSignal
 from drivers.trigger.serial import SerialLineTrigger
-from service.config.config import (
-    Config,
-    ControllerTrigger,
-    FilesCamera,
-    IntervalTrigger,
-    ModbusRtu,
-    ModbusRtuOverTcp,
-    ModbusTcp,
-    NoController,
-)
+from service.config.cameras import FilesCamera
+from service.config.config import Config
 from service.config.config import Metrics as MetricsSettings
 from service.config.config import Page as PageSettings
-from service.config.config import SerialTrigger as SerialTriggerSettings
+from service.config.controllers import ModbusRtu, ModbusRtuOverTcp, ModbusTcp, NoController
+from service.config.triggers import ControllerTrigger, IntervalTrigger
+from service.config.triggers import SerialTrigger as SerialTriggerSettings
 from service.daemon.daemon import Parts
 from service.daemon.lock import LockError, network_names, serial_name
 from service.daemon.opening import DiskRefuses, Opening, stand_in
@@ -321,12 +314,6 @@ def controller_names(config: Config) -> list[str]:
         return []
     unit = settings.device_id if isinstance(settings, ModbusTcp) else None
     return network_names(settings.host, settings.port, unit)
-
-
-def find_calibration(config: Config) -> tuple[Calibration | None, Fault | None]:
-    """The calibration, and the fault where a controller waits for millimetres that cannot be had."""
-    guard, fault = find_guard(config)
-    return None if guard is None else guard.record.calibration, fault
 
 
 def find_guard(config: Config) -> tuple[CalibrationGuard | None, Fault | None]:

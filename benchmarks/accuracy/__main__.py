@@ -1,6 +1,6 @@
 """Accuracy and speed of every method in one run: `python -m benchmarks.accuracy` (`--help` for options).
 
-Prints the tables; with `--write` they go to docs/accuracy.md, with pictures of the scenes beside it.
+Prints the tables; with `--write` they go to docs/reports/accuracy.md, with pictures of the scenes beside it.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--random", type=int, default=0, metavar="N", help="also N scenes with random parameters")
     parser.add_argument("--first", type=int, default=0, metavar="SEED", help="seed of the first random scene")
     parser.add_argument("--no-photographs", action="store_true", help="leave the photographs out")
-    parser.add_argument("--write", action="store_true", help="write docs/accuracy.md and its pictures")
+    parser.add_argument("--write", action="store_true", help="write docs/reports/accuracy.md and its pictures")
     return parser.parse_args(arguments)
 
 

@@ -1,7 +1,7 @@
 """How many false outlines the second account sees: `python -m benchmarks.accuracy.falsified_outlines` (`--help`).
 
 Outlines of traceable random scenes are falsified in three ways and judged as the service judges them, by the limit of a
-recipe that sets none. Prints the shares; with `--write` they take their place in docs/accuracy.md.
+recipe that sets none. Prints the shares; with `--write` they take their place in docs/reports/accuracy.md.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from contour.geometry.rings import Contour, Ring, densified, oriented_contour, s
 from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import render
 from contour.tracing.tracing import TraceSettings, trace
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from tests.support.scenes.random_scenes import random_scene
 from tests.support.scenes.trials import calibration_for
 
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy.falsified_outlines", description=__doc__)
     parser.add_argument("--first", type=int, default=SCENES[0], metavar="SEED", help="seed of the first random scene")
     parser.add_argument("--count", type=int, default=SCENES[1], metavar="N", help="so many random scenes")
-    parser.add_argument("--write", action="store_true", help="write the section of docs/accuracy.md")
+    parser.add_argument("--write", action="store_true", help="write the section of docs/reports/accuracy.md")
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.count)
     with ProcessPoolExecutor(max_workers=2) as pool:

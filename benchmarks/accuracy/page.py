@@ -1,4 +1,4 @@
-"""docs/accuracy.md from the tables of one run."""
+"""docs/reports/accuracy.md from the tables of one run."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def write_page(blocks: Sequence[tuple[str, str]], gallery: Gallery, left_out: Se
     parts += [f"## {title}\n\n{text}\n" for title, text in tables]
     parts += [f"{section}\n" for section in kept]
     parts.append(f"## The scenes, with the contour of {gallery.method}\n")
-    parts += [f"![{path.stem}](pictures/{path.name})\n" for path in paths]
+    parts += [f"![{path.stem}](../pictures/{path.name})\n" for path in paths]
     parts.append("In the close-ups the truth is red and the found contour green.\n")
     parts.append(f"## {last[0]}\n\n{last[1]}\n")
     PAGE.write_text("\n".join(parts), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Pictures for docs/accuracy.md: sheets of all scenes with the traced contour, and corners seen from near."""
+"""Pictures for docs/reports/accuracy.md: sheets of all scenes with the traced contour, and corners seen from near."""
 
 from __future__ import annotations
 

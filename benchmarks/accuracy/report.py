@@ -1,4 +1,4 @@
-"""Tables of trials as Markdown, for the terminal and for docs/accuracy.md."""
+"""Tables of trials as Markdown, for the terminal and for docs/reports/accuracy.md."""
 
 from __future__ import annotations
 

@@ -95,14 +95,16 @@ def test_a_hausdorff_distance_above_one_pitch_is_counted():
 
 def test_the_accuracy_page_is_written_with_its_pictures_by_one_command(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(pictures, "FOLDER", tmp_path / "pictures")
-    monkeypatch.setattr(accuracy_page, "PAGE", tmp_path / "accuracy.md")
+    written = tmp_path / "reports" / "accuracy.md"
+    written.parent.mkdir()
+    monkeypatch.setattr(accuracy_page, "PAGE", written)
     method = "closing + findContours"
     options = ["--method", method, "--detail", method, "--scenes", "fine-8px", "--write", "--no-photographs"]
     assert main([*options, "--random", "1"]) == 0
-    page = (tmp_path / "accuracy.md").read_text(encoding="utf-8")
+    page = written.read_text(encoding="utf-8")
     named = [line.split("(")[1].rstrip(")") for line in page.splitlines() if line.startswith("![")]
-    assert named == ["pictures/scenes-1.jpg", "pictures/scenes-close.png"]
-    assert all((tmp_path / name).stat().st_size > 1000 for name in named)
+    assert named == ["../pictures/scenes-1.jpg", "../pictures/scenes-close.png"]
+    assert all((written.parent / name).stat().st_size > 1000 for name in named)
     assert "| fine-8px |" in page
     assert "1 scenes: 0 without a contour" in page
     assert capsys.readouterr().out.count("| fine-8px |") == 1

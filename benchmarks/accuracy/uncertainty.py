@@ -1,6 +1,7 @@
 """Stated against true error: `python -m benchmarks.accuracy.uncertainty` (`--help` for options).
 
-Measures on fresh random scenes and on the scenes for measuring; with `--write` plot and numbers go to docs/accuracy.md.
+Measures on fresh random scenes and on the scenes for measuring; with `--write` plot and numbers go to
+docs/reports/accuracy.md.
 `--calibrate` fits the coefficients of `contour/outline/uncertainty.py` on other seeds and prints them.
 """
 
@@ -63,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--calibrate", action="store_true", help="fit the coefficients and print them")
     parser.add_argument("--first", type=int, metavar="SEED", help="seed of the first random scene")
     parser.add_argument("--count", type=int, metavar="N", help="number of random scenes")
-    parser.add_argument("--write", action="store_true", help="write plot and numbers to docs/accuracy.md")
+    parser.add_argument("--write", action="store_true", help="write plot and numbers to docs/reports/accuracy.md")
     options = parser.parse_args(arguments)
     first, count = CALIBRATED_ON if options.calibrate else MEASURED_ON
     first = first if options.first is None else options.first
@@ -145,7 +146,7 @@ def numbers(cases: Sequence[Case]) -> list[tuple[str, str, str, bool]]:
 
 
 def told(cases: Sequence[Case], lost: Sequence[str], seeds: Sequence[int]) -> str:
-    """The section for docs/accuracy.md."""
+    """The section for docs/reports/accuracy.md."""
     rows = [[what, asked, measured, "yes" if met else "**no**"] for what, asked, measured, met in numbers(cases)]
     worst = sorted(cases, key=lambda case: case.stated_px / case.true_px)[:8]
     over = [
@@ -165,7 +166,7 @@ def told(cases: Sequence[Case], lost: Sequence[str], seeds: Sequence[int]) -> st
             "",
             table(["", "must", "measured", "met"], rows),
             "",
-            f"![stated against true error](pictures/{PLOT.name})",
+            f"![stated against true error](../pictures/{PLOT.name})",
             "",
             "A point is a scene: across, within how much of the contour 95 % of the true outline lie; upwards, the "
             "bound that was stated with the contour, knowing the picture only. Red: the bound was too small.",

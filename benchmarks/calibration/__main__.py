@@ -2,7 +2,7 @@
 
     python -m benchmarks.calibration --write
 
-Prints the tables; with `--write` they become docs/calibration-accuracy.md. About ten minutes on two cores.
+Prints the tables; with `--write` they become docs/reports/calibration-accuracy.md. About ten minutes on two cores.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from benchmarks.calibration.bumps import Bumps, measure_bumps
 from benchmarks.calibration.page import page
 from benchmarks.calibration.trials import ChainTrial, Trial, chain_trial, trial
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "calibration-accuracy.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reports" / "calibration-accuracy.md"
 FIRST_SEED = 5000
 CHAIN_CAMERAS = 3
 
@@ -29,7 +29,7 @@ def main() -> None:
     parser.add_argument("--cameras", type=int, default=20)
     parser.add_argument("--first", type=int, default=FIRST_SEED, help="first seed; others were never seen")
     parser.add_argument("--workers", type=int, default=2, help="processes")
-    parser.add_argument("--write", action="store_true", help="write docs/calibration-accuracy.md")
+    parser.add_argument("--write", action="store_true", help="write docs/reports/calibration-accuracy.md")
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.cameras)
     campaigns: dict[str, list[Trial]] = {}

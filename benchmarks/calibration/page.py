@@ -1,4 +1,4 @@
-"""docs/calibration-accuracy.md from one run's numbers."""
+"""docs/reports/calibration-accuracy.md from one run's numbers."""
 
 from __future__ import annotations
 

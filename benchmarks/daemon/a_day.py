@@ -1,4 +1,4 @@
-"""A day of the daemon, told by its log: `python -m benchmarks.daemon.a_day` writes docs/a-day.md from a real run.
+"""A day of the daemon, told by its log: `python -m benchmarks.daemon.a_day` writes docs/reports/a-day.md from a run.
 
 The real daemon and the simulated controller as processes, two minutes for a day: whatever befalls a cell is done to
 them, and what the log said meanwhile goes on the page, with nothing but paths and dates made shorter. Needs root for a
@@ -27,7 +27,7 @@ from tests.support.processes.cell import SAMPLES, Cell
 from tests.support.processes.processes import combtrace, until
 from tests.support.processes.small_disk import mounted
 
-PAGE = Path(__file__).parents[2] / "docs" / "a-day.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reports" / "a-day.md"
 WIDTH = 120
 SHOWN_FOLDER = "/var/lib/combtrace"
 DATE = re.compile(r"^\d{4}-\d\d-\d\d ", re.MULTILINE)

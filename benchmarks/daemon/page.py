@@ -43,7 +43,7 @@ JOBS_A_ROUND = 12  # three of each picture
 JOBS_BEFORE = 4  # which do not count: a viewer who has just come looks at all at once
 DRAWN = 400
 PAGE_WIDTH = 120
-PAGE = Path(__file__).parents[2] / "docs" / "page-speed.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reports" / "page-speed.md"
 
 
 @dataclass(frozen=True)
@@ -223,7 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; 1 where a goal is missed."""
     parser = argparse.ArgumentParser(prog="benchmarks.daemon.page", description=__doc__)
     parser.add_argument("--rounds", type=int, default=12, metavar="N", help="with a viewer, and as many without")
-    parser.add_argument("--write", action="store_true", help=f"write docs/{PAGE.name}")
+    parser.add_argument("--write", action="store_true", help=f"write docs/reports/{PAGE.name}")
     args = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         shown, told = figures(Path(folder), args.rounds)

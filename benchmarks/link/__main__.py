@@ -3,7 +3,7 @@
 1,000 vertices, read-back off. Over loopback TCP to a libmodbus server, beside a C client and a bare pymodbus loop that
 do the same writes; on a line of 115,200 baud beside what its bits and silences take; how long our heartbeat
 stands while one of 9,600 is full; how soon the link is back; and what the link takes at rest. `--write` keeps the
-table in docs/link-speed.md.
+table in docs/reports/link-speed.md.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from tests.support.interop.programs import libmodbus_rtu
 from tests.support.processes.cell import Cell
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "link-speed.md"
+PAGE = ROOT / "docs" / "reports" / "link-speed.md"
 VERTICES = 1000
 BAUDRATE, SLOW_BAUDRATE = 115_200, 9600
 BACK_S = 2.0
@@ -285,7 +285,7 @@ on, away for 0.5 to 2.5 s; the return counts from when it listens or goes on.
 def main() -> int:
     """Measure, print, and tell by the exit status whether all goals are met."""
     parser = argparse.ArgumentParser(description="measure the link")
-    parser.add_argument("--write", action="store_true", help="keep the table in docs/link-speed.md")
+    parser.add_argument("--write", action="store_true", help="keep the table in docs/reports/link-speed.md")
     parser.add_argument(
         "--without-rest", action="store_true", help="leave out the link at rest, which takes two minutes"
     )

@@ -1,4 +1,4 @@
-"""Writes every figure and table of docs/methods.md: `python -m benchmarks.methods`."""
+"""Writes every figure and table of docs/reports/methods.md: `python -m benchmarks.methods`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from benchmarks.methods.tables import tables
 from benchmarks.page_section import put_section
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
-PAGE = DOCS / "methods.md"
+PAGE = DOCS / "reports" / "methods.md"
 PICTURES = DOCS / "pictures"
 
 

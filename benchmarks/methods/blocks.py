@@ -1,4 +1,4 @@
-"""The blocks of docs/methods.md, and what the methods make of them: rendered and traced once a run."""
+"""The blocks of docs/reports/methods.md, and what the methods make of them: rendered and traced once a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures of docs/methods.md: what the paper's methods see, and where each of them fails."""
+"""The figures of docs/reports/methods.md: what the paper's methods see, and where each of them fails."""
 
 from __future__ import annotations
 

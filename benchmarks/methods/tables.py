@@ -1,4 +1,4 @@
-"""The tables of docs/methods.md, by the names of their sections."""
+"""The tables of docs/reports/methods.md, by the names of their sections."""
 
 from __future__ import annotations
 

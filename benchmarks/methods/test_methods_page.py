@@ -1,4 +1,4 @@
-"""docs/methods.md shows what the methods do: its figures and tables are drawn again, and compared.
+"""docs/reports/methods.md shows what the methods do: its figures and tables are drawn again, and compared.
 
 Not byte by byte: another OpenCV draws other letters, and a last bit of a float may move a pixel of a rendered block.
 A contour that lies elsewhere by a pixel changes ten times what is allowed here.
@@ -26,7 +26,7 @@ ANEW = "Run `make methods`, and read the page again: its sentences may no longer
 
 def test_the_figures_are_what_is_drawn_now() -> None:
     drawn = figures()
-    named = set(re.findall(r"\(pictures/([^)]+)\)", PAGE.read_text(encoding="utf-8")))
+    named = set(re.findall(r"\(\.\./pictures/([^)]+)\)", PAGE.read_text(encoding="utf-8")))
     assert named == set(drawn) == {path.name for path in PICTURES.glob("methods-*")}
     for name, figure in drawn.items():
         shown = cv2.imread(str(PICTURES / name))

@@ -1,7 +1,7 @@
 """What is refused and what is not: `make refusals`, or `python -m benchmarks.refusals` (`--help` for options).
 
 Pictures without a whole block must be refused, each by a right name; traceable ones must not. Prints the tables; with
-`--write` they take their place in docs/accuracy.md.
+`--write` they take their place in docs/reports/accuracy.md.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ from benchmarks.refusals.checking_cost import ALLOWED, checking_cost
 from benchmarks.refusals.refusal_scenes import refusal_scenes
 from benchmarks.refusals.table_scenes import table_scenes
 from contour.synthetic import render
-from service.config.config import Recipe
-from service.measuring.measure import Measurement, Measurer
+from service.config.recipes import Recipe
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
 from tests.support.scenes.bench_scenes import BenchScene, measured_scenes, tuned_scenes
 from tests.support.scenes.metrics import agreement
 from tests.support.scenes.random_scenes import random_scene
@@ -174,7 +175,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--random", type=int, default=RANDOM[1], metavar="N", help="so many random traceable scenes")
     parser.add_argument("--first", type=int, default=RANDOM[0], metavar="SEED", help="seed of the first random scene")
     parser.add_argument("--only-refusals", action="store_true", help="leave the traceable scenes out")
-    parser.add_argument("--write", action="store_true", help="write the section of docs/accuracy.md")
+    parser.add_argument("--write", action="store_true", help="write the section of docs/reports/accuracy.md")
     return parser.parse_args(arguments)
 
 

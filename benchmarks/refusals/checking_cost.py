@@ -13,7 +13,7 @@ from unittest.mock import patch
 from contour.synthetic import render
 from contour.tracing import tracing, wall_tips
 from contour.walls import see_block as wall_witnesses
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.measuring import measure
 from service.measuring.measure import Measurer
 from tests.support.scenes.bench_scenes import measured_scenes

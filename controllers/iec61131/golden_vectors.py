@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes golden_vectors.st, a program that tries combtrace.st in a PLC on the project's golden vectors.
 
-python3 controllers/iec61131/golden_vectors.py docs/golden-vectors.json controllers/iec61131/golden_vectors.st
+python3 controllers/iec61131/golden_vectors.py docs/reference/golden-vectors.json controllers/iec61131/golden_vectors.st
 """
 
 import json
@@ -13,7 +13,7 @@ HOLES = "two holes"
 A_LINE = 8
 
 PROGRAM = """\
-(* Written by golden_vectors.py from docs/golden-vectors.json; do not edit.
+(* Written by golden_vectors.py from docs/reference/golden-vectors.json; do not edit.
 
    Tries combtrace.st in a PLC, without Modbus: run CT_TRY in any task after a cold start (nothing retained) until done
    is TRUE. All is well where failed = 0 and passed = {checks}. Each page's CRC and box are computed first, one page a

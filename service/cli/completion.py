@@ -32,15 +32,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the script."""
-    from service.cli.main import build_parser
-
     script = {"bash": bash, "zsh": zsh, "fish": fish}[args.shell]
-    print(script(commands_of(build_parser())), end="")
+    print(script(commands_of(args.parser)), end="")
     return EXIT_OK
 
 
 @dataclass(frozen=True)
-class Word:
+class Argument:
     """An option or, without names, a positional: what it is for, and what follows it or stands there."""
 
     names: tuple[str, ...]
@@ -56,27 +54,27 @@ class Command:
 
     name: str
     help: str
-    words: tuple[Word, ...]
+    arguments: tuple[Argument, ...]
 
     @property
-    def options(self) -> tuple[Word, ...]:
+    def options(self) -> tuple[Argument, ...]:
         """Those that begin with a hyphen."""
-        return tuple(word for word in self.words if word.names)
+        return tuple(one for one in self.arguments if one.names)
 
     @property
     def option_names(self) -> str:
         """All of them, for a list of words."""
-        return " ".join(name for word in self.options for name in word.names)
+        return " ".join(name for one in self.options for name in one.names)
 
     @property
     def choices(self) -> str:
         """The values of positionals that are chosen from."""
-        return " ".join(choice for word in self.words if not word.names for choice in word.choices)
+        return " ".join(choice for one in self.arguments if not one.names for choice in one.choices)
 
     @property
     def takes_files(self) -> bool:
         """Whether files are named without an option."""
-        return any(word.is_file for word in self.words if not word.names)
+        return any(one.is_file for one in self.arguments if not one.names)
 
 
 def commands_of(parser: argparse.ArgumentParser) -> list[Command]:
@@ -84,13 +82,13 @@ def commands_of(parser: argparse.ArgumentParser) -> list[Command]:
     (subparsers,) = (one for one in parser._actions if isinstance(one, argparse._SubParsersAction))
     helps = {one.dest: one.help or "" for one in subparsers._choices_actions}
     return [
-        Command(name, helps[name], tuple(_word(action) for action in command._actions))
+        Command(name, helps[name], tuple(_argument(action) for action in command._actions))
         for name, command in subparsers.choices.items()
     ]
 
 
-def _word(action: argparse.Action) -> Word:
-    return Word(
+def _argument(action: argparse.Action) -> Argument:
+    return Argument(
         tuple(action.option_strings),
         (action.help or "").replace("%%", "%"),
         tuple(str(choice) for choice in action.choices or ()),
@@ -139,7 +137,7 @@ def bash(commands: list[Command]) -> str:
     return _BASH % (values, _quoted(f"{names} --help --version"), words)
 
 
-def _bash_value(option: Word) -> str:
+def _bash_value(option: Argument) -> str:
     if option.choices:
         return f'COMPREPLY=($(compgen -W {_quoted(" ".join(option.choices))} -- "$word")); '
     return "compopt -o default; " if option.is_file else ""
@@ -176,19 +174,19 @@ if [[ $funcstack[1] == _combtrace ]]; then _combtrace "$@"; else compdef _combtr
 def zsh(commands: list[Command]) -> str:
     """The script for zsh."""
     names = "".join(f"            {_quoted(f'{one.name}:{one.help}')}\n" for one in commands)
-    cases = "".join(f"        {one.name}) _arguments {' '.join(_zsh_words(one))} ;;\n" for one in commands)
+    cases = "".join(f"        {one.name}) _arguments {' '.join(_zsh_arguments(one))} ;;\n" for one in commands)
     return _ZSH % (names, cases)
 
 
-def _zsh_words(command: Command) -> Iterator[str]:
+def _zsh_arguments(command: Command) -> Iterator[str]:
     if command.choices or command.takes_files:
         yield _quoted("*:value:" + (f"({command.choices})" if command.choices else "_files"))
-    for word in command.options:
-        action = f"({' '.join(word.choices)})" if word.choices else "_files" if word.is_file else " "
-        text = "".join(f"\\{one}" if one in "[]:\\" else one for one in word.help)
-        value = f":value:{action}" if word.takes_value else ""
-        for name in word.names:
-            yield _quoted(f"*{name}{'=' if word.takes_value and name.startswith('--') else ''}[{text}]{value}")
+    for option in command.options:
+        action = f"({' '.join(option.choices)})" if option.choices else "_files" if option.is_file else " "
+        text = "".join(f"\\{one}" if one in "[]:\\" else one for one in option.help)
+        value = f":value:{action}" if option.takes_value else ""
+        for name in option.names:
+            yield _quoted(f"*{name}{'=' if option.takes_value and name.startswith('--') else ''}[{text}]{value}")
 
 
 # --- fish -------------------------------------------------------------------------------------------------------------

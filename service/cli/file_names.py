@@ -29,6 +29,14 @@ def output_path(text: str) -> Path:
     return path
 
 
+def make_folder(option: str, path: Path) -> None:
+    """Make the folder that an option names; raise UserError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{option} {path}: cannot make the folder: {error.strerror}. Name another") from error
+
+
 def check_outputs(images: Iterable[Path], outputs: Sequence[tuple[str, Path]], *, drawn: str = "--overlay") -> None:
     """Raise UserError where an output, of an option, would replace a picture that is read, or another option's output.
 

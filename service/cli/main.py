@@ -12,15 +12,16 @@ from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_UNUSABLE, UserError
 from service.cli.examples import examples_of
 
-ROOMS = {
-    "daemon": ("run", "demo", "check", "trigger", "status", "halt", "resume", "confirm", "reset", "install-service"),
-    "pictures": ("cameras", "grab", "focus", "trace", "teach-table"),
-    "calibration": ("board", "calibrate", "align", "verify", "repeat"),
-    "controller": ("probe", "register-map", "simulate-controller", "simulate-service"),
-    "records": ("jobs", "replay"),
-    "": ("completion", "schema", "reasons"),
-}
-COMMANDS = tuple(name for names in ROOMS.values() for name in names)
+MODULES = (  # of this package, in the order of `--help`
+    *("daemon.run", "pictures.trace", "daemon.demo", "daemon.check", "daemon.trigger"),
+    *("controller.simulate_controller", "controller.simulate_service"),
+    *("pictures.cameras", "pictures.grab", "pictures.focus"),
+    *("calibration.board", "calibration.calibrate", "calibration.align", "calibration.verify", "calibration.repeat"),
+    *("pictures.teach_table", "controller.probe", "records.jobs", "records.replay"),
+    *("daemon.status", "daemon.halt", "daemon.resume", "daemon.confirm", "daemon.reset", "daemon.install_service"),
+    *("completion", "schema", "reasons", "controller.register_map"),
+)
+COMMANDS = {module.rpartition(".")[2].replace("_", "-"): f"service.cli.{module}" for module in MODULES}
 
 DESCRIPTION = """\
 NAME
@@ -72,8 +73,10 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="store_true", help="print the version and end")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="COMMANDS")
-    for name in COMMANDS:
-        module = _module(name)
+    parser.set_defaults(parser=parser)  # for the command that tells of all others
+    for name, place in COMMANDS.items():
+        # A command module: HELP, DESCRIPTION, add_arguments, run.
+        module = importlib.import_module(place)
         command = commands.add_parser(
             name,
             help=module.HELP,
@@ -85,11 +88,6 @@ def build_parser() -> argparse.ArgumentParser:
         command.add_argument("--debug", action="store_true", help="show a traceback with an error")
         command.set_defaults(handler=module.run)
     return parser
-
-
-def _module(name: str):  # type: ignore[no-untyped-def]  # a command module: HELP, DESCRIPTION, add_arguments, run
-    room = next(room for room, names in ROOMS.items() if name in names)
-    return importlib.import_module(".".join(filter(None, ("service.cli", room, name.replace("-", "_")))))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -21,8 +21,9 @@ from contour.acceptance.acceptance import judge_millimetres
 from contour.acceptance.error_budget import ErrorBudget
 from contour.geometry.rings import Contour, Ring, area, oriented_contour
 from drivers.camera import Frame
-from service.config.config import Recipe
-from service.measuring.measure import Measurement, Measurer, told
+from service.config.recipes import Recipe
+from service.measuring.measure import Measurer, rejections
+from service.measuring.measurement import Measurement
 
 LARGEST_FILE = 100_000_000
 LARGEST_COORDINATE_MM = 2_147_483.647  # what an i32 of micrometres holds
@@ -65,7 +66,7 @@ class GivenContours(Measurer):
             uncertainty=None if sure is None else ErrorBudget(sure, 0.0, None),
             thickness_mm=thickness_mm,
             aligned=self._aligned,
-            findings=told(judge_millimetres(given.contour, self._limits(recipe), sure)),
+            findings=rejections(judge_millimetres(given.contour, self._limits(recipe), sure)),
         )
 
 

@@ -10,7 +10,8 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from service.config.config import Config, FilesCamera
+from service.config.cameras import FilesCamera
+from service.config.config import Config
 
 USER = re.compile(r"[a-z_][a-z0-9_-]{0,30}")
 PLAIN = re.compile(r"[A-Za-z0-9/._:@+,=-]+")

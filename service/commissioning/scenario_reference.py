@@ -1,6 +1,7 @@
-"""The tables of docs/simulated-controller.md, made from the scenario's models, so that they cannot say what is not so.
+"""The tables of docs/reference/simulated-controller.md, made from the scenario's models, so that they say what is so.
 
-`python -m service.commissioning.scenario_reference docs/simulated-controller.md` writes them between its markers.
+`python -m service.commissioning.scenario_reference docs/reference/simulated-controller.md` writes them between its
+markers.
 """
 
 from __future__ import annotations

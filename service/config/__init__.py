@@ -1,1 +1,3 @@
-"""Files in, checked settings out, or mistakes with their lines. Used by all rooms of the service above it."""
+"""config.yaml in, checked settings out, or each mistake with its line; reference and JSON schema come from the same
+models. It uses no other room of the service, and all may use it.
+"""

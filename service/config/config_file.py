@@ -8,8 +8,9 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from service.config.config import Config, Recipe, Service
+from service.config.config import Config, Service
 from service.config.mistakes import Location, describe
+from service.config.recipes import Recipe
 from service.config.yaml_mistakes import FileLoader, in_words, unreadable
 
 LARGEST_FILE = 1_000_000

@@ -10,7 +10,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from service.config import config as models
+from service.config.config import Config
 from service.config.values import MistakeAt, TruthValue
 
 Location = tuple[int | str, ...]
@@ -220,7 +220,7 @@ def _kinds_of(model: type[BaseModel]) -> tuple[Any, ...]:
 # The words that choose a model of a union, which pydantic puts into an error's path.
 _KINDS = frozenset(
     word
-    for model in vars(models).values()
-    if isinstance(model, type) and issubclass(model, BaseModel)
+    for field in Config.model_fields.values()
+    for model in _models_in(field.annotation)
     for word in _kinds_of(model)
 )

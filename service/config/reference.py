@@ -1,6 +1,6 @@
 """The configuration's reference as Markdown, made from the models, so that it cannot say what is not so.
 
-`python -m service.config.reference docs/configuration.md config.schema.json` writes both generated files.
+`python -m service.config.reference docs/reference/configuration.md config.schema.json` writes both generated files.
 """
 
 from __future__ import annotations
@@ -15,26 +15,29 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from service.config import config
+from service.config import cameras, config, controllers, recipes, triggers
 from service.config.config_file import config_schema
 
 HEAD = """\
 # Configuration
 
-Made from the models in `service/config/config.py`; a test keeps it fresh. Unknown keys are refused with their path, and
+Made from the models in `service/config/`; a test keeps it fresh. Unknown keys are refused with their path, and
 relative paths count from the file's folder. `combtrace check` tries a configuration, `combtrace schema` prints its
 JSON schema.
 """
 
 SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("Top level", (config.Config,)),
-    ("`camera`", (config.FilesCamera, config.V4l2Camera)),
+    ("`camera`", (cameras.FilesCamera, cameras.V4l2Camera)),
     ("`calibration`", (config.Calibration,)),
-    ("`controller`", (config.ModbusTcp, config.ModbusRtu, config.ModbusRtuOverTcp, config.NoController)),
-    ("`controller.rs485`", (config.Rs485,)),
-    ("`triggers`", (config.IntervalTrigger, config.ControllerTrigger, config.SerialTrigger)),
-    ("`recipes`", (config.Recipe,)),
-    ("A recipe's `gcode`", (config.Gcode,)),
+    (
+        "`controller`",
+        (controllers.ModbusTcp, controllers.ModbusRtu, controllers.ModbusRtuOverTcp, controllers.NoController),
+    ),
+    ("`controller.rs485`", (controllers.Rs485,)),
+    ("`triggers`", (triggers.IntervalTrigger, triggers.ControllerTrigger, triggers.SerialTrigger)),
+    ("`recipes`", (recipes.Recipe,)),
+    ("A recipe's `gcode`", (recipes.Gcode,)),
     ("`table`", (config.Table,)),
     ("`service`", (config.Service,)),
     ("`journal`", (config.JournalSettings,)),
@@ -121,7 +124,7 @@ def _default(field: FieldInfo) -> str:
 
 def _parameters() -> str:
     text = "\n## A recipe's `parameters`\n\n| method | parameter | bounds |\n|---|---|---|\n"
-    for method, parameters in config.METHOD_PARAMETERS.items():
+    for method, parameters in recipes.METHOD_PARAMETERS.items():
         for name, (low, high) in parameters.items():
             text += f"| {method} | `{name}` | {low:g} to {high:g} |\n"
     return text

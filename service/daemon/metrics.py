@@ -1,6 +1,7 @@
 """Figures for Prometheus: what the daemon counts, and what it is like at the moment of a scrape.
 
-Off unless the configuration has `metrics`; needs the extra `combtrace[metrics]`. Names and meanings: docs/metrics.md.
+Off unless the configuration has `metrics`; needs the extra `combtrace[metrics]`. Names and meanings:
+docs/reference/metrics.md.
 """
 
 from __future__ import annotations

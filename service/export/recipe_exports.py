@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from contour.geometry.rings import Contour
-from service.config.config import Gcode, Recipe
+from service.config.recipes import Gcode, Recipe
 from service.export.document import ExportDocument, ExportError
 from service.export.files import exported, read_template
 from service.export.forms import ENDINGS
 from service.export.gcode import TEMPLATE, GcodeSettings
-from service.measuring.measure import Measurement
+from service.measuring.measurement import Measurement
 
 
 def gcode_settings(recipe: Recipe) -> GcodeSettings:

@@ -15,13 +15,14 @@ from contour.errors import ParameterError, PictureError
 from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
 from drivers.controller import ControllerError
 from drivers.controller.mailbox.mailbox import ContourTooLarge, MailboxError, Page, crc32_of, decode_header, withdrawal
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.jobs.health import Fault, Health, journal_fault
 from service.link.contour_message import Envelope, contour_pages
 from service.link.controller_clock import Stamp
 from service.link.link import Link
 from service.link.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
-from service.measuring.measure import Measurement, Measurer
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
 from service.reasons import Outcome, Reason
 from service.records.evidence import Evidence, Keeper, KeepsNothing
 from service.records.journal import Job, Journal, JournalError, Terms

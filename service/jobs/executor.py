@@ -78,6 +78,7 @@ class Executor:
         self.counts: Counter[tuple[str, str]] = Counter()
         self._wake = asyncio.Event()
         self._submitted: Ticket | None = None
+        self._submitting: asyncio.Future[Ticket] | None = None
         self._taking = False
         self._missed = 0
         self._told: set[str] = set()
@@ -121,9 +122,10 @@ class Executor:
         ours = block.owner == self._link.published.owner
         if (block.protocol_version, block.test_value) != (ServiceBlock().protocol_version, TEST_VALUE):
             block = replace(block, job_id=0, settled_job=0, trigger_ack=0)  # whatever stands there, it is no service's
-        session = self._link.view.session if self._link.view else 0
+        view = self._link.view
+        trigger = (view.session, view.trigger_counter) if view else (0, 0)
         running = self._health.job or 0
-        gone_on = await self._until_done(self._journal.go_on_above, block, session, self._room, running)
+        gone_on = await self._until_done(self._journal.go_on_above, block, trigger, self._room, running)
         self._numbered_above_last_job = False
         self._last_pair = await self._until_done(self._journal.last_controller_trigger)
         taken = await self._until_done(self._journal.last_taken)
@@ -202,10 +204,9 @@ class Executor:
         try:
             self._check_free()
             self._taking = True
-            try:
-                ticket = await self._ticket(trigger)
-            finally:
-                self._taking = False
+            self._submitting = asyncio.ensure_future(self._submit(trigger))
+            self._submitting.add_done_callback(lambda done: done.cancelled() or done.exception())  # seen, also alone
+            return await asyncio.shield(self._submitting)  # who asks may go away; what is durable is executed
         except TriggerRefused as refused:
             if refused.reason is Reason.BUSY and not self._queue.full:
                 queued = self._queue.add(trigger)
@@ -214,9 +215,14 @@ class Executor:
                 return queued
             self._refused(trigger, refused)
             raise
-        self._submitted = ticket
-        self._wake.set()
-        return ticket
+
+    async def _submit(self, trigger: TriggerStamp) -> Ticket:
+        try:
+            self._submitted = await self._ticket(trigger)
+            return self._submitted
+        finally:
+            self._taking = False
+            self._wake.set()
 
     def missed_by_source(self, kind: str, count: int) -> None:
         """Count triggers that a source could not even ask for."""

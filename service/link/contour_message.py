@@ -12,7 +12,7 @@ from drivers.controller.mailbox.mailbox import (
     encode_pages,
     micrometres,
 )
-from service.measuring.measure import Measurement
+from service.measuring.measurement import Measurement
 
 UNCERTAINTY_FACTOR = 1000.0  # mm to µm
 

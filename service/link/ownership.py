@@ -17,7 +17,7 @@ WATCH_S = 3.0  # how long a foreign heartbeat must stand still, and then how lon
 WATCH_OWN_S = 1.5  # how long a heartbeat beside our own number must stand still: a former life's does
 SHORT_PAUSE_S = 1.0  # without readings: a service that lives has moved its heartbeat by then
 NOBODY = 0  # in `owner`: registers that nobody has written yet
-OWN_BEATS_KEPT = 16  # of writes without a reply, one of which may land late
+OWN_BEATS_KEPT = 256  # own writes of the last seconds: one without a reply may land late
 
 
 class ForeignOwner(ControllerError):
@@ -45,6 +45,7 @@ class Ownership:
     def __init__(self, owner: int, *, now: Callable[[], float] = time.monotonic) -> None:
         self.owner = owner
         self._now = now
+        self._beats: deque[int] = deque(maxlen=OWN_BEATS_KEPT)  # that we may have written; one may land late
         self.epoch = 0  # starts of watching so far: what was confirmed in one says nothing in the next
         self.begin()
 
@@ -60,7 +61,7 @@ class Ownership:
         self._moved = False
         self._taken_over = False  # from a number that is not ours: our own must stand for a while
         self._doubted = False
-        self._beats: deque[int] | None = None  # that we may have written; None = whatever is found next
+        self._next_is_ours = False
 
     @property
     def ours(self) -> bool:
@@ -115,12 +116,11 @@ class Ownership:
 
     def controller_restarted(self) -> None:
         """Its registers may show what was there at any time before: the next heartbeat beside our number is ours."""
-        self._beats = None
+        self._next_is_ours = True
 
     def writing(self, beat: int) -> None:
         """The block is being written with this heartbeat: from here on it may be found."""
-        if self._beats is not None:
-            self._beats.append(beat)
+        self._beats.append(beat)
 
     def wrote(self) -> None:
         """A write was confirmed."""
@@ -149,11 +149,10 @@ class Ownership:
         self._beat = self._since_s = None
 
     def _saw_later(self, block: ServiceBlock) -> bool:
-        if self._beats is None and block.owner == self.owner:
-            self._beats = deque([block.service_heartbeat], OWN_BEATS_KEPT)
-        strange = self.is_foreign(block) or (
-            block.owner != NOBODY and self._beats is not None and block.service_heartbeat not in self._beats
-        )
+        if self._next_is_ours and block.owner == self.owner:
+            self._beats.append(block.service_heartbeat)
+            self._next_is_ours = False
+        strange = block.owner != NOBODY and (self.is_foreign(block) or block.service_heartbeat not in self._beats)
         if strange and self._doubted:
             self._phase, self._other = _Phase.CONFLICT, block.owner
             return False
@@ -167,7 +166,7 @@ class Ownership:
     def _watch(self, block: ServiceBlock) -> bool:
         """At the start: True where what stands there has stood still for as long as it must."""
         if block.owner == NOBODY:
-            self._other, self._beats = NOBODY, deque(maxlen=OWN_BEATS_KEPT)
+            self._other = NOBODY
             return True
         now = self._now()
         if block.owner != self._other:
@@ -185,5 +184,5 @@ class Ownership:
         if now - self._since_s < (WATCH_S if foreign else WATCH_OWN_S):
             return False
         self._taken_over = self._taken_over or foreign
-        self._beats = deque([block.service_heartbeat], OWN_BEATS_KEPT)
+        self._beats.append(block.service_heartbeat)
         return True

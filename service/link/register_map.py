@@ -1,7 +1,7 @@
 """Every register of the mailbox as Markdown, at the addresses of a layout; made from the codec's own tables.
 
-`combtrace register-map` prints it for a configuration; `python -m service.link.register_map docs/register-map.md`
-writes the page of the default layout.
+`combtrace register-map` prints it for a configuration; `python -m service.link.register_map
+docs/reference/register-map.md` writes the page of the default layout.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from contour.calibration.calibration import Calibration, CameraCalibration
+from contour.calibration.calibration import Calibration
 from contour.calibration.fixed_marks import Sentinels
 from contour.errors import CalibrationError
 from service.atomic_file import write_whole
@@ -47,11 +47,6 @@ class CalibrationRecord:
     made: dict[str, str | float | None] = field(default_factory=dict)
     digest: str = field(default="", compare=False)
     content: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
-
-
-def load_calibration(path: Path) -> Calibration:
-    """The calibration of a file; raise CalibrationFileError."""
-    return load_record(path).calibration
 
 
 def load_record(path: Path) -> CalibrationRecord:
@@ -90,12 +85,6 @@ def record_of(data: dict[str, Any], path: str) -> CalibrationRecord:
         )
     except CalibrationError as error:
         raise CalibrationFileError(f"{path}: {error}") from error
-
-
-def save_calibration(path: Path, calibration: Calibration) -> None:
-    """Write a calibration with its hash, and nothing besides; otherwise as `save_record`."""
-    name = calibration.camera_name if isinstance(calibration, CameraCalibration) else ""
-    save_record(path, CalibrationRecord(calibration, name))
 
 
 def save_record(path: Path, record: CalibrationRecord) -> None:

@@ -17,7 +17,8 @@ SECONDS_A_DAY = 86_400.0
 CLOCK_SLACK_DAYS = 1.0
 """A file may have been written on a computer whose clock is set otherwise; a day is no such difference."""
 
-Finding = tuple[Reason, str]
+Rejection = tuple[Reason, str]
+"""A reason to refuse a picture, and the sentence with the measured value and the limit."""
 
 
 def utc_now() -> datetime:
@@ -51,7 +52,7 @@ class CalibrationGuard:
             return None
         return (self._now() - self.record.created).total_seconds() / SECONDS_A_DAY
 
-    def findings(self, picture: NDArray[np.uint8], camera: str = "") -> tuple[Finding, ...]:
+    def findings(self, picture: NDArray[np.uint8], camera: str = "") -> tuple[Rejection, ...]:
         """Every reason not to use it for a frame of this camera ("" = not told), lowest code first."""
         found = [self.expired(), self.other_camera(camera)]
         calibration = self.record.calibration
@@ -59,7 +60,7 @@ class CalibrationGuard:
             found.append(self.moved(self.sentinels(picture)))
         return tuple(sorted((one for one in found if one is not None), key=lambda one: one[0]))
 
-    def expired(self) -> Finding | None:
+    def expired(self) -> Rejection | None:
         """141 where it is older than allowed, or does not say how old it is."""
         limit, age = self.limits.max_age_days, self.age_days
         if not limit:
@@ -74,7 +75,7 @@ class CalibrationGuard:
             return None
         return Reason.CALIBRATION_MISMATCH, text
 
-    def other_camera(self, camera: str) -> Finding | None:
+    def other_camera(self, camera: str) -> Rejection | None:
         """141 where the calibration names another camera than the frame's; where one is not named, none."""
         own = self.record.camera_name
         if not own or not camera or own == camera:
@@ -87,7 +88,7 @@ class CalibrationGuard:
         marks = self.record.sentinels
         return None if marks is None else check_sentinels(picture, marks)
 
-    def moved(self, check: SentinelCheck | None) -> Finding | None:
+    def moved(self, check: SentinelCheck | None) -> Rejection | None:
         """142 where a mark is off by more than the tolerance, or none is seen and one is required."""
         if check is None:
             return None

@@ -5,95 +5,30 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contour.acceptance.acceptance import Finding, Limits, judge, judge_table, judge_without_block, other_blocks
 from contour.acceptance.error_budget import ErrorBudget, error_budget
-from contour.acceptance.quality import Quality
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
 from contour.geometry.rings import Contour, Ring, densified
 from contour.image.region import Region
-from contour.image.taught_table import TableLimits, look_at
+from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.tracing import Trace, TraceSettings, check_picture, trace
-from service.config.config import Recipe
-from service.measuring.calibration_guard import CalibrationGuard
+from service.config.recipes import Recipe
+from service.measuring.calibration_guard import CalibrationGuard, Rejection
+from service.measuring.measurement import Measurement
 from service.measuring.table_file import TableRecord
 from service.reasons import Reason
 
 log = logging.getLogger("combtrace.measure")
 
 _ROI_STEPS = 12
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """What was seen in one picture: the contour, where there is one, and the findings against it, lowest code first.
-
-    pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
-    has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
-    was refused (116).
-    """
-
-    method: str
-    polarity: str | None = None
-    pitch_px: float | None = None
-    pixels: Contour | None = None
-    other_blocks_px: tuple[Ring, ...] = ()
-    millimetres: Contour | None = None
-    area_px2: float | None = None
-    area_mm2: float | None = None
-    uncertainty_px: float | None = None
-    uncertainty: ErrorBudget | None = None
-    thickness_mm: float | None = None
-    aligned: bool = False
-    quality: Quality | None = None
-    findings: tuple[tuple[Reason, str], ...] = ()
-    timings_ms: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def reasons(self) -> tuple[Reason, ...]:
-        """Why it is refused, lowest code first; empty where it is not."""
-        return tuple(reason for reason, _ in self.findings)
-
-    @property
-    def texts(self) -> tuple[str, ...]:
-        """The findings as sentences, each with the measured value and the limit."""
-        return tuple(text for _, text in self.findings)
-
-    @property
-    def uncertainty_mm(self) -> float | None:
-        """95 % bound on the position of the polygon that is sent, all causes together; None where it is not known."""
-        return None if self.uncertainty is None else self.uncertainty.total_mm
-
-    @property
-    def size_mm(self) -> tuple[float, float] | None:
-        """Width and height of the contour's box in the machine frame."""
-        if self.millimetres is None:
-            return None
-        width, height = np.ptp(self.millimetres.exterior, axis=0).tolist()
-        return width, height
-
-    def summary(self) -> dict[str, Any]:
-        """What the journal keeps of it."""
-        contour = self.pixels or self.millimetres
-        return {
-            "method": self.method,
-            "polarity": self.polarity,
-            "pitch_px": _rounded(self.pitch_px),
-            "vertices": 0 if contour is None else contour.point_count,
-            "area_mm2": _rounded(self.area_mm2),
-            "uncertainty_mm": _rounded(self.uncertainty_mm),
-            "thickness_mm": self.thickness_mm,
-            "quality": None if self.quality is None else {k: _rounded(v) for k, v in asdict(self.quality).items()},
-            "timings_ms": {name: _rounded(value) for name, value in self.timings_ms.items()},
-        }
 
 
 class _Stopwatch:
@@ -170,7 +105,7 @@ class Measurer:
             result = self._traced(picture, recipe, thickness_mm, result, watch, camera)
         except NoBlockFound as error:
             watch.lap("trace")
-            result = replace(result, findings=told(judge_without_block(picture, str(error))))
+            result = replace(result, findings=rejections(judge_without_block(picture, str(error))))
         except CalibrationError as error:
             result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))
         if self._guard is not None:
@@ -199,16 +134,11 @@ class Measurer:
         if calibration is not None:
             calibration.check_fits(width, height)
         if self._table is not None:
-            if camera and self._table.camera not in ("", camera):
-                raise CalibrationError(
-                    f"The table was taught with camera {self._table.camera}, the picture is of {camera}. Use that "
-                    "camera, or teach the table again."
-                )
-            look = look_at(picture, self._table.table)
+            look = self._look_at_table(self._table, picture, camera)
             watch.lap("table")
             changes = judge_table(look, TableLimits())
             if changes:
-                return replace(result, findings=told(changes))
+                return replace(result, findings=rejections(changes))
             picture = look.picture
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
@@ -216,30 +146,11 @@ class Measurer:
         result = replace(
             result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour, quality=traced.quality
         )
-        polygon = cutting_polygon(
-            traced.contour,
-            calibration,
-            height_mm=thickness_mm,
-            tolerance_mm=recipe.tolerance_mm,
-            finish=Finish(recipe.margin_mm, recipe.max_vertices, recipe.budget_mm, recipe.first_vertex),
-            on_stage=watch.lap,
-        )
-        # What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither.
-        # What the vertex budget gave up is of one sign, and adds in full.
-        sure_px = traced.uncertainty_px
-        if sure_px is not None:
-            sure_px = float(np.hypot(sure_px, polygon.shift_px)) + polygon.given_up_px
+        polygon = self._polygon(traced.contour, recipe, thickness_mm, watch)
+        sure_px = _uncertainty_px(traced, polygon)
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
         limits = self._limits(recipe)
-        findings = judge(
-            polygon,
-            (width, height),
-            limits,
-            traced=traced,
-            region=region,
-            budget=budget,
-            picture=picture,
-        )
+        findings = judge(polygon, (width, height), limits, traced=traced, region=region, budget=budget, picture=picture)
         watch.lap("judge")
         return replace(
             result,
@@ -250,7 +161,25 @@ class Measurer:
             area_mm2=polygon.area_mm2,
             uncertainty_px=sure_px,
             uncertainty=budget,
-            findings=told(findings),
+            findings=rejections(findings),
+        )
+
+    def _look_at_table(self, record: TableRecord, picture: NDArray[np.uint8], camera: str) -> TableLook:
+        if camera and record.camera not in ("", camera):
+            raise CalibrationError(
+                f"The table was taught with camera {record.camera}, the picture is of {camera}. Use that "
+                "camera, or teach the table again."
+            )
+        return look_at(picture, record.table)
+
+    def _polygon(self, contour: Contour, recipe: Recipe, thickness_mm: float, watch: _Stopwatch) -> Polygon:
+        return cutting_polygon(
+            contour,
+            self._calibration,
+            height_mm=thickness_mm,
+            tolerance_mm=recipe.tolerance_mm,
+            finish=Finish(recipe.margin_mm, recipe.max_vertices, recipe.budget_mm, recipe.first_vertex),
+            on_stage=watch.lap,
         )
 
     def _region(self, recipe: Recipe, thickness_mm: float) -> Region | None:
@@ -293,7 +222,18 @@ class Measurer:
         )
 
 
-def told(findings: tuple[Finding, ...]) -> tuple[tuple[Reason, str], ...]:
+def _uncertainty_px(traced: Trace, polygon: Polygon) -> float | None:
+    """95 % bound on where the polygon's edges lie, px; None where tracing gives none.
+
+    What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither. What the
+    vertex budget gave up is of one sign, and adds in full.
+    """
+    if traced.uncertainty_px is None:
+        return None
+    return float(np.hypot(traced.uncertainty_px, polygon.shift_px)) + polygon.given_up_px
+
+
+def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:
     """The findings by the names that journal and registers carry."""
     return tuple((Reason(int(finding.refusal)), finding.text) for finding in findings)
 
@@ -317,7 +257,3 @@ def step_doubt(recipe: Recipe, pitch_px: float | None = None) -> str | None:
     if core is None and pitch_px is not None:
         core = default_core_px(pitch_px)
     return None if step is None or core is None else coarse_step(int(core), int(step))
-
-
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(float(value), 3)

@@ -20,12 +20,13 @@ from contour.acceptance.quality import Quality
 from contour.geometry.rings import Contour
 from drivers.camera import Frame
 from drivers.controller.mailbox.mailbox import Page
-from service.config.config import Recipe
 from service.config.mistakes import describe
+from service.config.recipes import Recipe
 from service.link.contour_message import Envelope
 from service.measuring.calibration_file import CalibrationFileError, record_of
 from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
-from service.measuring.measure import Measurement, Measurer
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
 from service.measuring.table_file import TableFileError, TableRecord, load_table
 from service.reasons import Reason
 from service.records.archive import DRAFT, PLAIN_FRAME, TABLES, document_of, folder_of

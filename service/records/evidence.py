@@ -21,9 +21,10 @@ from contour.geometry.rings import Contour
 from contour.image.overlay import draw_overlay
 from drivers.camera import Frame
 from drivers.controller.mailbox.mailbox import Page
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.link.contour_message import Envelope
-from service.measuring.measure import Measurement, Measurer
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
 from service.measuring.table_file import TableRecord
 from service.records.journal import Job, pages_to_text
 from service.records.pictures import caption

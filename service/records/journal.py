@@ -302,21 +302,23 @@ class Journal:
             )
         return Job(job_id, taken_at, trigger)
 
-    def go_on_above(self, found: ServiceBlock, session: int, room: int, running: int = 0) -> GoneOn:
-        """Begin at a controller whose service block shows `found` in its session `session`; durable on return.
+    def go_on_above(self, found: ServiceBlock, trigger: tuple[int, int], room: int, running: int = 0) -> GoneOn:
+        """Begin at a controller with `found` as service block and `trigger` as (session, counter); durable on return.
 
         New jobs are numbered from more than `room` above all that is known. The block's trigger counts as taken where
-        it is later than ours, and its job, where it had not ended there and is not in the journal, becomes one of ours
-        that is to be taken back: the block may be another service's, and the journal may be an old one. `running` is a
-        job of this life, which knows itself what was sent of it.
+        it is later than ours and ours is not the controller's newest one. Its job, where it had not ended there and is
+        not in the journal, becomes one of ours that is to be taken back: the block may be another service's, and the
+        journal may be an old one. `running` is a job of this life, which knows itself what was sent of it.
         """
+        session, _ = trigger
         with self._transaction() as db:
             highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
             adopted = max(found.job_id, found.settled_job, self._number("adopted_job"))
             known = max(highest, adopted, self._number("above")) or self._number("otherwise_from") - 1
             self._keep(adopted_job=adopted, begin_above=min(known + room, LARGEST_JOB - 1))
             pair = (found.session_ack, found.trigger_ack)
-            later = _is_later(pair, self._last_pair(), session)
+            ours = self._last_pair()
+            later = ours != trigger and _is_later(pair, ours, session)
             if later:
                 self._keep(adopted_above=highest, adopted_session=pair[0], adopted_counter=pair[1])
             if session:  # one that this journal calls unsent may have been sent in a life that it does not know

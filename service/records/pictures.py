@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.image.overlay import draw_overlay
-from service.measuring.measure import Measurement
+from service.measuring.measurement import Measurement
 
 
 class PictureFileError(Exception):

@@ -16,7 +16,7 @@ from contour.geometry.rings import Contour, hausdorff
 from drivers.controller.mailbox.mailbox import HEADER_FIELDS, ContourTooLarge, MailboxError, Page
 from drivers.controller.mailbox.words import Unpacking, WordOrder
 from service.link.contour_message import Envelope, contour_pages
-from service.measuring.measure import Measurement
+from service.measuring.measurement import Measurement
 from service.reasons import Reason
 from service.records.archived_job import ArchivedJob, EvidenceError, recipe_with
 from service.records.evidence import measurement_fields

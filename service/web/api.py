@@ -8,10 +8,10 @@ import logging
 import math
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
@@ -21,44 +21,42 @@ from service.records.archived_job import EvidenceError, load_archived
 from service.records.evidence import FRAME, Evidence, job_fields
 from service.records.journal import Job
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
-from service.web import models as answers
-from service.web.commands import Orders, Refusal
-from service.web.daemon_access import DaemonSilent, Window
+from service.web import models
+from service.web.commands import Commands, RequestRefused
+from service.web.daemon_access import DaemonAccess, DaemonSilent
 from service.web.drawing import drawing
 from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept, tag_of
-from service.web.guard import BodyTooLarge, plain_address
+from service.web.guard import BodyTooLarge
 from service.web.live import MOST_VIEWERS, PERIOD_S, EventStream, Live
 from service.web.openapi import PREFIX, document
 from service.web.operations_table import MOST_JOBS, MOST_NOTES, OPERATIONS
+from service.web.requests import LARGEST_JOB, address_of, body, job_number, truth, whole_number
 
-M = TypeVar("M", bound=BaseModel)
 Endpoint = Callable[[Request], Awaitable[Response]]
 
 log = logging.getLogger("combtrace.page")
-
-LARGEST_JOB = 0xFFFFFFFF
 
 
 class Api:
     """The endpoints."""
 
-    def __init__(self, window: Window, orders: Orders, version: str) -> None:
-        self._window = window
-        self._orders = orders
-        self._archive = window.sources.archive_path
-        self._journal = window.sources.journal_path
+    def __init__(self, daemon: DaemonAccess, commands: Commands, version: str) -> None:
+        self._daemon = daemon
+        self._commands = commands
+        self._archive = daemon.sources.archive_path
+        self._journal = daemon.sources.journal_path
         self._pictures = Pictures()
-        self.live = Live(window)
-        if window.sources.archive is not None:
-            window.sources.archive.on_stored = self._stored
+        self.live = Live(daemon)
+        if daemon.sources.archive is not None:
+            daemon.sources.archive.on_stored = self._stored
         self._document = json.dumps(document(OPERATIONS, version), ensure_ascii=False).encode()
         self._reasons = _encoded(_reasons())
 
     def close(self) -> None:
         """Let go of threads."""
         self.live.close()
-        if self._window.sources.archive is not None:
-            self._window.sources.archive.on_stored = lambda _evidence: None
+        if self._daemon.sources.archive is not None:
+            self._daemon.sources.archive.on_stored = lambda _evidence: None
         self._pictures.close()
 
     def _stored(self, evidence: Evidence) -> None:
@@ -75,7 +73,7 @@ class Api:
 
     def routes(self) -> list[Route]:
         """All of them."""
-        looking = {
+        gets = {
             "/state": self.state,
             "/jobs": self.jobs,
             "/jobs/{job}": self.job,
@@ -87,55 +85,57 @@ class Api:
             "/audit": self.audit,
             "/openapi.json": self.openapi,
         }
-        asking = {"/trigger": self.trigger, "/halt": self.halt, "/resume": self.resume}
+        posts = {"/trigger": self.trigger, "/halt": self.halt, "/resume": self.resume}
         return [
-            *(Route(PREFIX + path, told(endpoint), methods=["GET"]) for path, endpoint in looking.items()),
-            *(Route(PREFIX + path, told(endpoint), methods=["POST"]) for path, endpoint in asking.items()),
+            *(Route(PREFIX + path, with_problems(endpoint), methods=["GET"]) for path, endpoint in gets.items()),
+            *(Route(PREFIX + path, with_problems(endpoint), methods=["POST"]) for path, endpoint in posts.items()),
         ]
 
     # --- looking ------------------------------------------------------------------------------------------------
 
     async def state(self, _request: Request) -> Response:
         """The service now."""
-        return _answer(answers.ServiceState.model_validate(await self._window.state()))
+        return _answer(models.ServiceState.model_validate(await self._daemon.state()))
 
     async def jobs(self, request: Request) -> Response:
         """The newest jobs."""
-        wanted = JobFilter(below=_whole(request, "before", LARGEST_JOB, None), faulty=_truth(request, "only_refused"))
-        limit = _whole(request, "limit", MOST_JOBS, 24)
+        wanted = JobFilter(
+            below=whole_number(request, "before", LARGEST_JOB, None), faulty=truth(request, "only_refused")
+        )
+        limit = whole_number(request, "limit", MOST_JOBS, 24)
         return _answer(await asyncio.to_thread(self._found_jobs, wanted, limit))
 
-    def _found_jobs(self, wanted: JobFilter, limit: int | None) -> answers.Jobs:
+    def _found_jobs(self, wanted: JobFilter, limit: int | None) -> models.Jobs:
         with reading(self._journal) as journal:
             found = journal.jobs(wanted, limit)
-        return answers.Jobs(jobs=[self._told(job) for job in reversed(found)])
+        return models.Jobs(jobs=[self._described(job) for job in reversed(found)])
 
     async def job(self, request: Request) -> Response:
         """One job."""
-        return _answer(await asyncio.to_thread(lambda: self._told(self._found(_job_number(request)))))
+        return _answer(await asyncio.to_thread(lambda: self._described(self._found(job_number(request)))))
 
     def _found(self, number: int) -> Job:
         with reading(self._journal) as journal:
             job = journal.find(number)
         if job is None:
-            raise Refusal(404, f"the journal has no job {number}")
+            raise RequestRefused(404, f"the journal has no job {number}")
         return job
 
-    def _told(self, job: Job) -> answers.Job:
-        return answers.Job(**job_fields(job), files=files_kept(self._archive, job))
+    def _described(self, job: Job) -> models.Job:
+        return models.Job(**job_fields(job), files=files_kept(self._archive, job))
 
     async def file(self, request: Request) -> Response:
         """A file of a job's evidence, to be saved."""
-        number, name = _job_number(request), request.path_params["name"]
+        number, name = job_number(request), request.path_params["name"]
         path = await asyncio.to_thread(self._kept, number, name)
         return FileResponse(path, media_type=FILES[name], filename=f"job-{number}-{name}")
 
     async def frame(self, request: Request) -> Response:
         """A job's frame, made small."""
-        number = _job_number(request)
-        width_px = _whole(request, "width", WIDTHS_PX[-1], WIDTHS_PX[-1])
+        number = job_number(request)
+        width_px = whole_number(request, "width", WIDTHS_PX[-1], WIDTHS_PX[-1])
         if width_px is None or width_px not in WIDTHS_PX:
-            raise Refusal(400, f"width is {width_px}, expected one of {', '.join(map(str, WIDTHS_PX))}")
+            raise RequestRefused(400, f"width is {width_px}, expected one of {', '.join(map(str, WIDTHS_PX))}")
         path = await asyncio.to_thread(self._kept, number, FRAME)
         tag = tag_of(path)
         etag = f'"{tag}-{width_px}"'
@@ -145,27 +145,27 @@ class Api:
         try:
             picture = await self._pictures.small(path, tag, width_px)
         except NoPicture as error:
-            raise Refusal(404, f"job {number}: {error}") from error
+            raise RequestRefused(404, f"job {number}: {error}") from error
         return Response(picture, media_type="image/jpeg", headers=headers)
 
     def _kept(self, number: int, name: str) -> Path:
         try:
             path = file_of(self._archive, self._found(number), name)
         except KeyError as error:
-            raise Refusal(404, f"there are only {', '.join(FILES)}") from error
+            raise RequestRefused(404, f"there are only {', '.join(FILES)}") from error
         if path is None:
-            raise Refusal(404, f"{name} of job {number} is not kept. See archive.max_bytes")
+            raise RequestRefused(404, f"{name} of job {number} is not kept. See archive.max_bytes")
         return path
 
     async def drawing(self, request: Request) -> Response:
         """What is drawn over a job's frame."""
-        number = _job_number(request)
+        number = job_number(request)
         return _answer(await asyncio.to_thread(lambda: drawing(load_archived(self._archive, number))))
 
     async def events(self, _request: Request) -> Response:
         """The state, as it changes."""
         if self.live.full:
-            raise Refusal(503, f"{MOST_VIEWERS} viewers watch already", again_s=PERIOD_S)
+            raise RequestRefused(503, f"{MOST_VIEWERS} viewers watch already", again_s=PERIOD_S)
         return EventStream(self.live)
 
     async def reasons(self, _request: Request) -> Response:
@@ -179,45 +179,45 @@ class Api:
     async def audit(self, request: Request) -> Response:
         """Who asked for what; only for those who may ask too."""
         await self._holder(request)
-        limit = _whole(request, "limit", MOST_NOTES, 100)
+        limit = whole_number(request, "limit", MOST_NOTES, 100)
         return _answer(await asyncio.to_thread(self._notes, limit or 0))
 
-    def _notes(self, limit: int) -> answers.Notes:
+    def _notes(self, limit: int) -> models.Notes:
         with reading(self._journal) as journal:
-            return answers.Notes(notes=[answers.NoteEntry(**vars(note)) for note in journal.notes(limit)])
+            return models.Notes(notes=[models.NoteEntry(**vars(note)) for note in journal.notes(limit)])
 
     # --- asking -------------------------------------------------------------------------------------------------
 
     async def trigger(self, request: Request) -> Response:
         """One job."""
-        who, address = await self._holder(request), _address(request)
-        asked = await _body(request, answers.TriggerRequest)
-        job = await self._orders.trigger(who, address, asked.recipe, asked.thickness_mm)
-        return _answer(answers.Triggered(job=job), 202)
+        who, address = await self._holder(request), address_of(request)
+        asked = await body(request, models.TriggerRequest)
+        job = await self._commands.trigger(who, address, asked.recipe, asked.thickness_mm)
+        return _answer(models.Triggered(job=job), 202)
 
     async def halt(self, request: Request) -> Response:
         """No trigger from now on."""
-        who, address = await self._holder(request), _address(request)
-        asked = await _body(request, answers.HaltRequest)
-        return _answer(answers.StateAfter(state=await self._orders.halt(who, address, asked.reason)))
+        who, address = await self._holder(request), address_of(request)
+        asked = await body(request, models.HaltRequest)
+        return _answer(models.StateAfter(state=await self._commands.halt(who, address, asked.reason)))
 
     async def resume(self, request: Request) -> Response:
         """The end of a halt."""
-        who, address = await self._holder(request), _address(request)
-        await _body(request, answers.Nothing)
-        return _answer(answers.StateAfter(state=await self._orders.resume(who, address)))
+        who, address = await self._holder(request), address_of(request)
+        await body(request, models.Nothing)
+        return _answer(models.StateAfter(state=await self._commands.resume(who, address)))
 
     async def _holder(self, request: Request) -> str:
-        return await self._orders.holder(request.headers.get("authorization"), _address(request))
+        return await self._commands.holder(request.headers.get("authorization"), address_of(request))
 
 
-def told(endpoint: Endpoint) -> Endpoint:
+def with_problems(endpoint: Endpoint) -> Endpoint:
     """The endpoint, with what it refuses told as a Problem."""
 
     async def answered(request: Request) -> Response:
         try:
             return await endpoint(request)
-        except Refusal as refusal:
+        except RequestRefused as refusal:
             return problem(refusal.status, str(refusal), refusal.reason, refusal.again_s)
         except (DaemonSilent, JournalUnreadable) as error:
             return problem(503, str(error))
@@ -234,7 +234,7 @@ def problem(status: int, text: str, reason: Reason | None = None, again_s: float
     headers = {"www-authenticate": "Bearer"} if status == 401 else {}
     if again_s is not None:
         headers["retry-after"] = str(math.ceil(again_s))
-    told = answers.Problem(
+    told = models.Problem(
         error=text, code=None if reason is None else int(reason), name=None if reason is None else reason.label
     )
     return _answer(told, status, headers)
@@ -248,49 +248,13 @@ def _encoded(model: BaseModel) -> bytes:
     return model.model_dump_json().encode()
 
 
-def _address(request: Request) -> str:
-    return "unknown" if request.client is None else plain_address(request.client.host)
-
-
-def _job_number(request: Request) -> int:
-    text = request.path_params["job"]
-    if not (text.isascii() and text.isdecimal() and len(text) <= 10 and 0 < int(text) <= LARGEST_JOB):
-        raise Refusal(404, "a job is a number from 1 on")
-    return int(text)
-
-
-def _whole(request: Request, name: str, most: int, otherwise: int | None) -> int | None:
-    text = request.query_params.get(name)
-    if text is None:
-        return otherwise
-    if not (text.isascii() and text.isdecimal() and len(text) <= 10 and 1 <= int(text) <= most):
-        raise Refusal(400, f"{name} is {text[:20]!r}, expected a whole number from 1 to {most}")
-    return int(text)
-
-
-def _truth(request: Request, name: str) -> bool:
-    text = request.query_params.get(name, "false")
-    if text not in ("true", "false"):
-        raise Refusal(400, f"{name} is {text[:20]!r}, expected true or false")
-    return text == "true"
-
-
-async def _body(request: Request, model: type[M]) -> M:
-    try:
-        return model.model_validate_json(await request.body() or b"{}")
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        where = ".".join(map(str, first["loc"])) or "the body"
-        raise Refusal(422, f"{where}: {first['msg']}") from error
-
-
-def _reasons() -> answers.Reasons:
+def _reasons() -> models.Reasons:
     def text(reason: Reason, language: Language) -> Any:
         told = reason.explained(language)
-        return answers.ReasonText(sentence=told.sentence, next_action=told.next_action)
+        return models.ReasonText(sentence=told.sentence, next_action=told.next_action)
 
     entries = [
-        answers.ReasonEntry(
+        models.ReasonEntry(
             code=int(reason),
             name=reason.label,
             outcome=str(reason.outcome),
@@ -299,4 +263,4 @@ def _reasons() -> answers.Reasons:
         )
         for reason in Reason
     ]
-    return answers.Reasons(reasons=entries)
+    return models.Reasons(reasons=entries)

@@ -53,7 +53,7 @@ class Sources:
     storage: StorageWatch | None = None
 
 
-class Window:
+class DaemonAccess:
     """The daemon as the page sees it; `open` is called in the daemon's loop, before anything else."""
 
     def __init__(self, sources: Sources) -> None:

@@ -23,7 +23,7 @@ from service.web.models import Axis, Drawing, Grid, SentinelMark
 
 Floats = NDArray[np.float64]
 
-GRID_COLUMNS, GRID_ROWS = 33, 25  # between the nodes a browser interpolates: docs/operators-guide.md says how well
+GRID_COLUMNS, GRID_ROWS = 33, 25  # a browser interpolates between them: docs/how-to/operators-guide.md says how well
 LINES_WANTED = 10
 LINE_POINTS = 33
 

@@ -20,7 +20,7 @@ from tests.support.structured_text import Program, StructuredTextError, compiled
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "controllers" / "iec61131"
 TEXT = (FOLDER / "combtrace.st").read_text(encoding="utf-8")
-VECTORS = json.loads((ROOT / "docs" / "golden-vectors.json").read_text(encoding="utf-8"))
+VECTORS = json.loads((ROOT / "docs" / "reference" / "golden-vectors.json").read_text(encoding="utf-8"))
 sys.path.insert(0, str(FOLDER))
 from golden_vectors import program  # noqa: E402
 
@@ -287,7 +287,7 @@ def test_a_service_that_falls_silent_is_not_asked():
 
 def test_the_golden_program_is_what_the_vectors_make_now():
     assert (FOLDER / "golden_vectors.st").read_text(encoding="utf-8") == program(VECTORS), (
-        "write it anew: python3 controllers/iec61131/golden_vectors.py docs/golden-vectors.json "
+        "write it anew: python3 controllers/iec61131/golden_vectors.py docs/reference/golden-vectors.json "
         "controllers/iec61131/golden_vectors.st"
     )
 

@@ -17,7 +17,7 @@ import mailbox as bridge  # noqa: E402
 
 from modbus_server import ModbusServer, answer  # noqa: E402
 
-VECTORS = json.loads((ROOT / "docs" / "golden-vectors.json").read_text())
+VECTORS = json.loads((ROOT / "docs" / "reference" / "golden-vectors.json").read_text())
 
 
 class FixedMailbox(bridge.Mailbox):

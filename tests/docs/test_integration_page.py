@@ -11,7 +11,7 @@ from service.commissioning.given_shapes import SHAPES
 from service.link.register_map import MEANINGS, register_map
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGE = (DOCS / "integrating-a-controller.md").read_text(encoding="utf-8")
+PAGE = (DOCS / "how-to" / "integrating-a-controller.md").read_text(encoding="utf-8")
 
 
 def rows(page: str, name_column: int) -> list[tuple[str, str, str]]:
@@ -39,5 +39,5 @@ def test_names_in_code_marks_that_look_like_registers_are_registers() -> None:
 
 def test_the_shapes_that_it_names_are_there_and_the_crc_is_the_first_vectors() -> None:
     assert set(re.findall(r"--shape (\w+)", PAGE)) <= SHAPES.keys()
-    page = json.loads((DOCS / "golden-vectors.json").read_text())["contours"][0]["pages"][0]
+    page = json.loads((DOCS / "reference" / "golden-vectors.json").read_text())["contours"][0]["pages"][0]
     assert f"{crc32_of(page['header'], page['payload']):08X}" in PAGE

@@ -17,7 +17,8 @@ import pytest
 
 from drivers.controller.simulated.contour import PageCopy
 from drivers.controller.simulated.controller import SimulatedController
-from service.commissioning.hil.bench import HEARTBEAT_S, HilError, open_bench
+from service.commissioning.hil.bench import open_bench
+from service.commissioning.hil.presence import HEARTBEAT_S, HilError
 
 SERVICE_HEARTBEAT = 18
 SERVICE_OWNER = 27

@@ -1,4 +1,4 @@
-"""The table of rules in docs/reliability.md: `python -m tests.rules.page` writes it."""
+"""The table of rules in docs/reports/reliability.md: `python -m tests.rules.page` writes it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tests.rules.table import RULES
 
-PAGE = Path(__file__).parents[2] / "docs" / "reliability.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reports" / "reliability.md"
 BEGIN, END = "<!-- rules: written by `python -m tests.rules.page` -->", "<!-- end of rules -->"
 
 

@@ -1,4 +1,4 @@
-"""The table of rules names code and tests that exist, and docs/reliability.md shows it as it is."""
+"""The table of rules names code and tests that exist, and docs/reports/reliability.md shows it as it is."""
 
 from __future__ import annotations
 

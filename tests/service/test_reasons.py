@@ -57,8 +57,8 @@ def test_what_the_core_refuses_for_stands_in_the_table_under_the_same_name() -> 
 
 
 def test_the_docs_page_is_fresh() -> None:
-    fresh = "python -m service.reasons_doc docs/reasons.md"
-    assert (ROOT / "docs" / "reasons.md").read_text(encoding="utf-8") == page(), f"write it anew: {fresh}"
+    fresh = "python -m service.reasons_doc docs/reference/reasons.md"
+    assert (ROOT / "docs" / "reference" / "reasons.md").read_text(encoding="utf-8") == page(), f"write it anew: {fresh}"
 
 
 def test_the_command_prints_all_reasons_or_those_asked_for(capsys: pytest.CaptureFixture[str]) -> None:

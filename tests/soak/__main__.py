@@ -1,4 +1,4 @@
-"""`make soak`: every campaign, in pieces, several at a time; the report goes to docs/reliability.md.
+"""`make soak`: every campaign, in pieces, several at a time; the report goes to docs/reports/reliability.md.
 
 A run that was broken off is resumed: pieces whose result is in --state are not run again. `--fresh` begins anew.
 """
@@ -20,7 +20,7 @@ from tests.soak.pieces import Amounts, all_pieces, run_piece
 from tests.soak.report import write_report
 
 ROOT = Path(__file__).parents[2]
-REPORT = ROOT / "docs" / "reliability.md"
+REPORT = ROOT / "docs" / "reports" / "reliability.md"
 NICE = 10
 
 

@@ -2,7 +2,7 @@
 
 The daemon and the simulated controller run as processes, on small frames; every fifth picture shows an empty table. The
 daemon's memory after the first jobs is held against that at each later look. `--write` puts the report into
-docs/reliability.md.
+docs/reports/reliability.md.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from tests.support.processes.cell import SAMPLES, Cell
 from tests.support.processes.processes import resident_megabytes, until
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "reliability.md"
+PAGE = ROOT / "docs" / "reports" / "reliability.md"
 BEGIN, END = "<!-- long run: written by `make soak-daemon` -->", "<!-- end of long run -->"
 JOBS = 20_000
 WARM_UP = 1000  # jobs in which caches fill
@@ -273,7 +273,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the report; 1 where something does not hold."""
     parser = argparse.ArgumentParser(prog="make soak-daemon", description=__doc__)
     parser.add_argument("--jobs", type=int, default=JOBS, metavar="N", help=f"default {JOBS}")
-    parser.add_argument("--write", action="store_true", help="put the report into docs/reliability.md")
+    parser.add_argument("--write", action="store_true", help="put the report into docs/reports/reliability.md")
     args = parser.parse_args(arguments)
     folder = Path(tempfile.mkdtemp(prefix="combtrace-long-run-"))
     course = run(folder, args.jobs)

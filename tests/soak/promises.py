@@ -264,8 +264,12 @@ def judge_twins(
     noticed_at: datetime,
     valid_for_s: float | None,
     findings: Findings,
+    before: dict[int, Rings],
 ) -> None:
-    """What always holds of two services with copies of one journal, which must have noticed by `noticed_at`."""
+    """What always holds of two services with copies of one journal, which must have noticed by `noticed_at`.
+
+    before: what the first one measured in earlier lives; the second may find such a job in the service block.
+    """
     accepted = {(contour.job_id, contour.rings) for contour in taken}
     numbers = Counter(row["job_id"] for side in sides for row in side.rows if row["trigger_kind"] != "found")
     for job, count in numbers.items():
@@ -284,7 +288,7 @@ def judge_twins(
                 findings.add("falsely-accepted", f"job {job} of service {number} of two, whose contour it was not")
             elif outcome in ("refused", "failed") and own and not _excepted(row, evidence):
                 findings.add("falsely-denied", f"job {job} of service {number} of two: {row['reason']} {row['detail']}")
-    measured = {(job, rings) for side in sides for job, rings in side.measured.items()}
+    measured = before.items() | {(job, rings) for side in sides for job, rings in side.measured.items()}
     own = {row["job_id"] for side in sides for row in side.rows}
     for job, rings in accepted:
         if job in own and (job, rings) not in measured:

@@ -7,7 +7,8 @@ import random
 import numpy as np
 
 from contour.geometry.rings import Contour, area
-from service.measuring.measure import Measurement, Measurer
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
 
 
 class RandomContours(Measurer):

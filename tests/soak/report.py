@@ -1,4 +1,4 @@
-"""The soak's report: a section of docs/reliability.md, written whole by the run that it tells of."""
+"""The soak's report: a section of docs/reports/reliability.md, written whole by the run that it tells of."""
 
 from __future__ import annotations
 

@@ -235,13 +235,20 @@ def test_a_job_found_at_the_controller_is_not_its_number_given_again() -> None:
     assert judge(given).counts == Counter()
 
 
-def encountered(first: list[dict[str, Any]], second: list[dict[str, Any]], *, by_first: bool = True) -> set[str]:
-    """What is found of two services that both measured job 7, where the controller took the one's contour."""
+def encountered(
+    first: list[dict[str, Any]], second: list[dict[str, Any]], *, by_first: bool = True, earlier: Any = SQUARE
+) -> set[str]:
+    """What is found of two services that both measured job 7, where the controller took the one's contour.
+
+    earlier: what it took of job 6, which an earlier life of the first one measured as SQUARE.
+    """
     other = (((0, 0), (100, 0), (100, 101), (0, 100)),)
-    taken = [Taken(7, SQUARE if by_first else other)]
+    taken = [Taken(7, SQUARE if by_first else other), Taken(6, earlier)]
     findings = Findings()
     noticed_at = datetime.fromisoformat("2026-01-01T00:00:08+00:00")
-    judge_twins((Side(first, {7: SQUARE}), Side(second, {7: other})), taken, [], noticed_at, 0.8, findings)
+    judge_twins(
+        (Side(first, {7: SQUARE}), Side(second, {7: other})), taken, [], noticed_at, 0.8, findings, before={6: SQUARE}
+    )
     return set(findings.counts)
 
 
@@ -252,6 +259,12 @@ def test_of_two_services_with_one_number_each_may_claim_only_what_is_its_own() -
     assert encountered([row(7, "failed", 155)], [other]) == {"falsely-denied"}
     assert encountered([row(7)], [row(1007, None)]) == {"unsettled"}
     assert encountered([row(7)], [other], by_first=False) == {"falsely-accepted"}
+
+
+def test_of_two_services_one_may_find_what_an_earlier_life_of_the_other_sent() -> None:
+    found = row(6, trigger_kind="found")
+    assert encountered([row(7)], [found]) == set()
+    assert encountered([row(7)], [found], earlier=(((0, 0), (1, 0), (1, 1)),)) == {"torn-or-misread"}
 
 
 def test_of_two_services_with_one_number_only_one_may_go_on() -> None:

@@ -1,6 +1,7 @@
 """Golden vectors: contours, and the registers that the service writes for them, for whoever programs a controller.
 
-`python -m drivers.controller.mailbox.golden_vectors docs/golden-vectors.json` writes them. Coordinates are in µm.
+`python -m drivers.controller.mailbox.golden_vectors docs/reference/golden-vectors.json` writes them. Coordinates are in
+µm.
 """
 
 from __future__ import annotations

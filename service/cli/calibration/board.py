@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from service.cli.calibration.calibrate import add_board_arguments, board_of
 from service.cli.errors import EXIT_OK, UserError
+from service.cli.options.board import add_board_arguments, board_of
 
 HELP = "draw a calibration board to print"
 DESCRIPTION = """\

@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
-from service.cli.options.measuring import Measuring, add_measuring_arguments, note_trend, now
+from service.cli.options.measuring import Measuring, add_measuring_arguments, note_trend
 
 if TYPE_CHECKING:
     from contour.geometry.rings import Contour
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     print(f"frames    {len(outlines)} of a still scene, {len(spread)} places along the outline")
     print(f"scatter   two standard deviations: mean {mean:.3f}, 95 % of places {p95:.3f}, worst {worst:.3f} mm")
     line = TrendLine(
-        now(),
+        datetime.now(UTC),
         "repeat",
         measuring.calibration_hash,
         len(outlines),

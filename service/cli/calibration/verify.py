@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from datetime import UTC, datetime
 from pathlib import Path
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
-from service.cli.options.measuring import Measuring, add_measuring_arguments, note_trend, now
+from service.cli.options.measuring import Measuring, add_measuring_arguments, note_trend
 from service.cli.pictures.given_pictures import add_pictures_argument, pictures_of
 
 HELP = "measure a master part: deviation in mm, pass or fail"
@@ -63,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     passed = not failed and bool(found) and worst <= args.tolerance_mm
     if found:
         line = TrendLine(
-            now(),
+            datetime.now(UTC),
             "verify",
             measuring.calibration_hash,
             len(found),

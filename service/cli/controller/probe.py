@@ -12,6 +12,7 @@ from service.cli.errors import EXIT_FAILED, EXIT_OK, UserError
 
 if TYPE_CHECKING:
     from drivers.controller.modbus.client import ModbusController
+    from service.commissioning.check_result import CheckResult
     from service.config.config import Config
 
 HELP = "find out what the controller can do and how it numbers its registers"
@@ -45,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Probe, print, and tell by the exit status."""
-    from service.config.config import NoController
     from service.config.config_file import ConfigError, load_config
+    from service.config.controllers import NoController
 
     try:
         config = load_config(args.config)
@@ -59,8 +60,9 @@ def run(args: argparse.Namespace) -> int:
 
 async def _probe(config: Config, args: argparse.Namespace) -> int:
     from drivers.controller import ControllerError
-    from service.commissioning.probing import Finding, Probe
-    from service.config.config import NoController
+    from service.commissioning.check_result import fault
+    from service.commissioning.probing.probe import Probe
+    from service.config.controllers import NoController
     from service.daemon.lock import LockError, Locks, NameLock
     from service.wiring import controller_names, make_controller
 
@@ -80,13 +82,13 @@ async def _probe(config: Config, args: argparse.Namespace) -> int:
     probe = Probe(controller, config.controller.timeout_s)
     well = True
     try:
-        async for finding in probe.findings(write=write):
-            _print(finding)
-            well = well and finding.well
+        async for result in probe.results(write=write):
+            _print(result)
+            well = well and result.well
         if args.restart:
             well = await _restarted(controller) and well
     except ControllerError as error:
-        _print(Finding("controller", False, str(error)))
+        _print(fault("controller", str(error)))
         well = False
     finally:
         await controller.close()
@@ -100,22 +102,19 @@ async def _probe(config: Config, args: argparse.Namespace) -> int:
     return EXIT_OK if well else EXIT_FAILED
 
 
-def _print(finding: object) -> None:
-    from service.commissioning.probing import Finding
-
-    assert isinstance(finding, Finding)
-    print(f"{'ok   ' if finding.well else 'FAULT'} {finding.part:<13} {finding.text}", flush=True)
+def _print(result: CheckResult) -> None:
+    print(f"{result.level.label:<5} {result.part:<13} {result.text}", flush=True)
 
 
 async def _restarted(controller: ModbusController) -> bool:
-    from service.commissioning.probing import Finding
+    from service.commissioning.check_result import fault, ok
     from service.daemon.restart_watch import RESTART_WAIT_S, RestartWatch
 
     watch = RestartWatch(controller)
     session = await watch.begin()
     print(f"Session {session}. Restart the controller's program now, within {RESTART_WAIT_S:g} s", flush=True)
     well, text = await watch.end()
-    _print(Finding("session", well, text))
+    _print((ok if well else fault)("session", text))
     return well
 
 

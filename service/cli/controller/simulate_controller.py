@@ -22,7 +22,7 @@ HELP = "play the cutting machine's controller"
 DESCRIPTION = """\
 Serve the contour mailbox as a controller does, and check the client against the
 protocol meanwhile. Ends on SIGTERM or SIGINT. The verdict is written at the start,
-every two seconds and at the end. docs/simulated-controller.md explains scenarios.
+every two seconds and at the end. docs/reference/simulated-controller.md explains scenarios.
 
 The addresses are those of the default layout; --layout gives others."""
 

@@ -30,7 +30,7 @@ the controller says is logged. All contours are marked as not from a live camera
 (bit 0 of flags). Contours are held against the recipe's limits as traced ones are.
 
 Jobs begin when the controller asks (trigger_counter), until stopped; --every and
---once begin them from here. docs/simulated-service.md says what it does not play.
+--once begin them from here. docs/reference/simulated-service.md says what it does not play.
 
 Exit status of --once: 0 accepted or written, 3 refused, 1 failed, 2 bad
 configuration, contours or usage; without it 0 when stopped."""
@@ -113,8 +113,9 @@ def simulated_config(args: argparse.Namespace) -> Config:
     """The configuration that the options name, without camera and calibration, with a state of its own."""
     from pydantic import ValidationError
 
-    from service.config.config import Config, NoController
+    from service.config.config import Config
     from service.config.config_file import ConfigError, default_config, load_config
+    from service.config.controllers import NoController
 
     try:
         config = default_config() if args.config is None else load_config(args.config)

@@ -13,7 +13,7 @@ from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_UNUSABLE
 
 if TYPE_CHECKING:
-    from service.commissioning.checkup.finding import Finding
+    from service.commissioning.check_result import CheckResult
 
 HELP = "say what is wrong with configuration, devices and machine"
 DESCRIPTION = """\
@@ -39,26 +39,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check, print, and tell by the exit status."""
     from service.cli.json_output import json_output
-    from service.commissioning.checkup.finding import Level
+    from service.commissioning.check_result import Level
 
     with json_output(args.json) as write:
         text = sys.stderr if args.json == "-" else sys.stdout
         found = []
         unusable = False
-        for finding in _findings(args):
-            _print(finding, text)
-            found.append(finding)
-            unusable = unusable or (finding.part == "config" and finding.level is Level.FAULT)
-        worst = max(finding.level for finding in found)
+        for result in _results(args):
+            _print(result, text)
+            found.append(result)
+            unusable = unusable or (result.part == "config" and result.level is Level.FAULT)
+        worst = max(result.level for result in found)
         write(json.dumps(_document(args.config, found, worst), ensure_ascii=False, indent=1) + "\n")
     if unusable:
         return EXIT_UNUSABLE
     return EXIT_FAILED if worst is Level.FAULT or (args.strict and worst is Level.WARNING) else EXIT_OK
 
 
-def _findings(args: argparse.Namespace) -> Iterator[Finding]:
+def _results(args: argparse.Namespace) -> Iterator[CheckResult]:
     """All that can be checked, part by part; after a bad configuration nothing more."""
-    from service.commissioning.checkup.finding import fault, ok, warning
+    from service.commissioning.check_result import fault, ok, warning
     from service.config.config_file import ConfigError, load_config
 
     try:
@@ -87,15 +87,15 @@ def _findings(args: argparse.Namespace) -> Iterator[Finding]:
     yield from check_storage(config, running=running is not None)
 
 
-def _print(finding: Finding, to: TextIO) -> None:
-    colour = (Colour.GOOD, Colour.DOUBTFUL, Colour.BAD)[finding.level]
-    print(f"{painted(f'{finding.level.label:<5}', colour, to)} {finding.part:<12} {finding.text}", file=to)
-    if finding.next_step:
-        print(f"{'':<18} -> {finding.next_step}", file=to)
+def _print(result: CheckResult, to: TextIO) -> None:
+    colour = (Colour.GOOD, Colour.DOUBTFUL, Colour.BAD)[result.level]
+    print(f"{painted(f'{result.level.label:<5}', colour, to)} {result.part:<12} {result.text}", file=to)
+    if result.next_step:
+        print(f"{'':<18} -> {result.next_step}", file=to)
     to.flush()
 
 
-def _document(config: Path, found: list[Finding], worst: int) -> dict[str, object]:
+def _document(config: Path, found: list[CheckResult], worst: int) -> dict[str, object]:
     """What `--json` gives."""
     names = ("ok", "warning", "fault")
     return {

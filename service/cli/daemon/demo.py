@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.errors import EXIT_FAILED, EXIT_OK, UserError
+from service.cli.file_names import make_folder
 
 if TYPE_CHECKING:
     from drivers.controller.simulated.controller import AcceptedContour
@@ -34,10 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo."""
-    try:
-        args.output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--output {args.output}: cannot make the folder: {error.strerror}. Name another") from error
+    make_folder("--output", args.output)
     _log_to_the_terminal()
     return asyncio.run(_demo(args.output))
 

@@ -9,7 +9,7 @@ import time
 from typing import Any, NoReturn
 
 from service.cli.colour import obeys_codes
-from service.cli.daemon.status import lines, page
+from service.cli.daemon.status_page import lines, page
 from service.cli.errors import EXIT_FAILED, UserError
 from service.cli.options.control import asked
 

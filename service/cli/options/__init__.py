@@ -1,1 +1,1 @@
-"""Options that several commands share. Used by the commands only."""
+"""Options that several commands share: how they are named, and what they stand for. Used by the commands only."""

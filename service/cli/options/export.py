@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.errors import UserError
-from service.cli.file_names import distinct_stems, output_path
+from service.cli.file_names import distinct_stems, make_folder, output_path
 from service.export.forms import ENDINGS
 
 if TYPE_CHECKING:
-    from service.config.config import Recipe
+    from service.config.recipes import Recipe
     from service.export.gcode import GcodeSettings
-    from service.measuring.measure import Measurement
+    from service.measuring.measurement import Measurement
 
 
 def add_export_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,7 +48,7 @@ class Exports:
         for form, path in given:
             folder = args.several or path.is_dir()
             if folder:
-                _make_folder(form, path)
+                make_folder(f"--{form}", path)
                 files = {image: path / f"{stem}.{ENDINGS[form]}" for image, stem in distinct_stems(args.images).items()}
             else:
                 files = {args.images[0]: path}
@@ -84,10 +84,3 @@ class Exports:
                 raise UserError(f"--{form}: {error}") from error
             told.append(str(file))
         return told
-
-
-def _make_folder(form: str, path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--{form} {path}: cannot make the folder: {error.strerror}. Name another") from error

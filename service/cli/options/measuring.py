@@ -5,14 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.errors import UserError
 
 if TYPE_CHECKING:
-    from service.config.config import Config, Recipe
+    from service.config.config import Config
+    from service.config.recipes import Recipe
     from service.measuring.calibration_guard import CalibrationGuard
     from service.measuring.measure import Measurer
     from service.measuring.trend_file import TrendLine
@@ -139,8 +139,3 @@ def note_trend(path: Path | None, line: TrendLine) -> None:
         print(f"trend     {plot}: cannot be written: {error.strerror}; the line is in {path}", file=sys.stderr)
     else:
         print(f"plot      {plot}")
-
-
-def now() -> datetime:
-    """The time by this computer's clock."""
-    return datetime.now(UTC)

@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
-from service.cli.file_names import check_outputs, distinct_stems, output_path
+from service.cli.file_names import check_outputs, distinct_stems, make_folder, output_path
 from service.cli.json_output import json_output
 from service.cli.options.export import Exports, add_export_arguments
 from service.cli.options.measuring import find_recipe, guard_of, load_config_or_default, thickness_of
 from service.cli.pictures.given_pictures import add_pictures_argument, pictures_of
+from service.cli.pictures.trace_record import record_of, sentence, unusable_record
 
 if TYPE_CHECKING:
-    from contour.geometry.rings import Contour
-    from service.config.config import Config, Recipe
-    from service.measuring.measure import Measurement, Measurer
+    from service.config.config import Config
+    from service.config.recipes import Recipe
+    from service.measuring.measure import Measurer
+    from service.measuring.measurement import Measurement
     from service.measuring.table_file import TableRecord
 
 HELP = "trace the contour in pictures"
@@ -137,14 +139,14 @@ def _overlays(overlay: Path, images: list[Path], *, several: bool) -> dict[Path,
     if not several and not overlay.is_dir():
         files = {images[0]: overlay}
     else:
-        _make_folder(overlay)
+        make_folder("--overlay", overlay)
         files = {image: overlay / f"{stem}-contour.png" for image, stem in distinct_stems(images).items()}
     return files
 
 
 def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
     """The recipe, by name, number or default, with what the command line says otherwise."""
-    from service.config.config import Recipe
+    from service.config.recipes import Recipe
 
     found = find_recipe(config, args.recipe)
     changes: dict[str, Any] = {
@@ -189,7 +191,7 @@ def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
         measurement = setup.measurer.measure(picture, setup.recipe, setup.thickness_mm)
     except (CameraError, ContourError) as error:
         line = f"{image}: {str(error).removeprefix(f'{shown(image)}: ')}"  # drivers name the file, the tracing does not
-        return _error_record(image, setup, str(error)), line, EXIT_UNUSABLE
+        return unusable_record(image, setup.recipe.method, str(error)), line, EXIT_UNUSABLE
     times = {"read": read_ms, **measurement.timings_ms}
     times["total"] = sum(value for name, value in times.items() if name != "total")
     measurement = replace(measurement, timings_ms=times)
@@ -202,72 +204,7 @@ def _trace_one(image: Path, setup: _Setup) -> tuple[dict[str, Any], str, int]:
     if exports:
         note += f"  [{', '.join(exports)}]"
     status = EXIT_REFUSED if measurement.findings else EXIT_OK
-    return _record(image, measurement), f"{image}: {_sentence(measurement, setup.language)}{note}", status
-
-
-def _sentence(measurement: Measurement, language: str) -> str:
-    from service.reasons import Language
-
-    if measurement.findings and language == Language.RUSSIAN:
-        told = (f"{int(code)} {code.label}: {code.explained(Language.RUSSIAN)}" for code in measurement.reasons)
-        return "отказ: " + "; ".join(told) + " [" + "; ".join(measurement.texts) + "]"
-    if measurement.findings:
-        return "refused: " + "; ".join(f"{int(code)} {code.label}: {text}" for code, text in measurement.findings)
-    assert measurement.pixels is not None
-    text = f"{measurement.method}, {measurement.pixels.point_count} vertices"
-    if measurement.pixels.holes:
-        text += f", {len(measurement.pixels.holes)} holes"
-    size = measurement.size_mm
-    if size is not None:
-        text += f", {measurement.area_mm2:.0f} mm², {size[0]:.1f} x {size[1]:.1f} mm"
-    else:
-        text += f", {measurement.area_px2:.0f} px²"
-    if measurement.uncertainty_mm is not None:
-        text += f", within {measurement.uncertainty_mm:.2f} mm"
-    elif measurement.uncertainty_px is not None:
-        text += f", within {measurement.uncertainty_px:.2f} px"
-    return f"{text}, {measurement.timings_ms['total']:.0f} ms"
-
-
-def _record(image: Path, measurement: Measurement) -> dict[str, Any]:
-    """The contract's object for a picture that could be read."""
-    from drivers.camera.files.folder import shown
-
-    reasons = [reason.label for reason in measurement.reasons]
-    return {
-        "image": shown(image),
-        "status": "refused" if reasons else "ok",
-        "reason": reasons[0] if reasons else None,
-        "reasons": reasons,
-        "reason_codes": [int(reason) for reason in measurement.reasons],
-        "method": measurement.method,
-        "polarity": measurement.polarity,
-        "pitch_px": measurement.pitch_px,
-        "pixels": _rings(measurement.pixels),
-        "area_px2": measurement.area_px2,
-        "uncertainty_px": measurement.uncertainty_px,
-        "frame": "machine",
-        "thickness_mm": measurement.thickness_mm,
-        "millimetres": _rings(measurement.millimetres),
-        "area_mm2": measurement.area_mm2,
-        "uncertainty_mm": measurement.uncertainty_mm,
-        "timings_ms": {name: round(value, 3) for name, value in measurement.timings_ms.items()},
-        "details": list(measurement.texts),
-    }
-
-
-def _error_record(image: Path, setup: _Setup, text: str) -> dict[str, Any]:
-    """The contract's object for a picture that could not be used."""
-    from service.measuring.measure import Measurement
-
-    record = _record(image, Measurement(method=setup.recipe.method))
-    return {**record, "status": "error", "details": [text]}
-
-
-def _rings(contour: Contour | None) -> dict[str, Any] | None:
-    if contour is None:
-        return None
-    return {"exterior": contour.exterior.tolist(), "holes": [hole.tolist() for hole in contour.holes]}
+    return record_of(image, measurement), f"{image}: {sentence(measurement, setup.language)}{note}", status
 
 
 def _write_overlay(path: Path, picture: Any, measurement: Measurement) -> None:
@@ -277,13 +214,6 @@ def _write_overlay(path: Path, picture: Any, measurement: Measurement) -> None:
         write_overlay(path, picture, measurement)
     except PictureFileError as error:
         raise UserError(str(error)) from error
-
-
-def _make_folder(path: Path) -> None:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--overlay {path}: cannot make the folder: {error.strerror}. Name another") from error
 
 
 def _table(config: Config) -> TableRecord | None:

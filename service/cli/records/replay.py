@@ -95,7 +95,7 @@ def settings_of(changes: list[str]) -> Settings:
     """The settings that --set names; raise UserError."""
     import yaml
 
-    from service.config.config import Recipe
+    from service.config.recipes import Recipe
     from service.config.yaml_mistakes import FileLoader
     from service.records.replay import Settings
 

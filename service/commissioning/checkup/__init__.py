@@ -1,1 +1,3 @@
-"""Everything that can be checked of a configuration and its machine, without disturbing a running service."""
+"""A configuration in, a result for each thing that can be checked of it and its machine out; a running service is not
+disturbed. Used by the commands only.
+"""

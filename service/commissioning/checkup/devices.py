@@ -15,9 +15,12 @@ from drivers.camera import CameraError, Frame
 from drivers.camera.files.folder import list_versions
 from drivers.controller import ControllerError
 from drivers.trigger import TriggerUnavailable
-from service.commissioning.checkup.finding import Finding, fault, ok, warning
+from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.commissioning.checkup.running import other_user_of_controller
-from service.config.config import Config, FilesCamera, ModbusRtu, SerialTrigger, V4l2Camera
+from service.config.cameras import FilesCamera, V4l2Camera
+from service.config.config import Config
+from service.config.controllers import ModbusRtu
+from service.config.triggers import SerialTrigger
 from service.link.link import Link, LinkSettings
 from service.wiring import WiringError, find_guard, make_camera, make_controller, make_serial_port
 
@@ -25,7 +28,7 @@ CONTROLLER_BOUND_S = 5.0
 CAMERA_BOUND_S = 5.0
 
 
-def check_devices(config: Config, running: int | None) -> Iterator[Finding]:
+def check_devices(config: Config, running: int | None) -> Iterator[CheckResult]:
     """Every device that the configuration names. running: the process of the service that has them."""
     yield from check_permissions(config)
     if running is not None:
@@ -42,7 +45,7 @@ def _serial_triggers(config: Config) -> list[SerialTrigger]:
     return [trigger for trigger in config.triggers if isinstance(trigger, SerialTrigger)]
 
 
-def check_permissions(config: Config) -> Iterator[Finding]:
+def check_permissions(config: Config) -> Iterator[CheckResult]:
     """Device files that this user may not use: which group may."""
     devices = [trigger.port for trigger in _serial_triggers(config) if "://" not in trigger.port]
     if isinstance(config.controller, ModbusRtu):
@@ -73,7 +76,7 @@ def _name(look_up: object, number: int) -> str:
 # --- camera -----------------------------------------------------------------------------------------------------------
 
 
-def _camera(config: Config) -> Finding:
+def _camera(config: Config) -> CheckResult:
     settings = config.camera
     if isinstance(settings, FilesCamera) and (settings.watch or settings.move_to is not None):
         return _waiting_folder(settings)
@@ -91,7 +94,7 @@ def _camera(config: Config) -> Finding:
     return _frame(config, frame)
 
 
-def _waiting_folder(settings: FilesCamera) -> Finding:
+def _waiting_folder(settings: FilesCamera) -> CheckResult:
     """A folder whose files are the service's to take: none is taken here, and none has to be there yet."""
     target = settings.move_to
     try:
@@ -105,7 +108,7 @@ def _waiting_folder(settings: FilesCamera) -> Finding:
     return ok("camera", f"{settings.path}: {seen}; none is taken by this check")
 
 
-def _frame(config: Config, frame: Frame) -> Finding:
+def _frame(config: Config, frame: Frame) -> CheckResult:
     height, width = frame.pixels.shape[:2]
     text = f"{frame.source}: {width} x {height} px" + (f", camera_name {frame.camera!r}" if frame.camera else "")
     guard, _ = find_guard(config)
@@ -125,7 +128,7 @@ def _frame(config: Config, frame: Frame) -> Finding:
 # --- controller and serial --------------------------------------------------------------------------------------------
 
 
-def _controller(config: Config) -> Finding:
+def _controller(config: Config) -> CheckResult:
     """The controller's answer. A second master would disturb its one client, so not where another service has it."""
     held = other_user_of_controller(config)
     if held is not None:
@@ -134,7 +137,7 @@ def _controller(config: Config) -> Finding:
     return asyncio.run(_answer(config))
 
 
-async def _answer(config: Config) -> Finding:
+async def _answer(config: Config) -> CheckResult:
     controller = make_controller(config)
     if controller is None:
         return ok("controller", "none: contours are traced and not sent")
@@ -152,12 +155,12 @@ async def _answer(config: Config) -> Finding:
         return fault(
             "controller",
             "it answers, but its session is 0: its program does not run, or link_address is another's",
-            "Start the controller's program; compare link_address with docs/register-map.md",
+            "Start the controller's program; compare link_address with docs/reference/register-map.md",
         )
     return ok("controller", f"it answers: session {block.session}, controller_state {block.controller_state}")
 
 
-def _serial(trigger: SerialTrigger) -> Finding:
+def _serial(trigger: SerialTrigger) -> CheckResult:
     port = make_serial_port(trigger)
     try:
         port.open()

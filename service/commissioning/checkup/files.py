@@ -8,9 +8,10 @@ import numpy as np
 
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
-from service.commissioning.checkup.finding import Finding, fault, ok, warning
+from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.commissioning.checkup.page import check_page
-from service.config.config import Config, Gcode
+from service.config.config import Config
+from service.config.recipes import Gcode
 from service.export.recipe_exports import trial
 from service.measuring.calibration_guard import CalibrationGuard
 from service.measuring.measure import step_doubt
@@ -27,7 +28,7 @@ def summary(config: Config) -> str:
     return text if triggers else f"{text}: jobs begin by hand only"
 
 
-def check_files(config: Config) -> Iterator[Finding]:
+def check_files(config: Config) -> Iterator[CheckResult]:
     """Calibration, sizes of methods, exports, table, and what the operator's page needs."""
     yield from check_calibration(config)
     yield from _sizes(config)
@@ -38,7 +39,7 @@ def check_files(config: Config) -> Iterator[Finding]:
         yield from check_page(config.page)
 
 
-def check_calibration(config: Config) -> Iterator[Finding]:
+def check_calibration(config: Config) -> Iterator[CheckResult]:
     """The calibration's file, its age, and whether it knows the scale at the recipes' thickness."""
     guard, trouble = find_guard(config)
     if trouble is not None:
@@ -51,7 +52,8 @@ def check_calibration(config: Config) -> Iterator[Finding]:
     yield fault("calibration", expired[1]) if expired else ok("calibration", _told(config, guard))
     allowed, age = guard.limits.max_age_days, guard.age_days
     if not expired and allowed and age is not None and age > _SOON * allowed:
-        yield warning("calibration", f"it expires in {allowed - age:.1f} days", "Calibrate again: docs/calibrating.md")
+        next_step = "Calibrate again: docs/how-to/calibrating.md"
+        yield warning("calibration", f"it expires in {allowed - age:.1f} days", next_step)
     calibration = guard.record.calibration
     blind = [recipe.name for recipe in config.recipes if not calibration.height_known(recipe.thickness_mm)]
     if blind:
@@ -63,7 +65,7 @@ def check_calibration(config: Config) -> Iterator[Finding]:
     yield from _work_area(config, calibration)
 
 
-def _work_area(config: Config, calibration: Calibration) -> Iterator[Finding]:
+def _work_area(config: Config, calibration: Calibration) -> Iterator[CheckResult]:
     """A warning where the work area reaches beyond what the calibration covers: blocks there would be refused."""
     sure = calibration.uncertainty
     if not config.work_area_mm or sure is None:
@@ -102,14 +104,14 @@ def _told(config: Config, guard: CalibrationGuard) -> str:
     return text if marks is None else f"{text}; {len(marks.marks)} fixed marks"
 
 
-def _sizes(config: Config) -> Iterator[Finding]:
+def _sizes(config: Config) -> Iterator[CheckResult]:
     for recipe in config.recipes:
         doubt = step_doubt(recipe)
         if doubt:
             yield warning("recipes", f"recipe {recipe.number}: {doubt}")
 
 
-def _exports(config: Config) -> Iterator[Finding]:
+def _exports(config: Config) -> Iterator[CheckResult]:
     asked = [recipe for recipe in config.recipes if recipe.exports or recipe.gcode != Gcode()]
     found = [fault("exports", f"recipe {recipe.number}: {text}") for recipe in asked for text in trial(recipe)]
     yield from found
@@ -118,7 +120,7 @@ def _exports(config: Config) -> Iterator[Finding]:
         yield ok("exports", f"of a plain square: {forms}")
 
 
-def _table(config: Config) -> Finding:
+def _table(config: Config) -> CheckResult:
     assert config.table is not None
     try:
         found = find_table(config)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Iterator
 
-from service.commissioning.checkup.finding import Finding, fault, ok
+from service.commissioning.check_result import CheckResult, fault, ok
 from service.config.config import Config
 from service.daemon.listening_socket import bound
 
 
-def check_listening(config: Config, running: int | None) -> Iterator[Finding]:
+def check_listening(config: Config, running: int | None) -> Iterator[CheckResult]:
     """Metrics' package, and the ports of metrics and page. running: the process that listens there by rights."""
     if config.metrics is not None:
         if importlib.util.find_spec("prometheus_client") is None:

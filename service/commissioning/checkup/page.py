@@ -5,11 +5,11 @@ from __future__ import annotations
 import ipaddress
 from collections.abc import Iterator
 
-from service.commissioning.checkup.finding import Finding, fault, ok, warning
+from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.config.config import Page
 
 
-def check_page(settings: Page) -> Iterator[Finding]:
+def check_page(settings: Page) -> Iterator[CheckResult]:
     """What it is made of, its tokens, its certificate, and who could listen on the line."""
     try:
         from service.web.server import PageError, check_certificate
@@ -30,7 +30,7 @@ def check_page(settings: Page) -> Iterator[Finding]:
         yield warning(
             "page",
             f"{settings.host}:{settings.port} is open to the network without TLS: tokens can be read on the line",
-            "Give page.certificate and page.key, or host 127.0.0.1: docs/security.md",
+            "Give page.certificate and page.key, or host 127.0.0.1: docs/reference/security.md",
         )
     yield ok("page", f"{settings.host}:{settings.port}, {who}")
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from service.commissioning.checkup.finding import Finding, fault, ok, warning
+from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.config.config import Config
 from service.records.archive import free_bytes
 from service.records.journal import Job
@@ -25,7 +25,7 @@ _TIMEX_BYTES = 512
 _NOT_SYNCHRONIZED = 5  # TIME_ERROR, adjtimex(2)
 
 
-def check_storage(config: Config, *, running: bool, now: Callable[[], float] = time.time) -> Iterator[Finding]:
+def check_storage(config: Config, *, running: bool, now: Callable[[], float] = time.time) -> Iterator[CheckResult]:
     """Folders, journal, disks, clock. running: a service has the journal open, and is not disturbed."""
     yield from _folders(config)
     journal, last = _journal(config, running)
@@ -34,7 +34,7 @@ def check_storage(config: Config, *, running: bool, now: Callable[[], float] = t
     yield _clock(datetime.fromtimestamp(now(), UTC), last)
 
 
-def _folders(config: Config) -> Iterator[Finding]:
+def _folders(config: Config) -> Iterator[CheckResult]:
     wanted = {
         "state": ("service.state_dir", config.service.state_dir),
         "archive": ("archive.path", config.archive.path),
@@ -70,7 +70,7 @@ def _user() -> str:
         return str(os.getuid())
 
 
-def _journal(config: Config, running: bool) -> tuple[Finding, Job | None]:
+def _journal(config: Config, running: bool) -> tuple[CheckResult, Job | None]:
     path = config.journal.path
     if not os.path.exists(path):
         why = _not_writable(path.parent)
@@ -97,7 +97,7 @@ def _journal(config: Config, running: bool) -> tuple[Finding, Job | None]:
     return ok("journal", text + (f", {open_} in flight" if open_ else "")), newest
 
 
-def _disks(config: Config) -> Iterator[Finding]:
+def _disks(config: Config) -> Iterator[CheckResult]:
     bounds = {"journal": (config.journal.path.parent, config.journal.min_free_bytes)}
     if config.archive.max_bytes:
         bounds["archive"] = (config.archive.path, config.archive.min_free_bytes)
@@ -122,7 +122,7 @@ def _disks(config: Config) -> Iterator[Finding]:
             yield warning("disk", f"{text}: the oldest evidence goes first", f"Free space on the disk of {path}")
 
 
-def _clock(now: datetime, last: Job | None) -> Finding:
+def _clock(now: datetime, last: Job | None) -> CheckResult:
     text = f"{now.isoformat(timespec='seconds')}{_synchronized()}"
     taken = None if last is None else datetime.fromisoformat(last.taken_at)
     if taken is not None and now < taken - _CLOCK_SLACK:

@@ -1,7 +1,9 @@
 """A pytest plugin for hardware-in-loop tests: the fixture `hil` is a service's hands on a real controller's mailbox.
+Needs the extra `combtrace[hil]`.
 
 Load it with `-p service.commissioning.hil`, or name it in `pytest_plugins` of the topmost conftest.py. Without
-`--hil-controller` and `--hil-config` the fixture works on a simulated controller. docs/hardware-in-loop.md tells more.
+`--hil-controller` and `--hil-config` the fixture works on a simulated controller; more in
+docs/how-to/hardware-in-loop.md.
 """
 
 from __future__ import annotations
@@ -10,9 +12,17 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
-import pytest
+try:
+    import pytest
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        f"hardware in loop: {error.name} is not installed, the fixture `hil` needs it. "
+        "Install it: pip install 'combtrace[hil]'",
+        name=error.name,
+    ) from error
 
-from service.commissioning.hil.bench import Bench, HilError, open_bench
+from service.commissioning.hil.bench import Bench, open_bench
+from service.commissioning.hil.presence import HilError
 
 __all__ = ["Bench", "HilError", "hil", "hil_moves"]
 

@@ -10,26 +10,15 @@ import secrets
 import threading
 import time
 from collections.abc import Callable, Coroutine
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
-from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
-from drivers.controller import (
-    Controller,
-    ControllerError,
-    ControllerRefused,
-    ControllerUnavailable,
-    LinkBlock,
-    Page,
-    ServiceBlock,
-)
+from drivers.controller import Controller, ControllerError, LinkBlock, Page
 from drivers.controller.mailbox.mailbox import (
     ContourMessage,
     MailboxError,
@@ -40,30 +29,20 @@ from drivers.controller.mailbox.mailbox import (
     withdrawal,
 )
 from drivers.controller.simulated.controller import SimulatedController
-from service.config.config import Config, NoController
-from service.config.config_file import ConfigError, load_config
-from service.config.mistakes import describe
+from service.commissioning.hil.presence import LOOK_S, HilError, Presence
+from service.commissioning.hil.which_controller import config_of, loaded, over_tcp
+from service.config.controllers import NoController
 from service.jobs.executor import ROOM
 from service.link.controller_clock import BEATS_TO_HOLD
-from service.link.ownership import WATCH_S
 from service.wiring import mailbox_layout, make_controller
 
-HEARTBEAT_S = 0.4
 HOLDS_S = 3.0  # two changes of a heartbeat that changes once a second, and more
 ANSWER_S = 5.0
-STARTED_S = 5.0
 BACK_S = 30.0
-RETRY_S = 0.2
-LOOK_S = 0.02
-READY, HALTED = 5, 2
+HALTED = 2
 SQUARE_UM = ((0, 0), (100_000, 0), (100_000, 100_000), (0, 100_000))
-KINDS = {"tcp": "modbus-tcp", "rtu-over-tcp": "modbus-rtu-over-tcp", "rtu": "modbus-rtu"}
 
 T = TypeVar("T")
-
-
-class HilError(Exception):
-    """The controller cannot be tested: seen, expected, next step."""
 
 
 @dataclass(frozen=True)
@@ -80,21 +59,18 @@ class Bench:
     def __init__(self, controller: Controller, layout: MailboxLayout, simulated: SimulatedController | None) -> None:
         self.layout = layout
         self.simulated = simulated is not None
-        self._controller = controller
+        self._presence = Presence(controller)
         self._server = simulated
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="hil", daemon=True)
-        self._block = ServiceBlock(service_state=READY, owner=1 + secrets.randbelow(0xFFFF))
-        self._beating: asyncio.Task[None] | None = None
-        self._trouble: ControllerUnavailable | HilError | None = None
-        self._transfer = 0
+        self._transfer = secrets.randbelow(0xFFFF)
         self._highest_job = 0
 
     def __enter__(self) -> Bench:
         self._thread.start()
         try:
             self._do(self._start())
-            self._highest_job = max(self._highest_job, self._held().last_job) + ROOM
+            self._highest_job = max(self._presence.highest_job, self._held().last_job) + ROOM
         except ControllerError as error:
             self._close()
             raise HilError(f"{error}") from error
@@ -139,13 +115,13 @@ class Bench:
 
     def publish(self, **changes: int) -> None:
         """Change the service block, and write it at once; raise HilError where a value does not fit its register."""
-        changed = replace(self._block, **changes)
+        changed = replace(self._presence.block, **changes)
         try:
             encode_service(changed, self.layout.word_order)
         except MailboxError as error:
             raise HilError(str(error)) from error
-        self._block = changed
-        self._do(self._beat())
+        self._presence.block = changed
+        self._do(self._presence.beat())
 
     def new_job(self) -> int:
         """A job_id above all that the controller knows, and that no call before gave."""
@@ -199,18 +175,18 @@ class Bench:
 
     def place(self, page: Page) -> None:
         """Steps 2 and 3: clear `transfer`, write the page; nothing is committed."""
-        self._do(self._controller.write_transfer(0))
-        self._do(self._controller.write_page(page))
+        self._do(self._presence.controller.write_transfer(0))
+        self._do(self._presence.controller.write_page(page))
 
     def read_back(self, page: Page) -> Page:
         """The page as the controller holds it."""
-        return self._do(self._controller.read_page(len(page.payload)))
+        return self._do(self._presence.controller.read_page(len(page.payload)))
 
     def commit(self) -> Answered:
         """Steps 5 and 6: a new `transfer`, and the answer to it; raise HilError where none comes."""
         acknowledged = self.link().ack_transfer
         self._transfer = _next(self._transfer, acknowledged)
-        self._do(self._controller.write_transfer(self._transfer))
+        self._do(self._presence.controller.write_transfer(self._transfer))
         transfer = self._transfer
         link = self.wait_for(lambda link: link.ack_transfer == transfer, f"the answer to transfer {transfer}")
         return Answered(link.ack_result, link)
@@ -221,7 +197,7 @@ class Bench:
 
     def write_transfer(self, transfer: int) -> None:
         """Write the commit register, whatever the protocol says of the value; no answer is waited for."""
-        self._do(self._controller.write_transfer(transfer))
+        self._do(self._presence.controller.write_transfer(transfer))
 
     def withdraw(self, job_id: int) -> Answered:
         """Take a job back; the answer."""
@@ -232,8 +208,8 @@ class Bench:
 
         The service block is as it was published last; `transfer` is left as it stands there.
         """
-        self._trouble = None
-        self._do(self._again(timeout_s))
+        self._presence.trouble = None
+        self._do(self._presence.again(timeout_s))
         return self.link()
 
     # --- inside -----------------------------------------------------------------------------------------------------
@@ -241,73 +217,8 @@ class Bench:
     async def _start(self) -> None:
         if self._server is not None:
             await self._server.start()
-            self._controller = _over_tcp(self._server.port, self.layout)
-        await self._controller.connect()
-        await self._watch_owner()
-        await self._serve()
-
-    async def _again(self, timeout_s: float) -> None:
-        await self._stop_beating()
-        give_up_at = time.monotonic() + timeout_s
-        while True:
-            try:
-                await self._controller.connect()
-                await self._check_owner()
-                await self._serve()
-                return
-            except ControllerError:
-                await self._stop_beating()
-                if time.monotonic() >= give_up_at:
-                    raise
-            await asyncio.sleep(RETRY_S)
-
-    async def _serve(self) -> None:
-        """Write the service block from now on; return when the controller's program runs."""
-        await self._controller.write_service(self._block)
-        self._beating = asyncio.create_task(self._beat_for_ever())
-        give_up_at = time.monotonic() + STARTED_S
-        while (await self._controller.read_link()).session == 0:
-            if time.monotonic() >= give_up_at:
-                raise HilError(f"session is 0 for {STARTED_S:g} s: the program does not start. Check link_address")
-            await asyncio.sleep(LOOK_S)
-
-    async def _watch_owner(self) -> None:
-        """Raise HilError where another service lives; what a dead one left behind is taken over."""
-        block = await self._controller.read_service()
-        self._highest_job = max(block.job_id, block.settled_job)
-        self._transfer = secrets.randbelow(0xFFFF)
-        if block.owner == 0:
-            return
-        await asyncio.sleep(WATCH_S)
-        after = await self._controller.read_service()
-        if after.service_heartbeat != block.service_heartbeat:
-            raise HilError(f"another service (owner {after.owner}) writes to this controller. Stop it before the test")
-
-    async def _check_owner(self) -> None:
-        """Raise HilError where another service has written: nothing is written over it."""
-        found = await self._controller.read_service()
-        if found.owner not in (0, self._block.owner):
-            raise HilError(f"another service (owner {found.owner}) came meanwhile. Stop it before the test")
-
-    async def _beat(self) -> None:
-        await self._check_owner()
-        self._block = replace(self._block, service_heartbeat=(self._block.service_heartbeat + 1) & 0xFFFF)
-        await self._controller.write_service(self._block)
-
-    async def _beat_for_ever(self) -> None:
-        try:
-            while True:
-                with suppress(ControllerRefused):  # busy for once; one that always refuses is told by `publish`
-                    await self._beat()
-                await asyncio.sleep(HEARTBEAT_S)
-        except (ControllerUnavailable, HilError) as error:
-            self._trouble = error
-
-    async def _stop_beating(self) -> None:
-        if self._beating is not None:
-            self._beating.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._beating
+            self._presence = Presence(over_tcp(self._server.port, self.layout))
+        await self._presence.begin()
 
     def _held(self) -> LinkBlock:
         """The link block as it stood over two changes of its heartbeat, so that none of it is half written.
@@ -324,14 +235,15 @@ class Bench:
         return before
 
     def _read(self) -> LinkBlock:
-        return self._do(self._controller.read_link())
+        return self._do(self._presence.controller.read_link())
 
     def _do(self, step: Coroutine[Any, Any, T]) -> T:
-        if self._trouble is not None:
+        trouble = self._presence.trouble
+        if trouble is not None:
             step.close()
-            if isinstance(self._trouble, HilError):
-                raise self._trouble
-            raise HilError(f"the controller was lost: {self._trouble}. `reconnect` where that was meant to be")
+            if isinstance(trouble, HilError):
+                raise trouble
+            raise HilError(f"the controller was lost: {trouble}. `reconnect` where that was meant to be")
         try:
             return asyncio.run_coroutine_threadsafe(step, self._loop).result()
         except ControllerError as error:
@@ -344,8 +256,7 @@ class Bench:
         self._loop.close()
 
     async def _end(self) -> None:
-        await self._stop_beating()
-        await self._controller.close()
+        await self._presence.end()
         if self._server is not None:
             await self._server.stop()
 
@@ -354,11 +265,14 @@ def open_bench(url: str | None, config: Path | None) -> Bench:
     """A bench, not yet entered: on the URL's controller, else the configuration's, else a simulated one."""
     if url is not None and config is not None:
         raise HilError("two controllers are named, by URL and by a configuration file. Name one")
-    if url is None and config is None:
+    if url is not None:
+        found = config_of(url)
+    elif config is not None:
+        found = loaded(config)
+    else:
         layout = MailboxLayout()
         server = SimulatedController(scan_s=0.005, layout=layout)
-        return Bench(_over_tcp(1, layout), layout, server)  # the port is known once it listens
-    found = _config_of(url) if url is not None else _loaded(config)
+        return Bench(over_tcp(1, layout), layout, server)  # the port is known once it listens
     if not isinstance(found.controller, NoController) and found.controller.mode == "observe":
         raise HilError(
             f"{url or config}: controller.mode is observe: another process writes there, and the suite would too"
@@ -367,47 +281,6 @@ def open_bench(url: str | None, config: Path | None) -> Bench:
     if controller is None or layout_of is None:
         raise HilError(f"{config}: controller.kind is none. Name a configuration with a controller")
     return Bench(controller, layout_of, None)
-
-
-def _over_tcp(port: int, layout: MailboxLayout) -> Controller:
-    controller = make_controller(
-        _config({"kind": "modbus-tcp", "port": port, "word_order": layout.word_order}, "the simulated controller")
-    )
-    assert controller is not None
-    return controller
-
-
-def _config_of(url: str) -> Config:
-    parts = urlsplit(url)
-    if parts.scheme not in KINDS:
-        raise HilError(f"{url}: expected tcp://HOST:PORT, rtu-over-tcp://HOST:PORT or rtu:///dev/PORT")
-    values: dict[str, Any] = {key: int(value) if value.isdigit() else value for key, value in parse_qsl(parts.query)}
-    values["kind"] = KINDS[parts.scheme]
-    if parts.scheme == "rtu":
-        values["port"] = parts.path
-    else:
-        try:
-            values |= {"host": parts.hostname or "", **({} if parts.port is None else {"port": parts.port})}
-        except ValueError as error:
-            raise HilError(f"{url}: {error}. Expected {parts.scheme}://HOST:PORT") from error
-    return _config(values, url)
-
-
-def _config(controller: dict[str, Any], where: str) -> Config:
-    devices = {"camera": {"kind": "files", "path": "."}, "calibration": {"file": "none.yaml"}}  # none is opened
-    data = {**devices, "controller": controller}
-    try:
-        return Config.model_validate(data)
-    except ValidationError as error:
-        raise HilError("; ".join(f"{where}: {line}" for line in describe(error, Config))) from error
-
-
-def _loaded(path: Path | None) -> Config:
-    assert path is not None
-    try:
-        return load_config(path)
-    except ConfigError as error:
-        raise HilError(str(error)) from error
 
 
 def _next(transfer: int, acknowledged: int) -> int:

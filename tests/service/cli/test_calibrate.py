@@ -13,7 +13,7 @@ from contour.calibration.plane_calibration import PlaneCalibration
 from contour.camera_calibration.board import Board
 from contour.synthetic.board_poses import BoardPose, board_poses
 from service.cli.main import main
-from service.measuring.calibration_file import load_calibration, load_record
+from service.measuring.calibration_file import load_record
 from tests.support.pictures.board_scenes import CHARUCO, SMALL, picture
 
 BOARD = ["--board", "charuco", "--squares", "11x8", "--square-mm", "30", "--marker-mm", "21"]
@@ -140,12 +140,12 @@ def test_views_of_less_than_half_serve_for_that_part_and_blocks_beyond_are_refus
     told = capsys.readouterr().out
     assert "verdict   good in " in told
     assert "a block that leaves that part is refused (115 outside_work_area)" in told
-    sure = load_calibration(output).uncertainty
+    sure = load_record(output).calibration.uncertainty
     assert sure is not None
     assert len(sure.uncovered(np.array([[480.0, 360.0], [2.0, 2.0]]))) == 1
     assert calibrated(tmp_path, output, "--block-mm", "20", "--accept-uncovered", square_mm="15") == 0
     assert "contours outside of it are taken, too" in capsys.readouterr().out
-    sure = load_calibration(output).uncertainty
+    sure = load_record(output).calibration.uncertainty
     assert sure is not None
     assert sure.covered_px is None
 
@@ -205,7 +205,7 @@ def from_points(tmp_path: Path, text: str, *more: str) -> int:
 
 def test_points_become_a_homography(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert from_points(tmp_path, POINTS, "--plane-height-mm", "20") == 0
-    calibration = load_calibration(tmp_path / "x.yaml")
+    calibration = load_record(tmp_path / "x.yaml").calibration
     assert isinstance(calibration, PlaneCalibration)
     np.testing.assert_allclose(calibration.to_work(np.array([[450.0, 850.0]]), 20), [[140, 100]], atol=1e-6)
     assert calibration.height_known(20)
@@ -253,7 +253,7 @@ def test_points_that_contradict_one_another_are_refused(tmp_path: Path, capsys: 
 def test_a_scale_becomes_the_simple_form(tmp_path: Path) -> None:
     options = ["--scale", "0.375", "--size", "1600x1200", "--origin-px", "100,1100"]
     assert main(["calibrate", *options, "--output", str(tmp_path / "x.yaml")]) == 0
-    calibration = load_calibration(tmp_path / "x.yaml")
+    calibration = load_record(tmp_path / "x.yaml").calibration
     assert isinstance(calibration, SimpleCalibration)
     np.testing.assert_allclose(calibration.to_work(np.array([[200.0, 1000.0]]), 0), [[37.5, 37.5]])
 

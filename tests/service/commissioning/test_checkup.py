@@ -16,9 +16,9 @@ from pathlib import Path
 import pytest
 
 from service.cli.main import main
+from service.commissioning.check_result import CheckResult, Level
 from service.commissioning.checkup.devices import check_devices
 from service.commissioning.checkup.files import check_files
-from service.commissioning.checkup.finding import Finding, Level
 from service.commissioning.checkup.listening import check_listening
 from service.commissioning.checkup.page import check_page
 from service.commissioning.checkup.running import holder
@@ -44,7 +44,7 @@ def config(folder: Path, camera: str = "{kind: files, path: in}", more: str = ""
     return load_config(written(folder, camera, more))
 
 
-def part(found: list[Finding], name: str) -> Finding:
+def part(found: list[CheckResult], name: str) -> CheckResult:
     return next(one for one in found if one.part == name)
 
 

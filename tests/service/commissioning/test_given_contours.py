@@ -13,8 +13,8 @@ from service.cli.controller.simulate_service import SHAPES as OFFERED
 from service.cli.main import main
 from service.commissioning.given_contours import GivenContour, GivenContours, GivenContoursError, read_contours
 from service.commissioning.given_shapes import SHAPES, shape
-from service.config.config import Recipe
 from service.config.config_file import SAMPLES
+from service.config.recipes import Recipe
 from service.export.document import ExportDocument
 from service.export.geojson import to_geojson
 from service.reasons import Reason
@@ -118,7 +118,7 @@ def test_contours_come_in_turn_and_begin_again():
 
 
 def test_the_page_shows_every_shape():
-    page = (Path(__file__).parents[3] / "docs" / "simulated-service.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "simulated-service.md").read_text(encoding="utf-8")
     shown = [line.split("`")[1] for line in page.splitlines() if line.startswith("| `")]
     assert shown == list(SHAPES)
 

@@ -15,7 +15,9 @@ from drivers.controller.modbus.client import ModbusController, ModbusRtuControll
 from drivers.controller.modbus.requests import read_registers, registers_of, stream_of, write_register, write_registers
 from drivers.controller.simulated.controller import FaultPlan, Pace, ServerLimits, SimulatedController
 from drivers.controller.simulated.faults import Fault, Target
-from service.commissioning.probing import LOOK_PERIOD_S, Finding, Probe
+from service.commissioning.check_result import CheckResult
+from service.commissioning.probing.probe import Probe
+from service.commissioning.probing.probed import LOOK_PERIOD_S
 from service.daemon.restart_watch import RestartWatch
 from tests.support.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 from tests.support.controller.pty_line import PtyLine
@@ -34,9 +36,9 @@ async def probed_by(controller: ModbusController, *, write: bool) -> tuple[dict[
     probe = Probe(
         controller, 5, sleep=lambda pause_s: asyncio.sleep(pause_s / FASTER), now=lambda: FASTER * time.monotonic()
     )
-    findings: dict[str, Finding] = {}
+    findings: dict[str, CheckResult] = {}
     try:
-        async for finding in probe.findings(write=write):
+        async for finding in probe.results(write=write):
             findings[finding.part] = finding
     finally:
         await controller.close()
@@ -227,10 +229,10 @@ async def test_shorter_requests_than_the_standards_are_found(longest: int) -> No
 async def test_one_that_answers_nothing_rightly_is_told_what_it_answers_and_no_address_is_blamed(
     reply: Callable[[bytes], bytes], said: str
 ) -> None:
-    findings: list[Finding] = []
+    findings: list[CheckResult] = []
 
     async def look(probe: Probe) -> None:
-        async for finding in probe.findings(write=True):
+        async for finding in probe.results(write=True):
             findings.append(finding)
 
     async with MisbehavingServer() as server:

@@ -12,15 +12,15 @@ from service.commissioning.scenario_file import load_scenario
 from service.commissioning.scenario_reference import with_tables
 from service.config.config_file import ConfigError
 
-DOCS = Path(__file__).parents[3] / "docs"
-EXAMPLES = sorted((DOCS / "scenarios").glob("*.yaml"))
+REFERENCE = Path(__file__).parents[3] / "docs" / "reference"
+EXAMPLES = sorted((REFERENCE / "scenarios").glob("*.yaml"))
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
 def test_every_example_is_loaded_and_told_of(example: Path) -> None:
     scenario = load_scenario(example)
     assert scenario.events
-    assert example.name in (DOCS / "simulated-controller.md").read_text()
+    assert example.name in (REFERENCE / "simulated-controller.md").read_text()
     assert example.read_text().startswith("# ")
 
 
@@ -90,7 +90,7 @@ def test_a_file_that_is_not_there_names_the_option(tmp_path: Path) -> None:
 
 
 def test_the_tables_of_the_page_are_fresh() -> None:
-    page = (DOCS / "simulated-controller.md").read_text()
+    page = (REFERENCE / "simulated-controller.md").read_text()
     assert page == with_tables(page), (
-        "run python -m service.commissioning.scenario_reference docs/simulated-controller.md"
+        "run python -m service.commissioning.scenario_reference docs/reference/simulated-controller.md"
     )

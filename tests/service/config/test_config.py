@@ -10,8 +10,11 @@ import pytest
 import yaml
 
 from service.config import reference as config_reference
-from service.config.config import Config, FilesCamera, ModbusTcp, NoController, SerialTrigger
+from service.config.cameras import FilesCamera
+from service.config.config import Config
 from service.config.config_file import ConfigError, config_schema, default_config, load_config
+from service.config.controllers import ModbusTcp, NoController
+from service.config.triggers import SerialTrigger
 
 ROOT = Path(__file__).parents[3]
 SMALL = "camera: {kind: files, path: in}\ncalibration: {file: c.yaml}\ncontroller: {kind: modbus-tcp}\n"
@@ -62,9 +65,9 @@ def test_line_1_of_the_shipped_config_names_the_schema() -> None:
 
 
 def test_schema_and_reference_are_fresh() -> None:
-    how = "run: python -m service.config.reference docs/configuration.md config.schema.json"
+    how = "run: python -m service.config.reference docs/reference/configuration.md config.schema.json"
     assert (ROOT / "config.schema.json").read_text() == config_reference.schema_text(), how
-    assert (ROOT / "docs" / "configuration.md").read_text() == config_reference.reference(), how
+    assert (ROOT / "docs" / "reference" / "configuration.md").read_text() == config_reference.reference(), how
 
 
 def test_every_section_of_the_configuration_is_in_the_reference() -> None:

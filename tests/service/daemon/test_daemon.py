@@ -19,7 +19,7 @@ import pytest
 from drivers.camera import CameraUnavailable
 from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.mailbox.mailbox import Answer, ServiceBlock
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.daemon.daemon import Daemon, Parts
 from service.daemon.lock import Lock, LockError
 from service.daemon.systemd import Notifier, Watchdog

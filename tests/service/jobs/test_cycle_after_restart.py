@@ -104,7 +104,7 @@ async def test_a_sent_job_without_a_limit_of_its_own_is_taken_back_after_a_resta
 
 async def test_a_job_that_was_found_without_its_pages_is_withdrawn_with_154(tmp_path: Path) -> None:
     async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
-        built.journal.go_on_above(ServiceBlock(job_id=70, trigger_ack=6, session_ack=9), 9, 1000)
+        built.journal.go_on_above(ServiceBlock(job_id=70, trigger_ack=6, session_ack=9), (9, 6), 1000)
         (job,) = built.journal.unsettled()
         settled = await asyncio.wait_for(built.cycle.resume(job), 15)
         assert (settled.outcome, settled.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
@@ -114,7 +114,7 @@ async def test_a_job_that_was_found_without_its_pages_is_withdrawn_with_154(tmp_
 async def test_a_job_that_was_found_and_had_been_accepted_is_accepted(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
         built.controller.link = replace(built.controller.link, last_job=70, last_result=1)
-        built.journal.go_on_above(ServiceBlock(job_id=70, trigger_ack=6, session_ack=9), 9, 1000)
+        built.journal.go_on_above(ServiceBlock(job_id=70, trigger_ack=6, session_ack=9), (9, 6), 1000)
         (job,) = built.journal.unsettled()
         settled = await asyncio.wait_for(built.cycle.resume(job), 15)
         assert settled.outcome is Outcome.ACCEPTED

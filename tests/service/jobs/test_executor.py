@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import sqlite3
+import threading
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -47,6 +49,30 @@ async def test_a_trigger_during_a_job_is_refused_as_busy_and_counted(tmp_path: P
         bench.runner.go.set()
         await ticket.settled
         assert bench.runner.begun == [ticket.job.job_id]
+
+
+async def test_a_job_that_is_durable_is_executed_though_who_asked_for_it_went_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with running(tmp_path) as bench:
+        taking, may_take, take = threading.Event(), threading.Event(), bench.journal.take
+
+        def slow_take(*args: Any, **kwargs: Any) -> Job:
+            taking.set()
+            assert may_take.wait(30)
+            return take(*args, **kwargs)
+
+        monkeypatch.setattr(bench.journal, "take", slow_take)
+        asking = asyncio.ensure_future(bench.executor.submit(TriggerStamp("serial")))
+        await until(taking.is_set)
+        asking.cancel()
+        with suppress(asyncio.CancelledError):
+            await asking
+        assert not bench.executor.idle
+        may_take.set()
+        await until(lambda: bench.settled)
+        assert bench.journal.unsettled() == ()
+        await until(lambda: bench.executor.idle)
 
 
 async def test_two_triggers_at_the_same_instant_give_one_job(tmp_path: Path) -> None:

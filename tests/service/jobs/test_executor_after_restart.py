@@ -151,6 +151,17 @@ async def test_an_earlier_trigger_in_the_service_block_takes_nothing_back(tmp_pa
         assert (bench.link.published.session_ack, bench.link.published.trigger_ack) == (9, 3)
 
 
+async def test_the_controllers_newest_trigger_stays_taken_whatever_else_the_service_block_shows(tmp_path: Path) -> None:
+    """Killed before it was acknowledged, at a controller in place of another with the same session and other counts."""
+    before = await after_a_restore(tmp_path)
+    async with running(tmp_path, counter=3) as bench:
+        owner = bench.journal.owner
+        await bench.link.on_found(left_behind(owner=owner, job_id=before, settled_job=before, trigger_ack=230))
+        await asyncio.sleep(0.05)
+        assert bench.settled == []
+        assert (bench.link.published.session_ack, bench.link.published.trigger_ack) == (9, 3)
+
+
 async def test_each_start_numbers_from_a_thousand_above_all_in_the_journal(tmp_path: Path) -> None:
     numbers = []
     for _ in range(4):

@@ -110,12 +110,12 @@ def test_a_heartbeat_of_ours_that_lands_late_is_ours() -> None:
 def test_what_a_controller_remembers_after_its_restart_is_ours() -> None:
     watched = Watched()
     watched.begin()
-    for beat in range(2, 60):
+    for beat in range(2, 600):
         watched.write(beat)
     watched.ownership.controller_restarted()
     assert watched.see(OURS, 5), "registers of long ago"
-    watched.write(60)
-    assert watched.see(OURS, 60)
+    watched.write(600)
+    assert watched.see(OURS, 600)
     assert not watched.see(OURS, 30)
 
 
@@ -217,6 +217,43 @@ def test_a_heartbeat_that_moved_while_replies_were_lost_has_moved() -> None:
     watched.ownership.disconnected()
     assert not watched.see(THEIRS, 8, after_s=0.4)
     assert watched.ownership.conflict
+
+
+@pytest.mark.parametrize(("owner", "found"), [(OURS, 7), (0, 0)])
+def test_our_first_write_that_lands_late_is_ours(owner: int, found: int) -> None:
+    watched = Watched()
+    while not watched.see(owner, found):
+        pass
+    watched.ownership.writing(20)  # no reply
+    watched.ownership.disconnected()
+    assert watched.see(owner, found, after_s=0.4)
+    watched.write(21)
+    assert watched.see(OURS, 21)
+    assert all(watched.see_for(0.3, OURS, itertools.repeat(20)))
+    assert watched.ownership.ours
+
+
+def test_a_write_of_ours_that_lands_late_is_ours_however_many_came_after_it() -> None:
+    watched = Watched()
+    watched.begin()
+    watched.ownership.writing(2)  # no reply
+    watched.ownership.disconnected()
+    for beat in range(3, 103):  # ten jobs, in a second and a half
+        watched.write(beat)
+        assert watched.see(OURS, beat, after_s=0.015)
+    assert all(watched.see_for(0.3, OURS, itertools.repeat(2)))
+
+
+def test_a_write_of_before_a_restart_of_the_controller_that_lands_after_it_is_ours() -> None:
+    watched = Watched()
+    watched.begin()
+    watched.ownership.writing(2)  # no reply
+    watched.ownership.disconnected()
+    watched.ownership.controller_restarted()
+    assert watched.see(OURS, 1)
+    watched.write(3)
+    assert all(watched.see_for(0.3, OURS, itertools.repeat(2)))
+    assert watched.ownership.ours
 
 
 def test_our_claim_stands_over_a_lost_reply() -> None:

@@ -24,9 +24,9 @@ def rows(page: str) -> dict[tuple[int, str], tuple[int, int, int]]:
 
 
 def test_the_page_is_what_the_codec_makes_now() -> None:
-    page = (ROOT / "docs" / "register-map.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "register-map.md").read_text(encoding="utf-8")
     assert page == register_map(MailboxLayout()), (
-        "write it anew: python -m service.link.register_map docs/register-map.md"
+        "write it anew: python -m service.link.register_map docs/reference/register-map.md"
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 
-from contour.calibration.calibration import Alignment, CameraCalibration, SimpleCalibration
+from contour.calibration.calibration import Alignment, Calibration, CameraCalibration, SimpleCalibration
 from contour.calibration.fixed_marks import Mark, Sentinels
 from contour.calibration.plane_calibration import PlaneCalibration
 from contour.calibration.position_uncertainty import PositionUncertainty
@@ -21,9 +21,7 @@ from service.measuring.calibration_file import (
     CalibrationFileError,
     CalibrationRecord,
     calibration_hash,
-    load_calibration,
     load_record,
-    save_calibration,
     save_record,
 )
 
@@ -61,35 +59,40 @@ def written(folder: Path, data: object) -> Path:
     return path
 
 
+def save(path: Path, calibration: Calibration) -> None:
+    name = calibration.camera_name if isinstance(calibration, CameraCalibration) else ""
+    save_record(path, CalibrationRecord(calibration, name))
+
+
 @pytest.mark.parametrize("stated", [{"plane_mm": 0.12}, {"planes": [PLANE]}], ids=["one figure", "maps"])
 def test_the_covered_part_comes_back_and_a_file_without_one_covers_all(tmp_path: Path, stated: dict[str, Any]) -> None:
     corners = np.array([[0.0, 0.0], [1599.0, 0.0]])
     ring = [[100.0, 100.0], [1700.0, -100.0], [900.0, 900.0]]
     for covered, outside in (({}, 0), ({"covered_px": ring}, 1)):
-        read = load_calibration(written(tmp_path, {**CAMERA, "uncertainty": {**stated, **covered}}))
-        save_calibration(tmp_path / "again.yaml", read)
-        for calibration in (read, load_calibration(tmp_path / "again.yaml")):
+        read = load_record(written(tmp_path, {**CAMERA, "uncertainty": {**stated, **covered}})).calibration
+        save(tmp_path / "again.yaml", read)
+        for calibration in (read, load_record(tmp_path / "again.yaml").calibration):
             assert calibration.uncertainty is not None
             assert len(calibration.uncertainty.uncovered(corners)) == outside
     with pytest.raises(CalibrationFileError, match="covered_px"):
-        load_calibration(written(tmp_path, {**CAMERA, "uncertainty": {**stated, "covered_px": ring[:2]}}))
+        load_record(written(tmp_path, {**CAMERA, "uncertainty": {**stated, "covered_px": ring[:2]}}))
 
 
 @pytest.mark.parametrize("form", [CAMERA, SIMPLE], ids=["camera", "simple"])
 def test_what_a_calibration_states_of_itself_is_read_and_written(tmp_path: Path, form: dict[str, Any]) -> None:
-    assert load_calibration(written(tmp_path, form)).uncertainty is None
-    stated = load_calibration(written(tmp_path, {**form, "uncertainty": {"plane_mm": 0.12}}))
+    assert load_record(written(tmp_path, form)).calibration.uncertainty is None
+    stated = load_record(written(tmp_path, {**form, "uncertainty": {"plane_mm": 0.12}})).calibration
     assert stated.uncertainty is not None
     assert stated.uncertainty.figure_mm(33.0) == 0.12
-    save_calibration(tmp_path / "again.yaml", stated)
-    again = load_calibration(tmp_path / "again.yaml")
+    save(tmp_path / "again.yaml", stated)
+    again = load_record(tmp_path / "again.yaml").calibration
     assert again.uncertainty is not None
     np.testing.assert_allclose(again.uncertainty.at(np.array([[5.0, 7.0], [900.0, 800.0]]), 20.0), 0.12)
 
 
 def test_the_simple_form_is_read_as_the_contract_says(tmp_path: Path) -> None:
     """The origin's pixel is work (0, 0); 100 px to its right are 37.5 mm in x, 100 px above it 37.5 mm in y."""
-    calibration = load_calibration(written(tmp_path, SIMPLE))
+    calibration = load_record(written(tmp_path, SIMPLE)).calibration
     points = np.array([[100.0, 1100.0], [200.0, 1100.0], [100.0, 1000.0]])
     expected = [[0, 0], [37.5, 0], [0, 37.5]]
     np.testing.assert_allclose(calibration.to_machine(calibration.to_work(points, 0)), expected, atol=1e-9)
@@ -98,14 +101,14 @@ def test_the_simple_form_is_read_as_the_contract_says(tmp_path: Path) -> None:
 
 def test_the_rotation_of_the_simple_form_is_counter_clockwise_as_seen(tmp_path: Path) -> None:
     """A work x axis turned by 90 degrees counter-clockwise points up in the picture: to smaller image y."""
-    calibration = load_calibration(written(tmp_path, {**SIMPLE, "rotation_deg": 90}))
+    calibration = load_record(written(tmp_path, {**SIMPLE, "rotation_deg": 90})).calibration
     np.testing.assert_allclose(calibration.to_work(np.array([[100.0, 1000.0]]), 0), [[37.5, 0]], atol=1e-9)
 
 
 def test_the_camera_form_is_read_with_its_alignment(tmp_path: Path) -> None:
     """A camera that looks straight down on (300, 225): its principal point sees that place at every height."""
     data = {**CAMERA, "distortion_coefficients": {"rows": 1, "cols": 5, "data": [0, 0, 0, 0, 0]}}
-    calibration = load_calibration(written(tmp_path, data))
+    calibration = load_record(written(tmp_path, data)).calibration
     centre = np.array([[799.5, 599.5]])
     np.testing.assert_allclose(calibration.to_work(centre, 0), [[300, 225]], atol=1e-6)
     np.testing.assert_allclose(calibration.to_machine(calibration.to_work(centre, 60)), [[1000 - 225, 2300]], atol=1e-6)
@@ -115,10 +118,10 @@ def test_the_camera_form_is_read_with_its_alignment(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("data", [CAMERA, SIMPLE])
 def test_what_is_saved_comes_back_as_it_was(tmp_path: Path, data: dict[str, Any]) -> None:
-    first = load_calibration(written(tmp_path, data))
+    first = load_record(written(tmp_path, data)).calibration
     path = tmp_path / "again.yaml"
-    save_calibration(path, first)
-    again = load_calibration(path)
+    save(path, first)
+    again = load_record(path).calibration
     for name, value in vars(first).items():
         np.testing.assert_equal(vars(again)[name], value)
     assert yaml.safe_load(path.read_text())["hash"] == calibration_hash(path)
@@ -129,7 +132,7 @@ def test_uncertainty_sentinels_and_origin_come_back_as_they_were(tmp_path: Path)
     sure = PositionUncertainty(1600, 1200, [0.0, 60.0], [0.02, 0.03], np.arange(24.0).reshape(2, 3, 4))
     marks = Sentinels("DICT_4X4_50", (Mark(7, np.array([[1.0, 2.0], [9.5, 2.0], [9.0, 10.0], [1.0, 10.0]])),))
     created = datetime(2026, 5, 4, 3, 2, 1, tzinfo=UTC)
-    calibration = replace(load_calibration(written(tmp_path, CAMERA)), uncertainty=sure)
+    calibration = replace(load_record(written(tmp_path, CAMERA)).calibration, uncertainty=sure)
     save_record(path, CalibrationRecord(calibration, "cam0", created, marks, {"views": 14, "board": "charuco"}))
     again = load_record(path)
     assert (again.camera_name, again.created) == ("cam0", created)
@@ -145,8 +148,8 @@ def test_uncertainty_sentinels_and_origin_come_back_as_they_were(tmp_path: Path)
 def test_a_homography_comes_back_as_it_was(tmp_path: Path) -> None:
     path = tmp_path / "calibration.yaml"
     first = PlaneCalibration(1600, 1200, np.array([[0.4, 0.01, -9], [0.02, -0.41, 480], [1e-5, 2e-5, 1]]), 5.0)
-    save_calibration(path, first)
-    again = load_calibration(path)
+    save(path, first)
+    again = load_record(path).calibration
     assert isinstance(again, PlaneCalibration)
     np.testing.assert_allclose(again.homography, first.homography, rtol=1e-14)
     assert again.plane_height_mm == 5.0
@@ -154,10 +157,10 @@ def test_a_homography_comes_back_as_it_was(tmp_path: Path) -> None:
 
 def test_a_changed_file_no_longer_matches_its_hash(tmp_path: Path) -> None:
     path = tmp_path / "calibration.yaml"
-    save_calibration(path, SimpleCalibration(1600, 1200, 0.375, (0.0, 0.0)))
+    save(path, SimpleCalibration(1600, 1200, 0.375, (0.0, 0.0)))
     path.write_text(path.read_text().replace("0.375", "0.376"))
     with pytest.raises(CalibrationFileError, match="it was changed after it was written"):
-        load_calibration(path)
+        load_record(path)
 
 
 def test_the_hash_does_not_depend_on_layout_and_order(tmp_path: Path) -> None:
@@ -169,13 +172,13 @@ def test_the_hash_does_not_depend_on_layout_and_order(tmp_path: Path) -> None:
 
 def test_a_file_without_a_hash_is_read(tmp_path: Path) -> None:
     assert "hash" not in SIMPLE
-    load_calibration(written(tmp_path, SIMPLE))
+    assert isinstance(load_record(written(tmp_path, SIMPLE)).calibration, SimpleCalibration)
 
 
 def test_saving_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
     path = tmp_path / "gone" / "calibration.yaml"
     with pytest.raises(CalibrationFileError, match="cannot be written"):
-        save_calibration(path, SimpleCalibration(1600, 1200, 0.375, (0.0, 0.0), alignment=Alignment()))
+        save(path, SimpleCalibration(1600, 1200, 0.375, (0.0, 0.0), alignment=Alignment()))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -188,7 +191,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_other(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(CalibrationFileError, match=r"No space left on device\. The old file is unchanged"):
-        save_calibration(path, SimpleCalibration(1600, 1200, 0.5, (0.0, 0.0)))
+        save(path, SimpleCalibration(1600, 1200, 0.5, (0.0, 0.0)))
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
@@ -197,7 +200,7 @@ def test_saving_through_a_link_changes_the_file_behind_it(tmp_path: Path) -> Non
     path = written(tmp_path, SIMPLE)
     link = tmp_path / "link.yaml"
     link.symlink_to(path)
-    save_calibration(link, SimpleCalibration(1600, 1200, 0.5, (0.0, 0.0)))
+    save(link, SimpleCalibration(1600, 1200, 0.5, (0.0, 0.0)))
     assert link.is_symlink()
     assert calibration_hash(path) == yaml.safe_load(path.read_text())["hash"]
 
@@ -256,15 +259,15 @@ def changed(data: dict[str, Any], **changes: Any) -> dict[str, Any]:
 def test_a_file_that_cannot_be_trusted_is_refused_with_its_reason(tmp_path: Path, data: Any, expected: str) -> None:
     path = written(tmp_path, data)
     with pytest.raises(CalibrationFileError) as error:
-        load_calibration(path)
+        load_record(path)
     assert str(path) in str(error.value)
     assert expected in str(error.value)
 
 
 def test_a_missing_file_is_an_error_that_names_it(tmp_path: Path) -> None:
     with pytest.raises(CalibrationFileError, match=r"nowhere\.yaml: cannot be read"):
-        load_calibration(tmp_path / "nowhere.yaml")
+        load_record(tmp_path / "nowhere.yaml")
 
 
 def test_a_loaded_camera_is_a_camera(tmp_path: Path) -> None:
-    assert isinstance(load_calibration(written(tmp_path, CAMERA)), CameraCalibration)
+    assert isinstance(load_record(written(tmp_path, CAMERA)).calibration, CameraCalibration)

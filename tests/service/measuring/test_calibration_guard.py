@@ -15,7 +15,7 @@ from contour.calibration.calibration import CameraCalibration
 from contour.calibration.fixed_marks import Sentinels, see_sentinels
 from contour.calibration.position_uncertainty import PositionUncertainty
 from service.cli.main import main
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.measuring.calibration_file import CalibrationRecord, save_record
 from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
 from service.measuring.measure import Measurer

@@ -12,8 +12,8 @@ from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.errors import ParameterError, PictureError
 from contour.geometry.rings import area, hausdorff
 from contour.synthetic import render
-from service.config.config import Recipe
-from service.measuring.calibration_file import load_calibration
+from service.config.recipes import Recipe
+from service.measuring.calibration_file import load_record
 from service.measuring.measure import Measurer, trace_settings
 from service.reasons import Reason
 from tests.support.scenes.sample_scenes import THICKNESS_MM, sample_scenes
@@ -29,12 +29,12 @@ def rendered():
 
 @pytest.fixture(scope="module")
 def measurer() -> Measurer:
-    return Measurer(load_calibration(SAMPLES / "calibration.yaml"))
+    return Measurer(load_record(SAMPLES / "calibration.yaml").calibration)
 
 
 def test_the_shipped_calibration_is_that_of_the_camera_that_rendered_the_samples(rendered, measurer: Measurer) -> None:
     """The rendered outline in pixels, taken through the calibration file, is the outline in millimetres."""
-    calibration = load_calibration(SAMPLES / "calibration.yaml")
+    calibration = load_record(SAMPLES / "calibration.yaml").calibration
     back = calibration.to_machine(calibration.to_work(rendered.truth_px.exterior, THICKNESS_MM))
     assert hausdorff(back, rendered.truth_mm.exterior, 1.0) < 0.001
 
@@ -138,14 +138,14 @@ def test_a_covered_lens_is_bad_quality_before_it_is_no_block(measurer: Measurer)
 
 
 def test_the_work_area_refuses(rendered) -> None:
-    calibration = load_calibration(SAMPLES / "calibration.yaml")
+    calibration = load_record(SAMPLES / "calibration.yaml").calibration
     area_mm = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
     seen = Measurer(calibration, work_area_mm=area_mm).measure(rendered.picture, RECIPE, THICKNESS_MM)
     assert seen.reasons == (Reason.OUTSIDE_WORK_AREA,)
 
 
 def test_a_contour_beyond_what_the_calibration_covers_is_refused_by_that_name(rendered) -> None:
-    plain = load_calibration(SAMPLES / "calibration.yaml")
+    plain = load_record(SAMPLES / "calibration.yaml").calibration
     exterior = rendered.truth_px.exterior
     low, high = exterior.min(axis=0) - 20, exterior.max(axis=0) + 20
     for right, reasons in ((high[0], ()), (high[0] - 40, (Reason.OUTSIDE_WORK_AREA,))):

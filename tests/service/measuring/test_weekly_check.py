@@ -15,7 +15,7 @@ import yaml
 from contour.calibration.calibration import Alignment, SimpleCalibration
 from contour.calibration.position_uncertainty import PositionUncertainty
 from service.cli.main import main
-from service.measuring.calibration_file import CalibrationRecord, load_calibration, load_record, save_record
+from service.measuring.calibration_file import CalibrationRecord, load_record, save_record
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"
 PICTURE = SAMPLES / "2-l-shape.jpg"
@@ -179,13 +179,13 @@ def test_work_points_align_the_file(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 def test_pixels_at_a_height_align_it_too(tmp_path: Path) -> None:
-    calibration = load_calibration(SAMPLES / "calibration.yaml")
+    calibration = load_record(SAMPLES / "calibration.yaml").calibration
     pixels = np.array([[100.0, 100.0], [1500.0, 150.0], [1400.0, 1100.0]])
     machine = MACHINE.apply(calibration.to_work(pixels, 20.0))
     assert align(tmp_path, pixels, machine, "x_px,y_px", "--height-mm", "20", "--output", str(tmp_path / "d.yaml")) == 0
-    aligned = load_calibration(tmp_path / "d.yaml")
+    aligned = load_record(tmp_path / "d.yaml").calibration
     np.testing.assert_allclose(aligned.to_machine(aligned.to_work(pixels, 20.0)), machine, atol=1e-6)
-    assert load_calibration(tmp_path / "c.yaml").alignment == Alignment(0.0, (0.0, 0.0))
+    assert load_record(tmp_path / "c.yaml").calibration.alignment == Alignment(0.0, (0.0, 0.0))
 
 
 def test_marks_off_the_calibrations_plane_or_beyond_what_it_covers_are_told(

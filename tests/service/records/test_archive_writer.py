@@ -16,7 +16,7 @@ import pytest
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
 from drivers.camera import Frame
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.link.contour_message import Envelope, contour_pages
 from service.measuring.measure import Measurer
 from service.reasons import Outcome, Reason

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import sqlite3
 import time
 from collections import Counter
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -179,6 +180,8 @@ class TwinCell(FaultedCell):
             copy.unlink(missing_ok=True)
             copy_journal(journal, copy)
         put_back(copy, self.folder / "twin" / "journal.sqlite")
+        self._in_flight_at_the_twins_address()
+        before = dict(self.measured)
         if together:
             await self.in_the_midst_of_a_transfer()
         await self.end_service()
@@ -195,8 +198,14 @@ class TwinCell(FaultedCell):
         sides = first.side(), second.side()
         self.met.extend(sides[0].rows)
         self.counted.update(str(row["outcome"]) for side in sides for row in side.rows)
-        judge_twins(sides, self.taken, self.events, noticed_at, self._valid_for_s, self.findings)
+        judge_twins(sides, self.taken, self.events, noticed_at, self._valid_for_s, self.findings, before)
         await self._person_decides(first, second)
+
+    def _in_flight_at_the_twins_address(self) -> None:
+        """Both addresses are one controller: else what was copied in flight would wait for a person."""
+        with closing(sqlite3.connect(self.folder / "twin" / "journal.sqlite")) as journal, journal:
+            first, second = (f'"host": "{host}"' for host in self.host)
+            journal.execute("UPDATE jobs SET target = replace(target, ?, ?) WHERE outcome IS NULL", (first, second))
 
     @property
     def _valid_for_s(self) -> float | None:
@@ -205,7 +214,9 @@ class TwinCell(FaultedCell):
     async def _both_come_to_an_end(self, *twins: Twin) -> None:
         """Also one that must not write any more: by `valid_for` and `ack_timeout`."""
         give_up_at = time.monotonic() + 5.0
-        while time.monotonic() < give_up_at and any(twin.parts.journal.unsettled() for twin in twins):
+        while time.monotonic() < give_up_at and (
+            self.controller.trigger_open or any(twin.parts.journal.unsettled() for twin in twins)
+        ):
             await asyncio.sleep(0.02)
 
     async def _person_decides(self, first: Twin, second: Twin) -> None:

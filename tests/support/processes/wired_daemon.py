@@ -15,7 +15,7 @@ from drivers.camera.simulated import SimulatedCamera
 from service import wiring
 from service.config.config import Config
 from service.daemon.daemon import Daemon, Parts
-from service.measuring.measure import Measurement
+from service.measuring.measurement import Measurement
 from service.records.journal import Job, TriggerStamp
 from service.state import State
 from tests.support.service.waiting import until

@@ -148,7 +148,7 @@ def _changed(scene: Scene, changes: dict[str, Any]) -> Scene:
 
 
 def measured_scenes() -> tuple[BenchScene, ...]:
-    """Scenes for measuring, all traceable; docs/accuracy.md says which were changed or known before."""
+    """Scenes for measuring, all traceable; docs/reports/accuracy.md says which were changed or known before."""
     plain = [BenchScene(easy(f"{shape}-easy", make(seed_of(shape)))) for shape, make in SHAPES.items()]
     worn = [BenchScene(shop(f"{shape}-shop", make(seed_of(shape) + 1))) for shape, make in SHAPES.items()]
     return (*plain, *worn, *_sizes(), *_views(), *_surfaces(), *_cells(), *_damage())

@@ -14,12 +14,12 @@ import numpy as np
 from contour.geometry.rings import Contour
 from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.mailbox.mailbox import Page
-from service.config.config import Recipe
+from service.config.recipes import Recipe
 from service.jobs.cycle import Cycle, CycleSettings, Observation
 from service.jobs.health import Health
 from service.link.link import Link, LinkSettings
 from service.link.transfer import TransferCounter, TransferSettings
-from service.measuring.measure import Measurement
+from service.measuring.measurement import Measurement
 from service.records.evidence import Evidence
 from service.records.journal import Job, Journal, TriggerStamp
 from service.state import StateMachine

@@ -10,7 +10,7 @@ import pytest
 from tests.support.processes.cell import Cell
 from tests.support.processes.processes import Process, combtrace, lines, until
 
-SCENARIOS = Path(__file__).parents[3] / "docs" / "scenarios"
+SCENARIOS = Path(__file__).parents[3] / "docs" / "reference" / "scenarios"
 
 
 def simulate(*arguments: str | Path):

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib.metadata import distributions
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
@@ -36,6 +37,8 @@ def test_the_wheel_runs_in_another_folder_and_environment(tmp_path: Path) -> Non
     # What the wheel depends on comes from the tested environment; combtrace itself must come from the wheel, so the
     # editable install's own pointer, a .pth file, is not followed: addsitedir would, a plain path does not.
     (packages / "dependencies.pth").write_text(tested + "\n")
+    # Who runs the daemon need not have what only tests on hardware use.
+    (packages / "pytest.py").write_text("raise ModuleNotFoundError(name='pytest')\n")
     installed = run(
         sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--target", packages, wheel, cwd=tmp_path
     )
@@ -49,3 +52,9 @@ def test_the_wheel_runs_in_another_folder_and_environment(tmp_path: Path) -> Non
     assert (tmp_path / "out" / "1-rectangle-contour.png").exists()
     version = run(python, "-m", "service.cli.main", "--version", cwd=tmp_path)
     assert version.stdout.startswith("combtrace ")
+    suite = run(python, "-c", "import service.commissioning.hil", cwd=tmp_path)
+    assert suite.stderr.endswith(
+        "pytest is not installed, the fixture `hil` needs it. Install it: pip install 'combtrace[hil]'\n"
+    )
+    (installed_as,) = distributions(name="combtrace", path=[str(packages)])
+    assert [line for line in installed_as.requires or () if "pytest" in line and "extra ==" not in line] == []

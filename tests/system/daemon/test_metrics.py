@@ -88,7 +88,7 @@ def test_the_alert_rules_name_only_what_is_served(text: str) -> None:
 
 
 def test_every_metric_is_explained(text: str) -> None:
-    page = (Path(__file__).parents[3] / "docs" / "metrics.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "reference" / "metrics.md").read_text()
     names = set(re.findall(r"^# TYPE (combtrace_[a-z_]+)", text, re.MULTILINE))
     assert {name for name in names if f"`{name}`" not in page and not name.endswith("_created")} == set()
 

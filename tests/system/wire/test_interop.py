@@ -17,7 +17,8 @@ from tests.support.controller.protocol_decoder import decode_contour, decode_ser
 from tests.support.controller.pty_line import PtyLine
 from tests.support.interop.programs import TCP_SERVERS, libmodbus_rtu, mbpoll_reads
 
-GOLDEN: dict[str, Any] = json.loads((Path(__file__).parents[3] / "docs" / "golden-vectors.json").read_text("utf-8"))
+VECTORS = Path(__file__).parents[3] / "docs" / "reference" / "golden-vectors.json"
+GOLDEN: dict[str, Any] = json.loads(VECTORS.read_text(encoding="utf-8"))
 CONTOURS = [contour for contour in GOLDEN["contours"] if contour["holes"]]
 SERVICE = ServiceBlock(service_state=5, service_heartbeat=9, job_id=70_000, session_ack=9, owner=4711)
 

@@ -17,7 +17,7 @@ from tests.support.controller.protocol_decoder import (
     page_crc,
 )
 
-FILE = Path(__file__).parents[4] / "docs" / "golden-vectors.json"
+FILE = Path(__file__).parents[4] / "docs" / "reference" / "golden-vectors.json"
 VECTORS: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
 CONTOURS = VECTORS["contours"]
 UNKNOWN = 0xFFFFFFFF
@@ -30,7 +30,7 @@ def rings(contour: dict[str, Any]) -> tuple[tuple[tuple[int, int], ...], ...]:
 
 def test_the_file_is_what_the_codec_makes_now() -> None:
     assert FILE.read_text(encoding="utf-8") == as_text(), (
-        "write it anew: python -m drivers.controller.mailbox.golden_vectors docs/golden-vectors.json"
+        "write it anew: python -m drivers.controller.mailbox.golden_vectors docs/reference/golden-vectors.json"
     )
 
 

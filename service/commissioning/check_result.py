@@ -20,7 +20,7 @@ class Level(IntEnum):
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """One checked thing. next_step: what to do, where the text does not say it; "" = nothing."""
 
     part: str
@@ -28,17 +28,22 @@ class Finding:
     text: str
     next_step: str = ""
 
+    @property
+    def well(self) -> bool:
+        """True where there is nothing to do."""
+        return self.level is Level.OK
 
-def ok(part: str, text: str) -> Finding:
+
+def ok(part: str, text: str) -> CheckResult:
     """It works."""
-    return Finding(part, Level.OK, text)
+    return CheckResult(part, Level.OK, text)
 
 
-def warning(part: str, text: str, next_step: str = "") -> Finding:
+def warning(part: str, text: str, next_step: str = "") -> CheckResult:
     """It works, and should be seen to."""
-    return Finding(part, Level.WARNING, text, next_step)
+    return CheckResult(part, Level.WARNING, text, next_step)
 
 
-def fault(part: str, text: str, next_step: str = "") -> Finding:
+def fault(part: str, text: str, next_step: str = "") -> CheckResult:
     """It does not work."""
-    return Finding(part, Level.FAULT, text, next_step)
+    return CheckResult(part, Level.FAULT, text, next_step)

@@ -1,0 +1,162 @@
+"""`recipes` of config.yaml: how each block type is traced, what of it is accepted, and what is made of it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from contour.polygon.start_vertex import Start
+from contour.tracing.tracing import Method
+from service.config.values import FilePath, Model, Number, Point
+
+DEFAULT_METHOD: Method = "wall-tips"
+METHOD_PARAMETERS: dict[str, dict[str, tuple[float, float]]] = {
+    "wall-tips": {},
+    "sliding-matrix": {"core_px": (1, 1000), "step_px": (1, 2000), "threshold": (0, 255)},
+    "direct-scan": {"max_gap_px": (0, 100_000), "min_width_px": (0, 100_000)},
+    "find-contours": {},
+}
+
+
+class Gcode(Model):
+    """How G-code of a contour moves; heights above the table."""
+
+    feed_mm_min: float = Field(3000, gt=0, le=1e6, description="Feed along the rings, mm/min.")
+    plunge_mm_min: float = Field(600, gt=0, le=1e6, description="Feed downwards, mm/min.")
+    safe_z_mm: float | None = Field(
+        None, ge=0, le=10_000, description="Height between rings, mm; none = 20 mm above the block."
+    )
+    cut_z_mm: float | None = Field(
+        None, ge=-1000, le=10_000, description="Height along the rings, mm; none = the safe height, a dry run."
+    )
+    path_tolerance_mm: float = Field(0.01, gt=0, le=10, description="How far corners may be rounded (G64 P), mm.")
+    direction: Literal["climb", "conventional"] = Field(
+        "climb", description="climb: the material is on the right of the way; conventional: on the left."
+    )
+    lead_in_mm: float = Field(
+        0, ge=0, le=1000, description="Straight way onto each ring through what is no material, mm; 0 = none."
+    )
+    template: FilePath | None = Field(None, description="Program around $rings; none = one for LinuxCNC.")
+
+
+class Recipe(Model):
+    """A block type: how it is traced and what is accepted."""
+
+    number: int = Field(ge=1, le=65_535, description="Number by which triggers name it.")
+    name: str = Field(min_length=1, max_length=80, description="Name for people.")
+    method: Method = Field(DEFAULT_METHOD, description="How the contour is traced.")
+    thickness_mm: float = Field(20, ge=0, le=10_000, description="Height of the block's top above the table, mm.")
+    tolerance_mm: float = Field(0.1, ge=0, le=100, description="Largest shift by leaving vertices out, mm.")
+    thickness_tolerance_mm: float = Field(
+        0, ge=0, le=1000, description="How far the block's top may lie from that height, mm."
+    )
+    max_uncertainty_mm: float = Field(
+        0, ge=0, le=1000, description="Largest accepted 95 % bound on the contour's position, mm; 0 = not checked."
+    )
+    max_disagreement_pitches: float = Field(
+        2.0,
+        ge=0,
+        le=1000,
+        description="How far contour and busy part of the picture may be apart in one place, cell pitches, and an "
+        "eighth of it everywhere; 0 = not checked.",
+    )
+    margin_mm: float = Field(
+        0,
+        ge=-1000,
+        le=1000,
+        description="How far the polygon's edges are moved into the material, mm: the exterior shrinks, holes grow; "
+        "negative = out of it.",
+    )
+    start: Literal["traced", "lower-left", "lower-right", "upper-left", "upper-right"] | Point = Field(
+        "traced",
+        description="Vertex at which each ring begins: as traced, the outermost towards a corner, or the nearest to a "
+        "point [x, y] in mm; all in the machine frame.",
+    )
+    max_vertices: int = Field(4000, ge=3, le=1_000_000, description="Most vertices of all rings together.")
+    budget_mm: float = Field(
+        0,
+        ge=0,
+        le=100,
+        description="Most material that may be given up so that there are no more than max_vertices, mm; 0 = none.",
+    )
+    min_area_mm2: float = Field(100, ge=0, le=4e9, description="Smallest accepted area, mm², holes taken off.")
+    max_area_mm2: float = Field(4_000_000, gt=0, le=4e9, description="Largest accepted area, mm², holes taken off.")
+    polarity: Literal["auto", "bright", "dark"] = Field("auto", description="Walls against the table.")
+    binarize: Literal["flat", "otsu"] | Annotated[int, Field(ge=0, le=255)] = Field(
+        "flat", description="How walls are told from gaps: flat, otsu, or a fixed grey level 0 to 255."
+    )
+    edge: Literal["cut", "cells"] = Field("cut", description="cut: cells are cut open at the edge; cells: closed.")
+    pieces: Literal["one", "largest"] = Field(
+        "one", description="one: other blocks in view are refused; largest: smaller ones are not."
+    )
+    roi_px: tuple[Number, ...] = Field(
+        (), description="Nothing is seen outside of it: left, top, right, bottom, px; none = the whole picture."
+    )
+    roi_mm: tuple[Number, ...] = Field(
+        (), description="The same in the machine frame, at the block's top: left, bottom, right, top, mm."
+    )
+    exports: tuple[Literal["dxf", "svg", "geojson", "gcode"], ...] = Field(
+        (), description="Forms in which an accepted contour is kept in the archive: dxf, svg, geojson, gcode."
+    )
+    gcode: Gcode = Field(Gcode(), description="How G-code moves.")
+    parameters: dict[str, Number] = Field(
+        default_factory=dict, description="Sizes of the method; left out, they follow from the picture."
+    )
+
+    @model_validator(mode="after")
+    def _wall_tips_finds_its_own_threshold(self) -> Self:
+        if self.method == "wall-tips" and self.binarize != "flat":
+            raise ValueError(
+                f"binarize is {self.binarize!r}, but wall-tips finds its own threshold; use flat, or another method"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _one_region_of_interest(self) -> Self:
+        if self.roi_px and self.roi_mm:
+            raise ValueError("roi_px and roi_mm are both given, expected one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _areas_in_order(self) -> Self:
+        if self.min_area_mm2 >= self.max_area_mm2:
+            raise ValueError(
+                f"min_area_mm2 is {self.min_area_mm2:g}, expected less than max_area_mm2, {self.max_area_mm2:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _parameters_of_the_method(self) -> Self:
+        known = METHOD_PARAMETERS[self.method]
+        for name, value in self.parameters.items():
+            if name not in known:
+                there = ", ".join(known) or "none"
+                owner = next((f"; {name} is {other}'s" for other, its in METHOD_PARAMETERS.items() if name in its), "")
+                raise ValueError(f"parameters.{name} is none of {self.method}'s; there are: {there}{owner}")
+            low, high = known[name]
+            if not low <= value <= high:
+                raise ValueError(f"parameters.{name} is {value:g}, expected {low:g} to {high:g}")
+            if name.endswith("_px") and value != int(value):
+                raise ValueError(f"parameters.{name} is {value:g}, expected a whole number of pixels")
+        return self
+
+    @property
+    def needs_millimetres(self) -> str | None:
+        """The first of its keys that means nothing without a calibration."""
+        meant = {"roi_mm": self.roi_mm, "margin_mm": self.margin_mm, "start": isinstance(self.start, tuple)}
+        return next((key for key, value in meant.items() if value), None)
+
+    @property
+    def first_vertex(self) -> Start | None:
+        """Where rings begin; None = as traced."""
+        return None if self.start == "traced" else self.start
+
+    @field_validator("roi_px", "roi_mm")
+    @classmethod
+    def _box(cls, value: tuple[float, ...]) -> tuple[float, ...]:
+        if value and (len(value) != 4 or value[0] >= value[2] or value[1] >= value[3]):
+            raise ValueError(
+                f"is {list(value)}, expected four numbers, the third above the first and the fourth above the second"
+            )
+        return value

@@ -1,0 +1,82 @@
+"""What was seen in one picture, and what speaks against it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from contour.acceptance.error_budget import ErrorBudget
+from contour.acceptance.quality import Quality
+from contour.geometry.rings import Contour, Ring
+from service.measuring.calibration_guard import Rejection
+from service.reasons import Reason
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What was seen in one picture: the contour, where there is one, and the findings against it, lowest code first.
+
+    pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
+    has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
+    was refused (116).
+    """
+
+    method: str
+    polarity: str | None = None
+    pitch_px: float | None = None
+    pixels: Contour | None = None
+    other_blocks_px: tuple[Ring, ...] = ()
+    millimetres: Contour | None = None
+    area_px2: float | None = None
+    area_mm2: float | None = None
+    uncertainty_px: float | None = None
+    uncertainty: ErrorBudget | None = None
+    thickness_mm: float | None = None
+    aligned: bool = False
+    quality: Quality | None = None
+    findings: tuple[Rejection, ...] = ()
+    timings_ms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """Why it is refused, lowest code first; empty where it is not."""
+        return tuple(reason for reason, _ in self.findings)
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The findings as sentences, each with the measured value and the limit."""
+        return tuple(text for _, text in self.findings)
+
+    @property
+    def uncertainty_mm(self) -> float | None:
+        """95 % bound on the position of the polygon that is sent, all causes together; None where it is not known."""
+        return None if self.uncertainty is None else self.uncertainty.total_mm
+
+    @property
+    def size_mm(self) -> tuple[float, float] | None:
+        """Width and height of the contour's box in the machine frame."""
+        if self.millimetres is None:
+            return None
+        width, height = np.ptp(self.millimetres.exterior, axis=0).tolist()
+        return width, height
+
+    def summary(self) -> dict[str, Any]:
+        """What the journal keeps of it."""
+        contour = self.pixels or self.millimetres
+        return {
+            "method": self.method,
+            "polarity": self.polarity,
+            "pitch_px": _rounded(self.pitch_px),
+            "vertices": 0 if contour is None else contour.point_count,
+            "area_mm2": _rounded(self.area_mm2),
+            "uncertainty_mm": _rounded(self.uncertainty_mm),
+            "thickness_mm": self.thickness_mm,
+            "quality": None if self.quality is None else {k: _rounded(v) for k, v in asdict(self.quality).items()},
+            "timings_ms": {name: _rounded(value) for name, value in self.timings_ms.items()},
+        }
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(float(value), 3)

@@ -1,0 +1,56 @@
+"""What a request holds, checked: from where it comes, the job it names, its parameters, its body."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+from starlette.requests import Request
+
+from service.web.commands import RequestRefused
+from service.web.guard import plain_address
+
+M = TypeVar("M", bound=BaseModel)
+
+LARGEST_JOB = 0xFFFFFFFF
+
+
+def address_of(request: Request) -> str:
+    """Whose it is, for notes and bounds."""
+    return "unknown" if request.client is None else plain_address(request.client.host)
+
+
+def job_number(request: Request) -> int:
+    """The job of its path; raise RequestRefused."""
+    text = request.path_params["job"]
+    if not (text.isascii() and text.isdecimal() and len(text) <= 10 and 0 < int(text) <= LARGEST_JOB):
+        raise RequestRefused(404, "a job is a number from 1 on")
+    return int(text)
+
+
+def whole_number(request: Request, name: str, most: int, otherwise: int | None) -> int | None:
+    """A parameter from 1 to `most`, `otherwise` where it is left out; raise RequestRefused."""
+    text = request.query_params.get(name)
+    if text is None:
+        return otherwise
+    if not (text.isascii() and text.isdecimal() and len(text) <= 10 and 1 <= int(text) <= most):
+        raise RequestRefused(400, f"{name} is {text[:20]!r}, expected a whole number from 1 to {most}")
+    return int(text)
+
+
+def truth(request: Request, name: str) -> bool:
+    """A parameter that is true or false, false where it is left out; raise RequestRefused."""
+    text = request.query_params.get(name, "false")
+    if text not in ("true", "false"):
+        raise RequestRefused(400, f"{name} is {text[:20]!r}, expected true or false")
+    return text == "true"
+
+
+async def body(request: Request, model: type[M]) -> M:
+    """What it carries; raise RequestRefused where that is not of the model."""
+    try:
+        return model.model_validate_json(await request.body() or b"{}")
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(map(str, first["loc"])) or "the body"
+        raise RequestRefused(422, f"{where}: {first['msg']}") from error

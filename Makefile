@@ -35,7 +35,7 @@ bench-camera: install
 	$(BIN)/python tests/camera_guest/guest.py --timeout 6000 -- $(BIN)/python -m benchmarks.cameras --frames $(or $(FRAMES),3000)
 
 bench: install
-	$(BIN)/python -m benchmarks.bench
+	$(BIN)/python -m benchmarks.accuracy
 
 bench-link: install
 	$(BIN)/python -m benchmarks.link --write
@@ -45,10 +45,10 @@ bench-daemon: install
 
 # First paint and weight of the operator's page, and what a viewer costs a job.
 bench-page: install
-	$(BIN)/python -m benchmarks.page --write
+	$(BIN)/python -m benchmarks.daemon.page --write
 
 accuracy: install
-	$(BIN)/python -m benchmarks.bench --random 300 --first 998000 --write
+	$(BIN)/python -m benchmarks.accuracy --random 300 --first 998000 --write
 
 # Every figure and table of docs/reports/methods.md; a test redraws them.
 methods: install

@@ -119,8 +119,8 @@ def stale_rows() -> Iterator[tuple[str, str, str]]:
 def usb_rows() -> Iterator[tuple[str, str, str]]:
     """Frames of a USB webcam exposed before their trigger: ours, and believing uvcvideo's flag."""
     from drivers.camera.v4l2 import camera as driver
-    from tests.camera_guest.test_usb_webcam import Scene, camera_on, node_of_the_webcam
-    from tests.camera_guest.usb_webcam import Webcam
+    from tests.support.camera.usb_webcam import Webcam
+    from tests.support.camera.webcam_scene import Scene, camera_on, node_of_the_webcam
 
     subprocess.run(["/bin/busybox", "modprobe", "uvcvideo"], check=True)
     scene = Scene()

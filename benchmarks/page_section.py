@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reports" / "accuracy.md"
@@ -30,6 +31,13 @@ def kept_sections(page: Path = PAGE) -> list[str]:
     """All such sections of the page as they stand, marks included."""
     old = page.read_text(encoding="utf-8") if page.exists() else ""
     return [found.group(0) for found in _pattern(r"[\w-]+").finditer(old)]
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table; the first column is text, the others are numbers."""
+    lines = ["| " + " | ".join(head) + " |", "|" + "|".join(["---"] + ["--:"] * (len(head) - 1)) + "|"]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines)
 
 
 def _pattern(name: str) -> re.Pattern[str]:

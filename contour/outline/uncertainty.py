@@ -13,7 +13,8 @@ variance that is a sum of squares:
 - outside: a wall end beyond the outline is material that the outline leaves out, even if it is a single one.
 
 The bound is the length within which these normal laws together put 95 % of the outline. All terms are lengths in the
-picture: twice the pixels, twice the bound. The coefficients come from `python -m benchmarks.uncertainty --calibrate`.
+picture: twice the pixels, twice the bound. The coefficients come from
+`python -m benchmarks.accuracy.uncertainty --calibrate`.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
 class Coefficients:
     """Standard deviation that one pixel of each cause stands for.
 
-    Fitted by `python -m benchmarks.uncertainty --calibrate`, but for two things: the fit all but leaves `gap` out,
-    which is kept, for a longer gap must state more; and all are 5 % larger, for of one fresh set 89.5 % had held.
+    Fitted by `python -m benchmarks.accuracy.uncertainty --calibrate`, but for two things: the fit all but leaves `gap`
+    out, which is kept, for a longer gap must state more; and all are 5 % larger, for of one fresh set 89.5 % had held.
     """
 
     blur: float = 0.267

@@ -21,7 +21,7 @@ from pathlib import Path
 import pytest
 
 from drivers.trigger.pulses import SerialSignal
-from tests.camera_guest.test_daemon_on_v4l2 import Daemon
+from tests.support.camera.daemon import Daemon
 
 UART, CABLE = "/dev/ttyS3", "/dev/ttyS2"
 TIOCM_LOOP = 0x8000  # asm-generic/termios.h; Python's termios does not name it

@@ -17,7 +17,7 @@ from contour.tracing.tracing import trace
 from drivers.camera import CameraTimeout, CameraUnavailable
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.camera.v4l2.listing import list_cameras
-from tests.camera_guest.vivid import (
+from tests.support.camera.vivid import (
     BIND,
     CAPTURE,
     OUTPUT,
@@ -178,7 +178,7 @@ def test_a_camera_whose_driver_is_unbound_is_gone_and_comes_back_with_it():
         unbinding.start()
         with pytest.raises(CameraUnavailable):
             grab_on(camera, 50)
-        unbinding.join(10)
+        unbinding.join(60)
         with pytest.raises(CameraUnavailable, match="No such file"):
             camera.open()
         BIND.write_text("vivid.0")

@@ -24,8 +24,6 @@ from drivers.controller.modbus.client import ModbusTcpController
 from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.controller_cells import PATIENT_S, SERVERS, WAYS, Cell, cell
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
 LAYOUTS = {
     "default": MailboxLayout(),
     "little": MailboxLayout(word_order="little"),

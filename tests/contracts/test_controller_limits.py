@@ -20,12 +20,10 @@ from drivers.controller.modbus.client import (
     SerialLine,
 )
 from drivers.controller.simulated.controller import ServerLimits, SimulatedController
-from tests.interop.programs import libmodbus_tcp
 from tests.support.controller.controller_cells import PATIENT_S, WAYS
 from tests.support.controller.pty_line import PtyLine
 from tests.support.controller.serial_server import SerialServer
-
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
+from tests.support.interop.programs import libmodbus_tcp
 
 LAYOUT = MailboxLayout(payload_capacity=400)
 RING = np.array([[0, 0], [100, 0], [100, 50], [0, 50]], dtype=np.float64)

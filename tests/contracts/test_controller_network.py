@@ -15,8 +15,6 @@ from drivers.controller.modbus.client import ModbusTcpController
 from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
 from tests.support.controller.fault_proxy import Fate, FaultProxy
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
 TIMEOUT_S = 0.03
 SESSION = 9
 FAULTS = [fate for fate in Fate if fate is not Fate.PASS]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import os
 from collections.abc import AsyncIterator, Awaitable, Callable
 from pathlib import Path
 
@@ -34,15 +33,6 @@ from tests.support.controller.rtu_frames import frame
 from tests.support.controller.serial_server import SerialServer
 
 IMPATIENT_S = 0.3  # waited out; long enough for a busy machine to answer in
-
-
-@pytest.fixture(autouse=True)
-async def nothing_is_left() -> AsyncIterator[None]:
-    tasks, descriptors = asyncio.all_tasks(), len(os.listdir("/proc/self/fd"))
-    yield
-    await asyncio.sleep(0.01)
-    assert asyncio.all_tasks() - tasks - {asyncio.current_task()} == set()
-    assert len(os.listdir("/proc/self/fd")) <= descriptors
 
 
 @pytest.fixture

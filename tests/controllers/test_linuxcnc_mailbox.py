@@ -173,7 +173,7 @@ def client(memory):
     server = ModbusServer(("127.0.0.1", 0), mailbox)
     thread = threading.Thread(target=server.serve_forever, args=(0.05,))
     thread.start()
-    client = ModbusTcpClient("127.0.0.1", port=server.server_address[1], timeout=5)
+    client = ModbusTcpClient("127.0.0.1", port=server.server_address[1], timeout=60)
     assert client.connect()
     client.mailbox = mailbox
     yield client

@@ -92,7 +92,9 @@ def test_the_changelog_keeps_to_its_sections_and_to_short_entries() -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_every_test_that_a_page_names_exists(page: Path) -> None:
-    for name, function in re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", page.read_text(encoding="utf-8")):
+    for name, function in re.findall(
+        r"`((?:tests|benchmarks)/[\w/]+\.py)(?:::(\w+))?`", page.read_text(encoding="utf-8")
+    ):
         assert (ROOT / name).exists(), name
         assert not function or f"def {function}(" in (ROOT / name).read_text(encoding="utf-8"), f"{name}::{function}"
 

@@ -46,7 +46,7 @@ def controller() -> Iterator[SimulatedController]:
 
     thread = threading.Thread(target=run)
     thread.start()
-    assert listening.wait(10)
+    assert listening.wait(60)
     try:
         yield made
     finally:

@@ -10,6 +10,7 @@ from tests.rules.rule import (
     IN_EXECUTOR,
     IN_JOURNAL,
     IN_LINK,
+    IN_RESTART,
     IN_RESUMING,
     IN_TRANSFER,
     JOURNAL,
@@ -137,7 +138,7 @@ RULES = (
     Rule(
         "Always: a lost journal repeats no trigger: the service block says which was taken",
         f"{JOURNAL}::Journal.go_on_above",
-        f"{IN_EXECUTOR}::test_a_trigger_that_a_lost_journal_held_is_not_taken_again",
+        f"{IN_RESTART}::test_a_trigger_that_a_lost_journal_held_is_not_taken_again",
         "if later:",
         "if False:",
     ),

@@ -23,10 +23,9 @@ from textwrap import wrap
 import cv2
 import numpy as np
 
-from benchmarks.daemon import resident_megabytes
 from service.cli.daemon.run import FILE_THREADS
 from tests.support.processes.cell import SAMPLES, Cell
-from tests.support.processes.processes import until
+from tests.support.processes.processes import resident_megabytes, until
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "reports" / "reliability.md"

@@ -11,7 +11,7 @@ from contour.acceptance.error_budget import ErrorBudget, error_budget
 from contour.calibration.calibration import SimpleCalibration
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.geometry.rings import Contour
-from tests.contour.calibration.test_calibration import camera
+from tests.support.pictures.cameras import camera
 from tests.support.pictures.rings import SQUARE
 
 SIMPLE = SimpleCalibration(1600, 1200, 0.375, (100.0, 1100.0))

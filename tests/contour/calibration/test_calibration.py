@@ -9,37 +9,13 @@ from hypothesis import strategies as st
 from contour.calibration.calibration import Alignment, CameraCalibration, SimpleCalibration, scales
 from contour.errors import CalibrationError
 from contour.geometry.rings import signed_area
-
-LOOKING_DOWN = np.array([np.pi, 0.0, 0.0])
-"""Camera x along work x, camera y against work y, camera z down."""
+from tests.support.pictures.cameras import LOOKING_DOWN, camera
 
 SIMPLE = SimpleCalibration(1600, 1200, mm_per_pixel=0.375, origin_px=(100.0, 1100.0))
 
 angles = st.floats(-180, 180)
 metres = st.floats(-1000, 1000)
 alignments = st.one_of(st.none(), st.builds(Alignment, angles, st.tuples(metres, metres)))
-
-
-def camera(
-    tilt: tuple[float, float] = (0.0, 0.0),
-    roll: float = 0.0,
-    distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0),
-    alignment: Alignment | None = None,
-    distance: float = 1000.0,
-) -> CameraCalibration:
-    """A camera of 1600 x 1200 px that sees the work point (300, 200, 0) in its middle, tilted by degrees."""
-    down = cv2.Rodrigues(LOOKING_DOWN)[0]
-    turn = cv2.Rodrigues(np.radians([tilt[0], tilt[1], 0.0]))[0] @ cv2.Rodrigues(np.radians([0.0, 0.0, roll]))[0]
-    rotation = turn @ down
-    return CameraCalibration(
-        1600,
-        1200,
-        camera_matrix=np.array([[1800.0, 0, 799.5], [0, 1810.0, 599.5], [0, 0, 1]]),
-        distortion_coefficients=np.array(distortion),
-        rotation_vector=cv2.Rodrigues(rotation)[0].ravel(),
-        translation_mm=np.array([0.0, 0, distance]) - rotation @ np.array([300.0, 200.0, 0.0]),
-        alignment=alignment,
-    )
 
 
 cameras = st.builds(

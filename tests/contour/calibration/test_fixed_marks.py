@@ -19,7 +19,7 @@ def largest_px(picture: np.ndarray) -> float:
 
 
 def test_noisy_pictures_of_a_camera_at_rest_raise_no_alarm() -> None:
-    """A fifth of the tolerance; benchmarks/calibration.py does it 50 times."""
+    """A fifth of the tolerance; `python -m benchmarks.calibration` does it 50 times."""
     still = marked(CAMERA, seed=9).astype(np.float64)
     rng = np.random.default_rng(1)
     for _ in range(12):

@@ -7,30 +7,11 @@ from hypothesis import strategies as st
 from contour.errors import MarginImpossible, ParameterError
 from contour.geometry.offset import offset_contour
 from contour.geometry.rings import Contour, area, contour_defect, densified, signed_area
-from tests.support.pictures.rings import SQUARE, simple_rings, star
+from tests.support.pictures.rings import SQUARE, contours, solid, star
 
 BLOCK = SQUARE * [40, 30]
 OPENING = SQUARE[::-1] * 8 + [100, 100]
 margins = st.floats(0.01, 15.0)
-
-
-@st.composite
-def contours(draw: st.DrawFn) -> Contour:
-    ring = draw(simple_rings)
-    holes: tuple[np.ndarray, ...] = ()
-    if draw(st.booleans()):
-        solid = shapely.Polygon(ring)
-        middle = solid.representative_point()
-        room = solid.exterior.distance(middle)
-        radii = draw(st.lists(st.floats(0.2, 0.9), min_size=4, max_size=12))
-        holes = (star([radius * room for radius in radii])[::-1] + np.array([middle.x, middle.y]),)
-    contour = Contour(ring, holes)
-    assume(contour_defect(contour) is None)
-    return contour
-
-
-def solid(contour: Contour) -> shapely.Polygon:
-    return shapely.Polygon(contour.exterior, contour.holes)
 
 
 def moved_or_refused(contour: Contour, margin: float) -> Contour | None:
@@ -88,8 +69,8 @@ def test_outwards_it_covers_all_within_the_margin_and_no_more_than_a_mitre_beyon
 @given(contours(), margins, st.floats(0.05, 0.95))
 def test_a_larger_margin_leaves_less(contour: Contour, margin: float, share: float) -> None:
     smaller, larger = moved_or_refused(contour, margin * share), moved_or_refused(contour, margin)
-    if smaller is not None and larger is not None:
-        assert area(larger) < area(smaller) < area(contour)
+    assume(smaller is not None and larger is not None)
+    assert area(larger) < area(smaller) < area(contour)
 
 
 @given(st.lists(st.floats(60.0, 70.0), min_size=5, max_size=12), st.floats(0.1, 5.0))

@@ -68,8 +68,10 @@ def test_the_input_is_left_alone() -> None:
 
 
 def test_a_contour_far_outside_and_a_tiny_picture_are_no_special_case() -> None:
-    draw_overlay(np.zeros((3, 3), np.uint8), Contour(SQUARE * 1e9 - 1e9), caption=["accepted", "text"])
-    draw_overlay(np.zeros((1, 1, 3), np.uint8), OUTLINE, caption=["accepted"])
+    far = draw_overlay(np.zeros((3, 3), np.uint8), Contour(SQUARE * 1e9 - 1e9), caption=["accepted", "text"])
+    tiny = draw_overlay(np.zeros((1, 1, 3), np.uint8), OUTLINE, caption=["accepted"])
+    assert (far.shape, tiny.shape) == ((3, 3, 3), (1, 1, 3))
+    assert (far.dtype, tiny.dtype) == (np.uint8, np.uint8)
 
 
 def test_thousands_of_vertices_are_drawn_as_a_line_without_marks() -> None:

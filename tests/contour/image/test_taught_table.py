@@ -14,32 +14,10 @@ from contour.image.taught_table import TableLimits, TaughtTable, look_at, teach
 from contour.synthetic import area_coverage
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
+from tests.support.pictures.grid_tables import grid_table, with_block
 from tests.support.pictures.small_scenes import block
 
 LIMITS = TableLimits()
-
-
-def grid_table(seed: int = 0, light: float = 1.0, shift: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
-    """A mat with a bright printed grid of 27 px all over and some dirt, at a turn, under noise."""
-    rng = np.random.default_rng(11)
-    y, x = np.mgrid[:480, :640].astype(np.float32)
-    x, y = x - shift[0], y - shift[1]
-    u, v = x * 0.96 - y * 0.28, x * 0.28 + y * 0.96
-    near = np.minimum(np.abs(u - np.rint(u / 27) * 27), np.abs(v - np.rint(v / 27) * 27))
-    table = 55 + 90 * np.clip(2.0 - near, 0, 1)
-    for at, size, level in zip(
-        rng.uniform(0, 640, (40, 2)), rng.uniform(3, 9, 40), rng.uniform(-25, 25, 40), strict=True
-    ):
-        table += level * np.exp(-((x - at[0]) ** 2 + (y - at[1]) ** 2) / (2 * size**2))
-    noise = np.random.default_rng(seed).normal(0, 1.5, table.shape)
-    return np.clip(np.rint(light * table + noise), 0, 255).astype(np.uint8)
-
-
-def with_block(table: np.ndarray) -> np.ndarray:
-    """The table with the rendered block on it."""
-    rendered = block("rectangle")
-    cover = area_coverage(rendered.truth_px.rings, 640, 480)
-    return np.rint(table * (1 - cover) + rendered.picture * cover).astype(np.uint8)
 
 
 @pytest.fixture(scope="module")

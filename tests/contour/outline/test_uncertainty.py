@@ -194,7 +194,7 @@ def test_dark_walls_leave_it_less_sure() -> None:
 
 @pytest.mark.parametrize("kind", ["easy", "shop", "dim", "dark"])
 def test_the_true_outline_lies_within_it(kind: str) -> None:
-    """Of blocks rendered, through pictures; how well in general is measured by `python -m benchmarks.uncertainty`."""
+    """Of blocks rendered, through pictures; how well in general, `python -m benchmarks.accuracy.uncertainty` tells."""
     scene = block("rectangle", kind)
     found = wall_tips(scene.picture, TraceSettings())
     assert found.uncertainty_px is not None

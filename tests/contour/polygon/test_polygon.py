@@ -8,7 +8,7 @@ from contour.calibration.calibration import Alignment, SimpleCalibration
 from contour.errors import CalibrationError, ParameterError
 from contour.geometry.rings import Contour, contour_defect, densified, hausdorff, signed_area
 from contour.polygon.polygon import PIXEL_TOLERANCE, Finish, Polygon, cutting_polygon
-from tests.contour.calibration.test_calibration import camera
+from tests.support.pictures.cameras import camera
 from tests.support.pictures.rings import SQUARE, blobs, simple_rings
 
 SIMPLE = SimpleCalibration(1600, 1200, 0.375, (100.0, 1100.0), alignment=Alignment(25.0, (500.0, -300.0)))

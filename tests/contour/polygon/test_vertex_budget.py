@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from contour.errors import ParameterError
 from contour.geometry.rings import Contour, contour_defect, densified, hausdorff
 from contour.polygon.vertex_budget import lies_within, within_budget
-from tests.contour.geometry.test_offset import contours, solid
-from tests.support.pictures.rings import SQUARE
+from tests.support.pictures.rings import SQUARE, contours, solid
 
 BLOCK = densified(SQUARE * [40, 30], 5.0)
 

@@ -1,5 +1,7 @@
 """The shipped sample frames are what their scenes render to, and their calibration file is their camera's."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -7,12 +9,12 @@ import numpy as np
 import pytest
 import yaml
 
-from benchmarks.make_samples import calibration_of, main
 from contour.synthetic import render
-from tests.support.scenes.sample_scenes import CAMERA, THICKNESS_MM, sample_scenes
+from tests.support.scenes.sample_scenes import CAMERA, THICKNESS_MM, calibration_of, sample_scenes
 from tests.support.scenes.trials import calibration_for
 
-SAMPLES = Path(__file__).resolve().parents[3] / "service" / "samples"
+ROOT = Path(__file__).resolve().parents[3]
+SAMPLES = ROOT / "service" / "samples"
 
 
 @pytest.mark.parametrize("scene", sample_scenes()[:2], ids=lambda scene: scene.name)
@@ -44,9 +46,10 @@ def test_the_calibration_takes_the_truth_in_pixels_back_to_the_truth_in_millimet
         assert np.allclose(calibration_for(CAMERA).to_work(seen, THICKNESS_MM), scene.outline.exterior, atol=1e-3)
 
 
-def test_the_samples_can_be_written_again_elsewhere(tmp_path, capsys):
-    main(tmp_path)
+def test_the_samples_can_be_written_again_elsewhere(tmp_path):
+    command = [sys.executable, "-m", "benchmarks.drawings.make_samples", tmp_path]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert sorted(file.name for file in tmp_path.iterdir()) == sorted(
         file.name for file in SAMPLES.iterdir() if file.suffix in (".jpg", ".yaml")
     )
-    assert "1-rectangle.jpg" in capsys.readouterr().out
+    assert "1-rectangle.jpg" in done.stdout

@@ -167,7 +167,7 @@ def test_unplugging_wakes_a_reader_that_waits(wire, port):
     reader = threading.Thread(target=read)
     reader.start()
     wire.unplug()
-    reader.join(10.0)
+    reader.join(30.0)
     assert not reader.is_alive()
     assert "was lost" in found[0]
 
@@ -184,7 +184,7 @@ def test_closing_wakes_a_reader_that_waits(port):
     reader = threading.Thread(target=read)
     reader.start()
     port.close()
-    reader.join(10.0)
+    reader.join(30.0)
     assert not reader.is_alive()
     assert "closed" in found[0] or "not open" in found[0]
 

@@ -19,10 +19,10 @@ from service.commissioning.check_result import CheckResult
 from service.commissioning.probing.probe import Probe
 from service.commissioning.probing.probed import LOOK_PERIOD_S
 from service.daemon.restart_watch import RestartWatch
-from tests.interop.programs import libmodbus_tcp
-from tests.interop.shifted_program import program
 from tests.support.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 from tests.support.controller.pty_line import PtyLine
+from tests.support.interop.programs import libmodbus_tcp
+from tests.support.interop.shifted_program import program
 
 FASTER = 8
 
@@ -359,7 +359,7 @@ async def test_a_session_that_a_restart_does_not_change_is_told(changes: bool) -
     async with SimulatedController(scan_s=0.005, session_source=lambda: next(sessions)) as simulated:
         controller = ModbusTcpController("127.0.0.1", simulated.port, timeout_s=5)
         watch = RestartWatch(controller)
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(60):
             while not simulated.registers(13, 1)[0]:
                 await asyncio.sleep(0.01)
             await asyncio.sleep(0.3)

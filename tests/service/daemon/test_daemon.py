@@ -70,7 +70,7 @@ class Built:
         self.daemon = Daemon(self.parts)
 
     async def until(self, condition: Callable[[], object]) -> None:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while not condition():
                 await asyncio.sleep(0.005)
 
@@ -80,7 +80,7 @@ class Built:
     async def stop(self, running: asyncio.Future[None]) -> list[Job]:
         """Stop it; the jobs of its journal then."""
         self.daemon.stop()
-        await asyncio.wait_for(running, 15)
+        await asyncio.wait_for(running, 60)
         Lock(self.folder / "lock").release()  # it let go
         journal = Journal(self.folder / "journal.sqlite")
         jobs = journal._jobs("ORDER BY job_id")
@@ -143,7 +143,7 @@ async def test_without_a_controller_it_runs_until_it_is_stopped(tmp_path: Path) 
         await built.ready()
         for _ in range(2):
             ticket = await built.parts.executor.submit(TriggerStamp("interval"))
-            assert (await asyncio.wait_for(ticket.settled, 5)).outcome is Outcome.WRITTEN
+            assert (await asyncio.wait_for(ticket.settled, 60)).outcome is Outcome.WRITTEN
         assert not task.done()
         assert len(await built.stop(task)) == 2
 

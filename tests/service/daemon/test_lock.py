@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from service.config.config import Config
-from service.daemon.lock import Lock, LockError, Locks, NameLock, journal_lock, network_names, serial_name
+from service.daemon.lock import Lock, LockError, Locks, NameLock, journal_lock, name_is_held, network_names, serial_name
 from service.wiring import controller_names
 
 
@@ -45,9 +45,14 @@ def test_a_killed_process_holds_no_lock() -> None:
     NameLock("test/killed").release()
 
 
-def test_two_paths_to_one_journal_are_one_journal(tmp_path: Path) -> None:
+@pytest.mark.parametrize("linked", ["folder", "file"])
+def test_two_paths_to_one_journal_are_one_journal(tmp_path: Path, linked: str) -> None:
     (tmp_path / "a").mkdir()
-    (tmp_path / "b").symlink_to("a")
+    if linked == "folder":
+        (tmp_path / "b").symlink_to("a")
+    else:  # the lock lies beside the file, so that only its true path leads to one lock
+        (tmp_path / "b").mkdir()
+        (tmp_path / "b" / "journal.sqlite").symlink_to(tmp_path / "a" / "journal.sqlite")
     held = journal_lock(tmp_path / "a" / "journal.sqlite")
     with pytest.raises(LockError, match=r"runs on this journal, expected one.*its own journal\.path"):
         journal_lock(tmp_path / "b" / "journal.sqlite")
@@ -82,13 +87,15 @@ def test_to_observe_needs_no_lock_but_that_of_a_serial_port() -> None:
     assert controller_names(config(kind="modbus-rtu", port="/dev/null", mode="observe")) == ["/dev/null"]
 
 
-def test_all_locks_are_let_go() -> None:
-    locks = Locks([NameLock("test/one")])
-    locks.add(NameLock("test/two"))
+def test_all_locks_are_let_go_at_once_and_once_more_does_no_harm() -> None:
+    names = ["test/one", "test/two"]
+    held = [NameLock(name) for name in names]  # kept here: what nobody refers to is let go by itself
+    locks = Locks(held[:1])
+    locks.add(held[1])
+    assert [name_is_held(name) for name in names] == [True, True]
     locks.release()
+    assert [name_is_held(name) for name in names] == [False, False]
     locks.release()
-    NameLock("test/one").release()
-    NameLock("test/two").release()
 
 
 def test_a_lock_whose_file_was_taken_away_while_one_waited_to_hold_it_is_not_held_twice(

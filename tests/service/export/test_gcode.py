@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -80,16 +81,21 @@ def test_the_material_is_on_the_side_that_the_direction_says(direction):
 
 def test_fast_moves_are_only_at_the_safe_height_or_straight_up():
     """A rapid move through the block breaks the tool."""
-    before = None
-    for kind, here in moves(to_gcode(DOCUMENT, CUT)):
-        if kind == "G0" and before is not None and "X" in before:
-            is_up = (here["X"], here["Y"]) == (before["X"], before["Y"]) and here["Z"] >= before["Z"]
-            assert is_up or (here["Z"] == before["Z"] == 40.0)
-        before = here
+    fast = [
+        (before, here)
+        for (_, before), (kind, here) in pairwise(moves(to_gcode(DOCUMENT, CUT)))
+        if kind == "G0" and "X" in before
+    ]
+    assert len(fast) >= 3, "up after each ring, and over to the next"
+    for before, here in fast:
+        is_up = (here["X"], here["Y"]) == (before["X"], before["Y"]) and here["Z"] >= before["Z"]
+        assert is_up or (here["Z"] == before["Z"] == 40.0)
 
 
 def test_the_lead_in_runs_through_no_material_and_meets_the_ring():
-    for ring in cut_rings(to_gcode(DOCUMENT, CUT)):
+    rings = cut_rings(to_gcode(DOCUMENT, CUT))
+    assert len(rings) == 2
+    for ring in rings:
         lead = shapely.LineString(ring[:2])
         assert lead.length == pytest.approx(5.0, abs=1e-3)
         assert shapely.intersection(lead, MATERIAL).length < 1e-3

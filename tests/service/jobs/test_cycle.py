@@ -329,7 +329,7 @@ async def test_a_journal_that_fails_during_a_job_holds_it_up_is_told_once_and_lo
         assert built.controller.count("write_page") == 0, "nothing is sent that is not durable"
         assert built.health.first().reason is Reason.INTERNAL_ERROR
         built.journal._db.execute("PRAGMA query_only = OFF")
-        assert (await asyncio.wait_for(task, 10)).outcome is Outcome.ACCEPTED
+        assert (await asyncio.wait_for(task, 60)).outcome is Outcome.ACCEPTED
     assert sum("journal" in record.message for record in caplog.records if record.name == "combtrace.cycle") == 1
 
 
@@ -397,7 +397,7 @@ async def test_a_withdrawal_that_drags_on_is_an_error_with_its_reason(tmp_path: 
             await asyncio.sleep(0.01)
         assert "cannot be taken back" in (built.machine.reason or "")
         built.controller.answers = [Answer.WITHDRAWN]
-        await asyncio.wait_for(task, 10)
+        await asyncio.wait_for(task, 60)
         assert built.machine.state is State.READY
 
 
@@ -426,5 +426,5 @@ async def test_a_withdrawal_after_a_defect_that_dragged_on_leaves_no_fault_behin
         while built.machine.state is not State.ERROR:
             await asyncio.sleep(0.01)
         built.controller.answers = [Answer.WITHDRAWN]
-        assert (await asyncio.wait_for(task, 10)).reason is Reason.INTERNAL_ERROR
+        assert (await asyncio.wait_for(task, 60)).reason is Reason.INTERNAL_ERROR
         assert built.machine.state is State.READY

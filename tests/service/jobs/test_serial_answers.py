@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sqlite3
 import threading
 import time
 from collections.abc import AsyncIterator
@@ -22,6 +21,7 @@ from service.reasons import Outcome, Reason
 from service.records.journal import Job, Journal, TriggerStamp
 from service.records.journal_recovery import open_journal
 from service.state import StateMachine
+from tests.support.service.journal_files import changed
 from tests.support.service.waiting import until
 
 LINE = "/dev/ttyPanel"
@@ -221,7 +221,7 @@ async def test_the_end_never_comes_before_the_acknowledgement(tmp_path: Path) ->
 
     def slow(text: str) -> None:
         if text.startswith("ACK"):
-            assert over.wait(5)
+            assert over.wait(60)
             time.sleep(0.1)
         write(text)
 
@@ -237,10 +237,7 @@ async def test_jobs_of_a_damaged_journal_are_owed_to_their_line_still(tmp_path: 
     journal = Journal(path)
     journal.take(TriggerStamp("serial", line=LINE))
     journal.close()
-    database = sqlite3.connect(path)
-    database.execute("UPDATE meta SET value = 'none' WHERE key = 'owner'")
-    database.commit()
-    database.close()
+    changed(path, "UPDATE meta SET value = 'none' WHERE key = 'owner'")
     open_journal(path, tmp_path / "archive", ran_before=True).close()
     panel = Panel()
     async with served(tmp_path, panel):

@@ -76,10 +76,14 @@ def test_no_bytes_whatever_raise(line):
     assert isinstance(parse_line(line), TriggerRequest | StatusRequest | PingRequest | Malformed | None)
 
 
-@given(st.binary(max_size=81))
-def test_only_the_word_trig_begins_a_job(line):
-    if isinstance(parse_line(line), TriggerRequest):
-        assert line.split()[0].upper() == b"TRIG"
+WORDS = st.lists(st.sampled_from([b"TRIG", b"trig", b"TRIGG", b"STAT", b"recipe=7", b"\0", b"x"]), max_size=3)
+
+
+@given(WORDS.map(b" ".join))
+def test_a_job_is_begun_by_the_word_trig_alone_or_with_one_recipe(line):
+    word, *rest = line.split() or [b""]
+    begins = word.upper() == b"TRIG" and rest in ([], [b"recipe=7"])
+    assert isinstance(parse_line(line), TriggerRequest) == begins
 
 
 @given(st.integers(1, 65_535))

@@ -16,7 +16,7 @@ from service.jobs.triggers import interval_trigger
 from service.reasons import Outcome, Reason
 from service.records.journal import Journal, TriggerStamp
 from service.state import StateMachine
-from tests.service.jobs.test_executor import HeldRunner
+from tests.support.service.executor_rig import HeldRunner
 from tests.support.service.waiting import until
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from typing import Any
 
@@ -14,22 +12,9 @@ import pytest
 
 from drivers.controller.mailbox.mailbox import LinkBlock
 from service.link.link import Link, LinkSettings, LinkUnsteady, steady
+from tests.support.service.linked import QUICK, linked
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.waiting import until
-
-QUICK = LinkSettings(poll_period_s=0.01, heartbeat_timeout_s=0.15)
-
-
-@asynccontextmanager
-async def linked(controller: ScriptedController, settings: LinkSettings = QUICK) -> AsyncIterator[Link]:
-    link = Link(controller, settings)
-    task = asyncio.ensure_future(link.run())
-    try:
-        yield link
-    finally:
-        task.cancel()
-        with suppress(asyncio.CancelledError):
-            await task
 
 
 class Reading:

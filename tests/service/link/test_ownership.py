@@ -17,7 +17,7 @@ from service.link.link import Link
 from service.link.ownership import ForeignOwner, Ownership
 from service.link.transfer import Settlement, TransferSettings, Validity
 from service.reasons import Outcome, Reason
-from tests.service.link.test_link import QUICK, linked
+from tests.support.service.linked import QUICK, linked
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.transferring import JOB, Run, transferring
 from tests.support.service.transferring import QUICK as STEPS

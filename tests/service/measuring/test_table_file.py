@@ -12,7 +12,7 @@ import pytest
 from contour.image.taught_table import TaughtTable
 from service.cli.main import main
 from service.measuring.table_file import TableFileError, TableRecord, load_table, save_table
-from tests.contour.image.test_taught_table import grid_table, with_block
+from tests.support.pictures.grid_tables import grid_table, with_block
 
 
 @pytest.fixture

@@ -180,7 +180,7 @@ def test_a_disk_that_hangs_holds_one_draft_and_no_other_job(tmp_path: Path, monk
     goes_on, fsync = threading.Event(), os.fsync
 
     def hanging(handle: int) -> None:
-        goes_on.wait(10)
+        goes_on.wait(60)
         fsync(handle)
 
     monkeypatch.setattr(os, "fsync", hanging)
@@ -224,7 +224,7 @@ def on_disk(path: Path) -> int:
 
 
 def until(condition: Callable[[], object]) -> None:
-    give_up_at = time.monotonic() + 10
+    give_up_at = time.monotonic() + 60
     while not condition():
         assert time.monotonic() < give_up_at
         time.sleep(0.01)

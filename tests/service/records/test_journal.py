@@ -14,6 +14,7 @@ from drivers.controller.mailbox.mailbox import Page
 from service.reasons import Outcome, Reason
 from service.records.journal import Journal, JournalConflict, JournalError, JournalFull, Terms, TriggerStamp
 from service.records.journal_reader import reading
+from tests.support.service.journal_files import changed
 
 PAGE = Page(tuple(range(31)), (1, 2, 3, 4, 0xFFFF, 0))
 
@@ -129,9 +130,7 @@ def test_a_file_that_is_no_journal_is_an_error_and_stays_as_it_is(tmp_path: Path
 def test_a_journal_of_another_version_is_refused_by_its_number(tmp_path: Path) -> None:
     path = tmp_path / "journal.sqlite"
     Journal(path).close()
-    database = sqlite3.connect(path)
-    database.execute("PRAGMA user_version = 99")
-    database.close()
+    changed(path, "PRAGMA user_version = 99")
     with pytest.raises(JournalError, match="schema version 99, expected 1 to 4"):
         Journal(path)
 
@@ -281,9 +280,7 @@ def test_notes_of_who_asked_for_what_last_and_only_the_newest_are_kept(
 
 def test_a_migration_that_fails_leaves_the_old_journal_as_it_was(tmp_path: Path) -> None:
     path = version_1(tmp_path / "journal.sqlite")
-    database = sqlite3.connect(path)
-    database.execute("CREATE TABLE recipe_settings (somebody TEXT)")
-    database.close()
+    changed(path, "CREATE TABLE recipe_settings (somebody TEXT)")
     with pytest.raises(JournalError, match="recipe_settings already exists"):
         Journal(path)
     database = sqlite3.connect(path)

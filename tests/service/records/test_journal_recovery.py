@@ -17,9 +17,16 @@ from service.reasons import Outcome
 from service.records.journal import Journal, JournalDamaged, JournalError, TriggerStamp
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 from service.records.journal_recovery import _move_aside, highest_archived, highest_job, open_journal, set_aside
+from tests.support.service.journal_files import changed
 
 PAGE = Page((1, 0, 7, 1, 1, 1, 4, *[0] * 24), (1, 2, 3, 4))
 UNIX_S = 1_795_000_000
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """Where the journal is to lie."""
+    return tmp_path / "journal.sqlite"
 
 
 def filled(path: Path, jobs: int) -> None:
@@ -36,8 +43,7 @@ def reopened(path: Path, *, ran_before: bool = True) -> Journal:
     return open_journal(path, path.parent / "archive", ran_before=ran_before, now=lambda: UNIX_S)
 
 
-def test_a_sound_journal_is_opened_as_it_is(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_a_sound_journal_is_opened_as_it_is(path: Path, caplog: pytest.LogCaptureFixture) -> None:
     filled(path, 3)
     journal = reopened(path)
     assert journal.take(TriggerStamp("serial")).job_id == 5
@@ -61,8 +67,7 @@ def test_a_lost_journal_begins_at_the_unix_time_and_says_so(tmp_path: Path, capl
     assert "the journal is lost" in record.message
 
 
-def test_an_emptied_file_is_a_lost_journal(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_an_emptied_file_is_a_lost_journal(path: Path) -> None:
     path.touch()
     journal = reopened(path)
     assert journal.take(TriggerStamp("serial")).job_id == UNIX_S
@@ -75,12 +80,9 @@ def test_a_lost_journal_goes_on_above_the_controllers_last_job(tmp_path: Path) -
     journal.close()
 
 
-def test_what_was_moved_aside_counts_also_where_the_controller_knows_less(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_what_was_moved_aside_counts_also_where_the_controller_knows_less(path: Path) -> None:
     filled(path, 60)
-    content = bytearray(path.read_bytes())
-    content[:100] = bytes(100)
-    path.write_bytes(content)
+    path.write_bytes(bytes(100) + path.read_bytes()[100:])
     journal = reopened(path)
     assert journal.take(TriggerStamp("serial"), above=5).job_id == 62
     journal.close()
@@ -101,9 +103,8 @@ def test_a_lost_journal_goes_on_above_the_archive(tmp_path: Path) -> None:
     ["header gone", "middle gone", "cut off", "all but the last page gone"],
 )
 def test_a_damaged_journal_is_moved_aside_whole_and_numbers_go_on_above_it(
-    tmp_path: Path, damage: str, caplog: pytest.LogCaptureFixture
+    path: Path, damage: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    path = tmp_path / "journal.sqlite"
     filled(path, 60)
     content = bytearray(path.read_bytes())
     if damage == "header gone":
@@ -132,9 +133,8 @@ class Killed(BaseException):
 
 @pytest.mark.parametrize("steps", range(4))
 def test_killed_while_it_is_moved_aside_nothing_is_lost_and_no_number_comes_twice(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, steps: int
+    path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, steps: int
 ) -> None:
-    path = tmp_path / "journal.sqlite"
     filled(path, 60)
     content, wal = bytes(100) + path.read_bytes()[100:], b"\xa5" * 100
     path.write_bytes(content)
@@ -166,8 +166,7 @@ def test_killed_while_it_is_moved_aside_nothing_is_lost_and_no_number_comes_twic
         assert kept.with_name(kept.name + "-wal").read_bytes() == wal
 
 
-def test_what_had_not_ended_is_brought_over_where_it_can_be_read(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_what_had_not_ended_is_brought_over_where_it_can_be_read(path: Path) -> None:
     filled(path, 60)
     content = bytearray(path.read_bytes())
     # An index that says nothing true: SQLite's check finds it, its rows are still there.
@@ -194,14 +193,6 @@ def test_the_last_trigger_is_not_taken_again_after_a_journal_was_brought_over(tm
     journal.close()
 
 
-def changed(path: Path, *statements: str) -> None:
-    database = sqlite3.connect(path)
-    for statement in statements:
-        database.execute(statement)
-    database.commit()
-    database.close()
-
-
 @pytest.mark.parametrize(
     "damage",
     [
@@ -219,9 +210,8 @@ def changed(path: Path, *statements: str) -> None:
     ],
 )
 def test_content_that_no_journal_can_hold_is_damage_though_the_database_is_sound(
-    tmp_path: Path, damage: str, caplog: pytest.LogCaptureFixture
+    path: Path, damage: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    path = tmp_path / "journal.sqlite"
     filled(path, 3)
     changed(path, damage)
     journal = reopened(path)
@@ -233,8 +223,7 @@ def test_content_that_no_journal_can_hold_is_damage_though_the_database_is_sound
     assert any(record.levelno == logging.CRITICAL and "is damaged (" in record.message for record in caplog.records)
 
 
-def test_a_detail_that_is_no_text_any_more_is_no_reason_to_begin_anew(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_a_detail_that_is_no_text_any_more_is_no_reason_to_begin_anew(path: Path) -> None:
     filled(path, 3)
     changed(path, "UPDATE jobs SET detail = CAST(x'e4' AS TEXT) WHERE job_id = 3")
     journal = reopened(path)
@@ -245,8 +234,7 @@ def test_a_detail_that_is_no_text_any_more_is_no_reason_to_begin_anew(tmp_path: 
     assert set_aside(path) == []
 
 
-def test_a_damaged_row_of_long_ago_is_left_out_of_lists_and_told(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_a_damaged_row_of_long_ago_is_left_out_of_lists_and_told(path: Path) -> None:
     filled(path, 3)
     changed(path, "UPDATE jobs SET reason = 999 WHERE job_id = 2")
     reopened(path).close()
@@ -259,8 +247,7 @@ def test_a_damaged_row_of_long_ago_is_left_out_of_lists_and_told(tmp_path: Path)
 
 
 @pytest.mark.parametrize("table", ["customers", "jobs"])
-def test_another_programs_database_is_refused_and_stays_as_it_is(tmp_path: Path, table: str) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_another_programs_database_is_refused_and_stays_as_it_is(path: Path, table: str) -> None:
     changed(path, f"CREATE TABLE {table} (name)", f"INSERT INTO {table} VALUES ('kept')")
     before = path.read_bytes()
     with pytest.raises(JournalError, match=rf"a database of another program \(tables {table}\)"):
@@ -279,28 +266,23 @@ def test_a_pipe_or_folder_is_no_journal_and_holds_nobody_up(tmp_path: Path) -> N
             pass
 
 
-def test_a_damaged_journal_without_any_number_begins_at_the_unix_time(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_a_damaged_journal_without_any_number_begins_at_the_unix_time(path: Path) -> None:
     path.write_bytes(b"\xa5" * 9000)
     journal = reopened(path)
     assert journal.take(TriggerStamp("serial")).job_id == UNIX_S
     journal.close()
 
 
-def test_a_strange_file_where_the_service_never_ran_is_refused_and_stays(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_a_strange_file_where_the_service_never_ran_is_refused_and_stays(path: Path) -> None:
     path.write_bytes(b"somebody's notes" * 100)
     with pytest.raises(JournalDamaged):
         reopened(path, ran_before=False)
     assert path.read_bytes() == b"somebody's notes" * 100
 
 
-def test_a_second_loss_remembers_what_was_moved_aside_at_the_first(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_a_second_loss_remembers_what_was_moved_aside_at_the_first(path: Path) -> None:
     filled(path, 40)
-    content = bytearray(path.read_bytes())
-    content[:100] = bytes(100)
-    path.write_bytes(content)
+    path.write_bytes(bytes(100) + path.read_bytes()[100:])
     reopened(path).close()
     for part in ("", "-wal", "-shm"):
         path.with_name(path.name + part).unlink(missing_ok=True)
@@ -309,8 +291,7 @@ def test_a_second_loss_remembers_what_was_moved_aside_at_the_first(tmp_path: Pat
     journal.close()
 
 
-def test_two_journals_moved_aside_in_one_second_of_a_clock_that_went_back_are_both_kept(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_two_journals_moved_aside_in_one_second_of_a_clock_that_went_back_are_both_kept(path: Path) -> None:
     contents = []
     for jobs in (3, 40):
         path.unlink(missing_ok=True)
@@ -321,8 +302,7 @@ def test_two_journals_moved_aside_in_one_second_of_a_clock_that_went_back_are_bo
     assert sorted(kept.read_bytes() for kept in set_aside(path)) == sorted(contents)
 
 
-def test_numbers_that_stand_in_the_write_ahead_log_alone_are_found(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_numbers_that_stand_in_the_write_ahead_log_alone_are_found(tmp_path: Path, path: Path) -> None:
     journal = Journal(path)
     for _ in range(5):
         journal.take(TriggerStamp("serial"))
@@ -349,8 +329,7 @@ def test_after_the_last_number_that_a_register_holds_no_job_is_taken(tmp_path: P
     journal.close()
 
 
-def test_a_locked_or_unreadable_file_is_no_damaged_one(tmp_path: Path) -> None:
-    path = tmp_path / "journal.sqlite"
+def test_a_locked_or_unreadable_file_is_no_damaged_one(path: Path) -> None:
     filled(path, 1)
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("PRAGMA locking_mode = EXCLUSIVE")

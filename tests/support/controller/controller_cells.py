@@ -15,9 +15,9 @@ from drivers.controller.modbus.client import (
     SerialLine,
 )
 from drivers.controller.simulated.controller import SimulatedController
-from tests.interop.programs import libmodbus_rtu, libmodbus_tcp
 from tests.support.controller.pty_line import PtyLine
 from tests.support.controller.serial_server import SerialServer
+from tests.support.interop.programs import libmodbus_rtu, libmodbus_tcp
 
 PATIENT_S = 60.0  # longer than any test: what fails then did not fail by its time-out
 WAYS = ("modbus-tcp", "modbus-rtu", "modbus-rtu-over-tcp")

@@ -53,13 +53,13 @@ class Client:
         await self.until_answered(transfer)
 
     async def until_answered(self, transfer: int) -> None:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while (await self.read(6, 1))[0] != transfer:
                 await asyncio.sleep(0.001)
 
     async def until_started(self, no_longer: int = 0) -> None:
         """Return when there is a session, other than `no_longer`."""
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while (await self.read(13, 1))[0] in (0, no_longer):
                 await asyncio.sleep(0.001)
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import shapely
+from hypothesis import assume
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from contour.geometry.rings import Ring, densified, largest_loop
+from contour.geometry.rings import Contour, Ring, contour_defect, densified, largest_loop
 
 SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
 """Counter-clockwise for y up, area 100."""
@@ -45,3 +47,22 @@ stars = st.builds(
 blobs = st.builds(random_blob, st.integers(0, 10_000))
 dense_stars = stars.map(lambda ring: densified(ring, 3.0))
 simple_rings = st.one_of(stars, blobs, dense_stars)
+
+
+@st.composite
+def contours(draw: st.DrawFn) -> Contour:
+    ring = draw(simple_rings)
+    holes: tuple[np.ndarray, ...] = ()
+    if draw(st.booleans()):
+        solid = shapely.Polygon(ring)
+        middle = solid.representative_point()
+        room = solid.exterior.distance(middle)
+        radii = draw(st.lists(st.floats(0.2, 0.9), min_size=4, max_size=12))
+        holes = (star([radius * room for radius in radii])[::-1] + np.array([middle.x, middle.y]),)
+    contour = Contour(ring, holes)
+    assume(contour_defect(contour) is None)
+    return contour
+
+
+def solid(contour: Contour) -> shapely.Polygon:
+    return shapely.Polygon(contour.exterior, contour.holes)

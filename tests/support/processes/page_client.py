@@ -34,7 +34,7 @@ class Client:
 
     def ask(self, method: str, path: str, *, body: bytes | None = None, **headers: str) -> Reply:
         """Header names with _ for -; each request by a connection of its own."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=10, source_address=(self.source, 0))
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60, source_address=(self.source, 0))
         try:
             sent = {name.replace("_", "-"): value for name, value in headers.items()}
             connection.request(method, path, body, sent)

@@ -104,7 +104,7 @@ def jobs(journal: Path) -> list[dict[str, Any]]:
     """All jobs of a journal, read by SQLite's own hands while the service may be writing."""
     if not journal.exists():
         return []
-    database = sqlite3.connect(f"file:{journal}?mode=ro", uri=True, timeout=5)
+    database = sqlite3.connect(f"file:{journal}?mode=ro", uri=True, timeout=60)
     try:
         database.row_factory = sqlite3.Row
         return [dict(row) for row in database.execute("SELECT * FROM jobs ORDER BY job_id")]
@@ -119,3 +119,10 @@ def lines(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         return []
     return [json.loads(line) for line in path.read_text().splitlines(keepends=True) if line.endswith("\n")]
+
+
+def resident_megabytes(process_id: int) -> float:
+    """Memory that a process holds, in 10⁶ bytes."""
+    status = Path(f"/proc/{process_id}/status").read_text()
+    (line,) = (line for line in status.splitlines() if line.startswith("VmRSS:"))
+    return int(line.split()[1]) * 1024 / 1e6

@@ -63,7 +63,7 @@ class WiredDaemon:
         fault = self.parts.health.first()
         return "" if fault is None else f"{int(fault.reason)} {fault.text}"
 
-    async def ready(self, bound_s: float = 10.0) -> None:
+    async def ready(self, bound_s: float = 60.0) -> None:
         await until(lambda: self.parts.health.state is State.READY, bound_s)
 
     async def job(self) -> Job:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contour.synthetic import (
+    CameraModel,
     CellGeometry,
     Clutter,
     Light,
@@ -79,3 +80,22 @@ def sample_scenes() -> tuple[Scene, ...]:
             clutter=Clutter(specks=40, debris=12),
         ),
     )
+
+
+def calibration_of(camera: CameraModel, name: str = "samples") -> dict[str, object]:
+    """The camera as a calibration file's content (camera model form)."""
+    return {
+        "version": 1,
+        "kind": "camera",
+        "image_width": camera.width,
+        "image_height": camera.height,
+        "camera_name": name,
+        "distortion_model": "plumb_bob",
+        "camera_matrix": {"rows": 3, "cols": 3, "data": camera.matrix.ravel().tolist()},
+        "distortion_coefficients": {"rows": 1, "cols": 5, "data": list(camera.distortion)},
+        "work_plane": {
+            "rotation_vector": list(camera.rotation_vector),
+            "translation_mm": list(camera.translation_mm),
+        },
+        "alignment": {"rotation_deg": 0.0, "translation_mm": [0.0, 0.0]},
+    }

@@ -62,7 +62,7 @@ class Run:
     async def _withdrawing(self, reason: Reason) -> None:
         self.durable.append(f"withdraw {reason.label}")
 
-    async def end(self, bound_s: float = 10.0) -> Settlement:
+    async def end(self, bound_s: float = 60.0) -> Settlement:
         return await asyncio.wait_for(self.transfer.run(), bound_s)
 
 

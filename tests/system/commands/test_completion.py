@@ -70,7 +70,7 @@ class Typed:
         os.write(self._master, text.encode())
 
     def _until(self, condition) -> None:
-        give_up_at = time.monotonic() + 20
+        give_up_at = time.monotonic() + 60
         while not condition():
             assert time.monotonic() < give_up_at, self._seen
             if select.select([self._master], [], [], 0.2)[0]:

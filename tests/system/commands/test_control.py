@@ -45,7 +45,7 @@ def state_of(cell: Cell) -> str:
 def connected(cell: Cell) -> socket.socket:
     """A client of the control socket, however deep the test's folder lies: addresses hold 107 bytes."""
     client = socket.socket(socket.AF_UNIX)
-    client.settimeout(10)
+    client.settimeout(60)
     folder = os.open(cell.folder / "state", os.O_PATH)
     client.connect(f"/proc/self/fd/{folder}/control.sock")
     os.close(folder)

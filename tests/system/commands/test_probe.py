@@ -10,8 +10,8 @@ import pytest
 from service.config.config_file import load_config
 from service.daemon.lock import NameLock
 from service.wiring import controller_names
-from tests.interop.programs import TCP_SERVERS
-from tests.interop.shifted_program import program
+from tests.support.interop.programs import TCP_SERVERS
+from tests.support.interop.shifted_program import program
 from tests.support.processes.processes import combtrace
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"

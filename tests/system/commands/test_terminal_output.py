@@ -42,7 +42,7 @@ class OnTerminal:
 
     def until(self, words: str) -> None:
         """Read until the words have come."""
-        give_up_at = time.monotonic() + 20
+        give_up_at = time.monotonic() + 60
         while words not in self.text:
             assert time.monotonic() < give_up_at, self.text
             self._read(0.2)
@@ -64,7 +64,7 @@ class OnTerminal:
         """The exit status, once all was read."""
         while self._read(0.2):
             pass
-        status = self._process.wait(20)
+        status = self._process.wait(60)
         os.close(self._master)
         return status
 
@@ -138,7 +138,7 @@ def test_a_status_that_is_followed_is_a_line_a_change_in_a_pipe(cell: Cell, form
         assert combtrace("halt", *config, "--reason", "blade").returncode == 0
         until(lambda: "blade" in log.read_text(), what="the change")
         watching.send_signal(signal.SIGINT)
-        assert watching.wait(20) == 130
+        assert watching.wait(60) == 130
     first, second = log.read_text().splitlines()
     if form:
         assert [json.loads(line)["state"] for line in (first, second)] == ["Ready", "Halted"]

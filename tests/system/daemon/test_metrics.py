@@ -19,7 +19,7 @@ NAME = re.compile(r"\b(combtrace_[a-z0-9_]+)\b")
 
 
 def served(port: int) -> str:
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=5) as answer:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=60) as answer:
         return answer.read().decode()
 
 

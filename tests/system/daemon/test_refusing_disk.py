@@ -13,9 +13,8 @@ from service.jobs.executor import ROOM
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import Client, token_file
 from tests.support.processes.processes import combtrace, free_port, jobs, lines, until
-from tests.support.processes.small_disk import CannotMount, mounted, remount
+from tests.support.processes.small_disk import CannotMount, fill, mounted, remount
 from tests.support.real_parts import missing
-from tests.system.daemon.test_storage import fill
 
 
 @pytest.fixture

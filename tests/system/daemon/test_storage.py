@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -129,6 +130,7 @@ def test_a_small_disk_goes_with_the_test_that_is_killed(small_disk: Path, tmp_pa
         "with mounted(Path(sys.argv[1]), 1):\n    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     disk = tmp_path / "other"
-    subprocess.run([sys.executable, "-c", program, disk], check=False, env=ENVIRONMENT)
+    killed = subprocess.run([sys.executable, "-c", program, disk], check=False, env=ENVIRONMENT)
+    assert killed.returncode == -signal.SIGKILL, "while it was mounted"
     until(lambda: disk.exists() and not os.path.ismount(disk), what="the end of the mount")
     assert os.path.ismount(small_disk)

@@ -20,7 +20,7 @@ from tests.support.processes.page_client import TOKEN, Client, token_file
 from tests.support.processes.processes import free_port, until
 from tests.support.real_parts import need_program
 
-expect.set_options(timeout=15_000)  # a job on a busy machine
+expect.set_options(timeout=60_000)  # a job on a busy machine
 FRAME = "#view image:not([visibility])"  # not the one that is still to come
 # What was seen together at each change of the picture: numbers of jobs whose frames show, the contour.
 WATCH_PICTURE = """() => {
@@ -101,7 +101,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cell, Clien
 @pytest.fixture
 def panel(cell: tuple[Cell, Client], browser: Browser) -> Iterator[Panel]:
     page = browser.new_page(viewport=PANEL, has_touch=True, locale="en-GB")
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(60_000)
     opened = Panel(*cell, page)
     page.on("console", lambda message: message.type == "error" and opened.complaints.append(message.text))
     page.on("pageerror", lambda error: opened.complaints.append(str(error)))
@@ -114,7 +114,7 @@ def panel(cell: tuple[Cell, Client], browser: Browser) -> Iterator[Panel]:
 
 
 def settled_state(panel: Panel, kind: str) -> None:
-    expect(panel.page.locator("#banner")).to_have_attribute("data-kind", kind, timeout=15_000)
+    expect(panel.page.locator("#banner")).to_have_attribute("data-kind", kind, timeout=60_000)
 
 
 def test_the_first_view_tells_state_in_words_colour_and_shape_and_every_part(panel: Panel) -> None:

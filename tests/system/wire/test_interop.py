@@ -23,9 +23,9 @@ from drivers.controller.modbus.client import (
     SerialLine,
 )
 from drivers.controller.simulated.controller import SimulatedController
-from tests.interop.programs import TCP_SERVERS, libmodbus_rtu, mbpoll_reads, pymodbus
 from tests.support.controller.protocol_decoder import decode_contour, decode_service
 from tests.support.controller.pty_line import PtyLine
+from tests.support.interop.programs import TCP_SERVERS, libmodbus_rtu, mbpoll_reads, pymodbus
 
 VECTORS = Path(__file__).parents[3] / "docs" / "reference" / "golden-vectors.json"
 GOLDEN: dict[str, Any] = json.loads(VECTORS.read_text(encoding="utf-8"))

@@ -14,9 +14,6 @@ from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
 from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
 from tests.support.controller.raw_client import SESSION, Client, page, simulated
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
-
 # --- its life ---------------------------------------------------------------------------------------------------------
 
 
@@ -154,7 +151,7 @@ async def test_a_request_for_a_measurement_stands_in_the_registers() -> None:
     async with simulated() as controller, Client(controller.port) as client:
         await client.until_started()
         await client.write(16, *encode_service(ServiceBlock(service_state=5), "big"))
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while not controller.can_request:
                 await asyncio.sleep(0.001)
         assert controller.request_measurement(recipe=3, thickness_um=70_000) == 1

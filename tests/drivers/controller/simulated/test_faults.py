@@ -21,8 +21,6 @@ from drivers.controller.simulated.server import QUIET_S, RegisterServer
 from tests.support.controller.raw_client import Client, page, simulated
 from tests.support.controller.rtu_frames import frame
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
 READ_LINK = struct.pack(">BHH", 3, 0, 16)
 CLEAR = struct.pack(">BHH", 6, 32, 0)
 COMMIT = struct.pack(">BHH", 6, 32, 5)

@@ -15,9 +15,6 @@ from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
 from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.rtu_frames import crc16
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
-
 # --- Modbus RTU -------------------------------------------------------------------------------------------------------
 
 
@@ -40,7 +37,7 @@ class Line:
 
     async def receive(self, length: int) -> bytes:
         received = b""
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(60):
             while len(received) < length:
                 try:
                     received += os.read(self.near, 512)

@@ -13,9 +13,6 @@ from drivers.controller.simulated.verdict import KINDS, Verdict
 from tests.support.controller.raw_client import SESSION, Client, page, simulated
 from tests.support.controller.simulated_bench import sealed
 
-pytestmark = pytest.mark.usefixtures("no_task_is_left")
-
-
 # --- the verdict ------------------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,1 @@
+"""What the daemon and its page take as processes, beside what they may take; and a day of its life."""

@@ -1,0 +1,1 @@
+"""The figures and tables of the page on methods, drawn from blocks rendered for it."""

@@ -106,15 +106,16 @@ def build(
         plan, calibration_fault = _plan_of(instead.measurer, config), None
         camera = instead.camera
     lock, journal, refused = _make_journal(config, opening)
-    link = None if refused else _make_link(config, instead.listen if instead else lambda controller: controller)
+    notifier = Notifier()
+    watchdog = Watchdog(notifier)
+    listen = instead.listen if instead else lambda controller: controller
+    link = None if refused else _make_link(config, listen, partial(watchdog.beat, "link"))
     health = Health(StateMachine(_publisher(link)))
     health.report("calibration", calibration_fault)
     health.report("journal", refused.fault if refused else _not_written(journal))
     pool = ThreadPoolExecutor(1, "camera")
     archive = _make_archive(config, journal)
     _tell_exports(config)
-    notifier = Notifier()
-    watchdog = Watchdog(notifier)
     cycle = Cycle(
         camera,
         plan.measurer,
@@ -142,8 +143,6 @@ def build(
         )
     except JournalError as error:
         raise WiringError(str(error)) from error
-    if link is not None:
-        link.on_look = executor.wake
     parts = Parts(camera, journal, health, executor, link, pool, lock, notifier=notifier, watchdog=watchdog)
     parts.opening = lock if refused else None
     parts.state_dir = config.service.state_dir
@@ -451,7 +450,7 @@ def find_table(config: Config) -> TableRecord | None:
         raise WiringError(str(error)) from error
 
 
-def _make_link(config: Config, listen: Callable[[Controller], Controller]) -> Link | None:
+def _make_link(config: Config, listen: Callable[[Controller], Controller], beat: Callable[[], None]) -> Link | None:
     controller = make_controller(config)
     if controller is None or isinstance(config.controller, NoController):
         return None
@@ -464,6 +463,7 @@ def _make_link(config: Config, listen: Callable[[Controller], Controller]) -> Li
             settings.heartbeat_timeout_s,
             observe=settings.mode == "observe",
         ),
+        beat=beat,
     )
 
 

@@ -188,7 +188,6 @@ class Daemon:
         if parts.link is not None:
             add("link", parts.link.run)
             add("link watch", partial(self._watch_link, parts.link))
-            parts.link.on_round = partial(beat, "link")
             watched.append("link")
             self._report_link(parts.link)
         parts.watchdog.watch(watched)

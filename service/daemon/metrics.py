@@ -149,9 +149,11 @@ class _Moment(Collector):
 
     def _controller(self, link: Link) -> Iterator[Metric]:
         yield _one("combtrace_controller_up", "1 where the controller is reached and runs", link.fault() is None)
-        yield CounterMetricFamily("combtrace_controller_connections", "Connections opened", value=link.connections)
+        yield CounterMetricFamily(
+            "combtrace_controller_connections", "Connections opened", value=link.connection.opened
+        )
         text = "Time of the last read of the controller's block"
-        yield _one("combtrace_controller_round_trip_seconds", text, link.round_trip_s)
+        yield _one("combtrace_controller_round_trip_seconds", text, link.reading.round_trip_s)
 
     def _storage(self) -> Iterator[Metric]:
         storage, archive = self._sources.storage, self._sources.archive

@@ -14,7 +14,7 @@ from drivers.controller.mailbox.mailbox import TEST_VALUE, ServiceBlock
 from service.jobs.health import Fault, Health, journal_fault
 from service.jobs.job_log import log_end
 from service.jobs.trigger_queue import Queued, Ticket, TriggerQueue, TriggerRefused
-from service.link.link import Link
+from service.link.link import Link, LinkListener
 from service.reasons import Reason
 from service.records.journal import GoneOn, Job, Journal, JournalError, TriggerStamp
 from service.state import State
@@ -50,7 +50,7 @@ def missed_between(last: tuple[int, int], session: int, counter: int) -> int:
     return (counter - before - 1) % COUNTER_VALUES
 
 
-class Executor:
+class Executor(LinkListener):
     """One job at a time, from any trigger. Jobs found in flight come first, then the controller's trigger."""
 
     def __init__(
@@ -92,7 +92,7 @@ class Executor:
         self._observing_since: tuple[int, int] | None = None
         self._restore_published()
         if link is not None:
-            link.on_found = self._begin_at
+            link.listen(self)
 
     def _restore_published(self) -> None:
         """What the service block said before the restart: it is true still."""
@@ -109,30 +109,30 @@ class Executor:
             reject_reason=int(settled.reason) if settled and settled.reason else 0,
             owner=self._journal.owner,
         )
-        self._link.highest_known = taken.job_id if taken else 0
+        self._link.numbers.highest_known = taken.job_id if taken else 0
 
-    async def _begin_at(self, block: ServiceBlock) -> None:
+    async def service_block_found(self, found: ServiceBlock) -> None:
         """Go on where the service block ends that stands at the controller, whoever wrote it.
 
         It may be another's, or our own of a journal that was lost or is older than it: a trigger that it shows as taken
         is not taken again, a job that had not ended there is taken back, and numbers go on well above.
         """
         assert self._link is not None
-        ours = block.owner == self._link.published.owner
-        if (block.protocol_version, block.test_value) != (ServiceBlock().protocol_version, TEST_VALUE):
-            block = replace(block, job_id=0, settled_job=0, trigger_ack=0)  # whatever stands there, it is no service's
+        ours = found.owner == self._link.published.owner
+        if (found.protocol_version, found.test_value) != (ServiceBlock().protocol_version, TEST_VALUE):
+            found = replace(found, job_id=0, settled_job=0, trigger_ack=0)  # whatever stands there, it is no service's
         session = self._link.view.session if self._link.view else 0
         running = self._health.job or 0
-        gone_on = await self._until_done(self._journal.go_on_above, block, session, self._room, running)
+        gone_on = await self._until_done(self._journal.go_on_above, found, session, self._room, running)
         self._numbered_above_last_job = False
         self._last_pair = await self._until_done(self._journal.last_controller_trigger)
         taken = await self._until_done(self._journal.last_taken)
-        if taken is None or taken.job_id <= block.job_id:
-            self._link.publish(job_id=block.job_id)
-        if block.settled_job > self.settled_job:
-            self.settled_job = block.settled_job
-            self._link.publish(settled_job=block.settled_job, reject_reason=block.reject_reason)
-        self._link.highest_known = max(self._link.highest_known, block.job_id, block.settled_job)
+        if taken is None or taken.job_id <= found.job_id:
+            self._link.publish(job_id=found.job_id)
+        if found.settled_job > self.settled_job:
+            self.settled_job = found.settled_job
+            self._link.publish(settled_job=found.settled_job, reject_reason=found.reject_reason)
+        self._link.numbers.highest_known = max(self._link.numbers.highest_known, found.job_id, found.settled_job)
         self._link.publish(trigger_ack=self._last_pair[1], session_ack=self._last_pair[0])
         self._tell_found(gone_on, ours)
         if gone_on.in_flight is not None:
@@ -159,7 +159,7 @@ class Executor:
                 self._tell(f"journal: {error}")
                 self._health.report("journal", journal_fault(error))
                 if self._link is not None:
-                    self._link.on_round()  # its task waits here, and is alive
+                    self._link.beat()  # its task waits here, and is alive
                 await asyncio.sleep(JOURNAL_PAUSE_S)
             else:
                 self._health.report("journal", None)
@@ -173,6 +173,10 @@ class Executor:
     def wake(self) -> None:
         """Something changed that may let a job begin."""
         self._wake.set()
+
+    def link_changed(self) -> None:
+        """The controller may ask for a job, or be ready for one."""
+        self.wake()
 
     def ignore_controller(self) -> None:
         """Take no triggers of the controller; they stay pending."""
@@ -277,7 +281,7 @@ class Executor:
 
     def _above(self) -> int:
         """What the controller's `last_job` has a new number be above."""
-        last_job = self._link.last_job if self._link else None
+        last_job = self._link.reading.last_job if self._link else None
         if not last_job:
             return 0
         return last_job if self._numbered_above_last_job else last_job + self._room
@@ -402,7 +406,7 @@ class Executor:
         if self._health.state is not State.READY or self._taking:
             return None
         view = self._link.view
-        if view.session == 0 or self._link.fault() is not None or self._link.number_in_doubt() is not None:
+        if view.session == 0 or self._link.fault() is not None or self._link.numbers.in_doubt() is not None:
             return None
         pair = (view.session, view.trigger_counter)
         if self._link.settings.observe and self._observing_since is None:

@@ -19,8 +19,9 @@ from typing import NoReturn
 from drivers.controller import ControllerError, ControllerUnavailable
 from drivers.controller.mailbox.mailbox import Answer, LinkBlock, Page
 from service.link.controller_clock import MODULUS
-from service.link.link import Link, LinkUnsteady
+from service.link.link import Link
 from service.link.ownership import ForeignOwner
+from service.link.reading import LinkUnsteady, echo_fault
 from service.reasons import Outcome, Reason
 
 log = logging.getLogger("combtrace.transfer")
@@ -202,11 +203,12 @@ class Transfer:
         """The controller's block, empty where it says nothing; raise _Ended where it ends the job."""
         self._beat()
         view = await self._link.look()
-        if view.session == 0 or self._link.echo_fault(view) is not None:
+        if view.session == 0 or echo_fault(view) is not None:
             return LinkBlock()  # it is being filled, or misread: nothing is concluded from it
-        if view.last_job == self._job_id and view.last_result != 0 and (self._link.holds or self._acknowledged(view)):
+        holds = self._link.reading.holds
+        if view.last_job == self._job_id and view.last_result != 0 and (holds or self._acknowledged(view)):
             self._end_by(view.last_result)
-        if self._link.holds:
+        if holds:
             self._end_without(view)
         return view
 
@@ -386,12 +388,12 @@ class Transfer:
         """Step 2: the connection on which `transfer` = 0 was confirmed, and since which start of ownership."""
         self._link.ownership.check()
         await self._link.controller.write_transfer(0)
-        return self._link.connections, self._link.ownership.epoch
+        return self._link.connection.opened, self._link.ownership.epoch
 
     def _check_may_go_on(self, clean: tuple[int, int]) -> None:
         """Raise ControllerError where steps 3 to 5 must not follow the step 2 confirmed as `clean`."""
         self._link.ownership.check()
-        if (self._link.connections, self._link.ownership.epoch) != clean:
+        if (self._link.connection.opened, self._link.ownership.epoch) != clean:
             raise ControllerUnavailable("the connection was opened anew: it begins again with transfer = 0")
 
     def _too_old(self) -> bool:

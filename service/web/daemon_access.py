@@ -105,12 +105,13 @@ class Window:
         link = self.sources.link
         if link is None:
             return None
+        round_trip_s = link.reading.round_trip_s
         return {
             "what": self.sources.controller,
             "up": link.fault() is None,
             "not_ready": link.controller_not_ready(),
-            "round_trip_ms": None if link.round_trip_s is None else round(link.round_trip_s * 1000, 1),
-            "connections": link.connections,
+            "round_trip_ms": None if round_trip_s is None else round(round_trip_s * 1000, 1),
+            "connections": link.connection.opened,
         }
 
     def _calibration(self) -> dict[str, Any] | None:

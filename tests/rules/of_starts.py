@@ -16,9 +16,11 @@ from tests.rules.rule import (
     IN_RESUMING,
     IN_TRANSFER,
     JOURNAL,
-    LINK,
+    NUMBERS,
     OWNERSHIP,
+    READING,
     TRANSFER,
+    WRITING,
     Rule,
 )
 
@@ -103,9 +105,9 @@ RULES = (
     ),
     Rule(
         "Own start: a last_job more than 1,000,000 above all known is a fault until a person confirms it",
-        f"{LINK}::Link._number_fault",
+        f"{NUMBERS}::JobNumbers.fault",
         f"{IN_LINK}::test_a_last_job_that_leaps_is_a_fault_until_it_is_corrected",
-        "if self.last_job > known + LARGEST_STEP and",
+        "if last_job > known + LARGEST_STEP and",
         "if False and",
     ),
     Rule(
@@ -131,10 +133,10 @@ RULES = (
     ),
     Rule(
         "Contours are sent only while test_echo = test_value + 1",
-        f"{LINK}::Link.echo_fault",
+        f"{READING}::echo_fault",
         f"{IN_TRANSFER}::test_contours_are_sent_only_while_the_test_echo_is_right",
-        "if view.test_echo == expected:",
-        "if expected:",
+        "if block.test_echo == TEST_ECHO:",
+        "if TEST_ECHO:",
     ),
     Rule(
         "A clock reading counts only if it fits the last one that counted within 1 s",
@@ -177,14 +179,14 @@ RULES = (
     # --- one service ---
     Rule(
         "One service: owner is read before each write of the service block",
-        f"{LINK}::Link._keep_service",
+        f"{WRITING}::ServiceBlockWriting.keep",
         f"{IN_OWNERSHIP}::test_owner_is_read_before_each_write_of_the_service_block",
-        "found = await self.controller.read_service()",
-        "found = self._block",
+        "found = await self._controller.read_service()",
+        "found = self.published",
     ),
     Rule(
         "One service: and the block is written only where what was read allows it",
-        f"{LINK}::Link._keep_service",
+        f"{WRITING}::ServiceBlockWriting.keep",
         f"{IN_OWNERSHIP}::test_what_stands_still_is_not_overwritten_before_it_was_watched",
         "if not self.ownership.saw(found):",
         "if self.ownership.saw(found) is None:",

@@ -174,7 +174,7 @@ RULES = (
         "Transfer 7: nothing is concluded while test_echo is wrong",
         f"{TRANSFER}::Transfer._see",
         f"{IN_DOUBT}::test_nothing_is_concluded_from_a_block_that_is_misread",
-        "or self._link.echo_fault(view) is not None",
+        "or echo_fault(view) is not None",
         "",
     ),
     Rule(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tests.rules.rule import (
+    CONNECTION,
     CYCLE,
     EXECUTOR,
     IN_ANSWERS,
@@ -13,7 +14,6 @@ from tests.rules.rule import (
     IN_RESUMING,
     IN_TRANSFER,
     JOURNAL,
-    LINK,
     TRANSFER,
     TRIGGERS,
     Rule,
@@ -164,7 +164,7 @@ RULES = (
     ),
     Rule(
         "Always: losing the controller never ends the service",
-        f"{LINK}::Link.run",
+        f"{CONNECTION}::Connection.keep",
         f"{IN_LINK}::test_a_lost_controller_is_found_and_taken_up_again_alone",
         "self._lost(error)",
         "raise",

@@ -18,6 +18,9 @@ JOURNAL, OWNERSHIP, CLOCK = (
     "service/link/ownership.py",
     "service/link/controller_clock.py",
 )
+CONNECTION, READING, WRITING, NUMBERS = (
+    f"service/link/{name}.py" for name in ("connection", "reading", "writing", "job_numbers")
+)
 IN_CLOCK, IN_DOUBT = "tests/service/link/test_controller_clock.py", "tests/service/link/test_transfer_in_doubt.py"
 TRIGGERS, IN_ANSWERS = "service/jobs/triggers.py", "tests/service/jobs/test_serial_answers.py"
 IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_RESUMING, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (

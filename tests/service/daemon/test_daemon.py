@@ -64,8 +64,6 @@ class Built:
             pool,
         )
         executor = Executor(journal, cycle, health, link, controller_triggers=True)
-        if link is not None:
-            link.on_look = executor.wake
         self.parts = Parts(self.camera, journal, health, executor, link, pool, Lock(folder / "lock"))
         self.daemon = Daemon(self.parts)
 
@@ -111,6 +109,8 @@ class Systemd:
         parts.notifier = Notifier({"NOTIFY_SOCKET": self._address, "WATCHDOG_USEC": "300000"})
         parts.watchdog = Watchdog(parts.notifier)
         parts.executor._beat = lambda: parts.watchdog.beat("jobs")
+        if parts.link is not None:
+            parts.link.beat = lambda: parts.watchdog.beat("link")
         return parts
 
     def heard(self) -> list[str]:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.controller.mailbox.mailbox import Answer, LinkBlock, Page, ServiceBlock, withdrawal
-from service.link.link import READS_FOR_TWO_ALIKE
+from service.link.reading import READS_FOR_TWO_ALIKE
 from service.link.transfer import Settlement, TransferCounter, TransferSettings
 from service.reasons import Outcome, Reason
 from tests.support.service.scripted_controller import ScriptedController
@@ -484,7 +484,8 @@ async def test_a_block_that_does_not_hold_still_between_page_and_commit_is_no_at
             nonlocal moving
             await write_page(page)
             if controller.count("write_page") <= 2 * QUICK.max_repeats:
-                run.link.view, moving = None, 3 * READS_FOR_TWO_ALIKE  # as after a look of the link's own that failed
+                # As after a look of the link's own that failed.
+                run.link.reading.view, moving = None, 3 * READS_FOR_TWO_ALIKE
 
         async def moved() -> LinkBlock:
             nonlocal moving

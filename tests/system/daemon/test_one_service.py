@@ -119,15 +119,15 @@ async def test_a_service_that_another_one_drives_out_stops_writing_and_stays_in_
     ):
         await one.ready()
         assert one.parts.link is not None
-        keep = one.parts.link._keep_service
+        keep = one.parts.link.writing.keep
 
         async def frozen() -> None:
             return
 
-        one.parts.link._keep_service = frozen  # type: ignore[method-assign]  # its heartbeat stands still
+        one.parts.link.writing.keep = frozen  # type: ignore[method-assign]  # its heartbeat stands still
         async with wired(tmp_path / "two", tcp(door.port)) as two:
             await two.ready()
-            one.parts.link._keep_service = keep  # type: ignore[method-assign]
+            one.parts.link.writing.keep = keep  # type: ignore[method-assign]
             await until(lambda: "Stop one of the two" in one.reason)
             assert (await two.job()).outcome is Outcome.ACCEPTED
             assert one.parts.health.state is State.ERROR

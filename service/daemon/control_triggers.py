@@ -12,7 +12,8 @@ from service.jobs.executor import Executor
 from service.jobs.trigger_lines import LARGEST_RECIPE, UNKNOWN_RECIPE, ack, nak, wait
 from service.jobs.trigger_queue import Queued, TriggerRefused
 from service.jobs.triggers import result_line
-from service.records.journal import Job, Journal, JournalError, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal, JournalError
 
 log = logging.getLogger("combtrace.control")
 

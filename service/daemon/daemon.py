@@ -32,7 +32,8 @@ from service.link.link import Link
 from service.poll_timing import until_beat
 from service.reasons import Reason
 from service.records.archive_writer import ArchiveWriter
-from service.records.journal import Job, Journal, JournalError, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal, JournalError
 from service.state import State
 
 log = logging.getLogger("combtrace.daemon")

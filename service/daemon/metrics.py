@@ -21,7 +21,7 @@ from service.jobs.health import PARTS, Health
 from service.link.link import Link
 from service.measuring.calibration_guard import CalibrationGuard
 from service.records.archive_writer import ArchiveWriter
-from service.records.journal import Job
+from service.records.job import Job
 from service.state import State
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from service.jobs.executor import Executor
 from service.jobs.health import Fault, Health
 from service.jobs.trigger_queue import TriggerRefused
 from service.reasons import Reason
-from service.records.journal import Job
+from service.records.job import Job
 from service.state import State
 
 log = logging.getLogger("combtrace.control")

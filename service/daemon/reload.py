@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from service.config.config import Config
 from service.config.config_file import ConfigError, load_config
-from service.jobs.cycle import Plan
+from service.jobs.cycle_terms import Plan
 from service.jobs.health import Health
 from service.logs import event
 

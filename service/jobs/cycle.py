@@ -6,113 +6,32 @@ import asyncio
 import logging
 import time
 from collections.abc import Awaitable, Callable, Mapping
-from concurrent.futures import Executor as ThreadPool
 from concurrent.futures import Future
-from dataclasses import dataclass, field
-from typing import Any, ParamSpec, TypeVar
+from functools import partial
+from typing import Any
 
 from contour.errors import ParameterError, PictureError
-from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
+from drivers.camera import CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
 from drivers.controller import ControllerError
 from drivers.controller.mailbox.mailbox import ContourTooLarge, MailboxError, Page, crc32_of, decode_header, withdrawal
 from service.config.config import Recipe
-from service.jobs.health import Fault, Health, journal_fault
+from service.jobs.cycle_terms import CycleSettings, Devices, JobInProgress, Observation, Plan, Records
+from service.jobs.health import Fault, journal_fault
 from service.link.contour_message import Envelope, contour_pages
 from service.link.controller_clock import Stamp
 from service.link.link import Link
-from service.link.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
+from service.link.transfer import Transfer
+from service.link.transfer_terms import Lifetime, Outgoing, Settlement, TransferSteps, Validity
 from service.measuring.measure import Measurement, Measurer
 from service.reasons import Outcome, Reason
-from service.records.evidence import Evidence, Keeper, KeepsNothing
-from service.records.journal import Job, Journal, JournalError, Terms
+from service.records.durable_journal import DurableJournal
+from service.records.job import Job, Terms
+from service.records.journal import JournalError
 
 log = logging.getLogger("combtrace.cycle")
 
-P = ParamSpec("P")
-R = TypeVar("R")
-
 STAMP_WAIT_S = 3.0  # a lost connection is back within that, and a clock has held over two heartbeats
 EVIDENCE_WAIT_S = 2.0  # a slow disk has written a frame by then; one that hangs must not hold contours up
-JOURNAL_PAUSE_S = 1.0
-
-
-@dataclass(frozen=True)
-class MailboxFormat:
-    """How pages are laid out for this controller."""
-
-    word_order: Any = "big"
-    payload_capacity: int = 1984
-
-
-@dataclass(frozen=True)
-class CycleSettings:
-    """Bounds of one job. valid_for_s 0 = no limit by the controller's clock; job_timeout_s bounds it then.
-
-    observe: the pages are made and not sent.
-    target: which controller it is and how it is laid out, by configuration key: a job in flight is settled there only.
-    """
-
-    default_recipe: int = 1
-    camera_timeout_s: float = 5.0
-    valid_for_s: float = 30.0
-    job_timeout_s: float = 120.0
-    observe: bool = False
-    mailbox: MailboxFormat = field(default_factory=MailboxFormat)
-    transfer: TransferSettings = field(default_factory=TransferSettings)
-    target: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def lifetime_s(self) -> float:
-        """How old a contour may become, by whichever bound there is."""
-        return self.valid_for_s or self.job_timeout_s
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What jobs are measured by. A job keeps the plan that it began with."""
-
-    measurer: Measurer
-    recipes: Mapping[int, Recipe]
-    default_recipe: int = 1
-
-
-@dataclass(frozen=True)
-class Observation:
-    """What one job saw: for whoever draws, archives or prints it."""
-
-    job: Job
-    frame: Frame
-    measurement: Measurement
-
-
-@dataclass
-class _Course:
-    """What a job has come to so far; what it did not come to stays None."""
-
-    job: Job
-    plan: Plan
-    report: dict[str, Any] = field(default_factory=dict)
-    recipe: Recipe | None = None
-    thickness_mm: float = 0.0
-    frame: Frame | None = None
-    measurement: Measurement | None = None
-    envelope: Envelope | None = None
-    pages: tuple[Page, ...] = ()
-    transfer: dict[str, Any] = field(default_factory=dict)
-    terms: Terms | None = None
-
-    def evidence(self, job: Job) -> Evidence:
-        """What it leaves behind."""
-        return Evidence(
-            job,
-            self.plan.measurer,
-            self.recipe,
-            self.thickness_mm,
-            self.frame,
-            self.measurement,
-            self.envelope,
-            self.pages,
-        )
 
 
 class _Stop(Exception):
@@ -124,36 +43,31 @@ class _Stop(Exception):
 
 
 class Cycle:
-    """Carries jobs out, one at a time. Camera and tracing run in `pool`, so that the heartbeat goes on meanwhile."""
+    """Carries jobs out, one at a time."""
 
     def __init__(
         self,
-        camera: Camera,
-        measurer: Measurer,
-        recipes: Mapping[int, Recipe],
-        journal: Journal,
-        health: Health,
-        link: Link | None,
-        counter: TransferCounter,
+        devices: Devices,
+        records: Records,
+        plan: Plan,
         settings: CycleSettings,
-        pool: ThreadPool,
         *,
-        observe: Callable[[Observation], None] = lambda _observation: None,
-        keeper: Keeper | None = None,
         beat: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """keeper: is handed what a job leaves behind; None = nothing is kept."""
-        self._camera = camera
-        self._plan = Plan(measurer, recipes, settings.default_recipe)
-        self._journal = journal
-        self._health = health
-        self._link = link
-        self._counter = counter
+        self._camera = devices.camera
+        self._pool = devices.pool
+        self._link = devices.link
+        self._counter = devices.counter
+        self._journal = records.journal
+        self._health = records.health
+        self._keeper = records.keeper
+        self._observe = records.observe
+        self._durable = DurableJournal(
+            self._journal_fails, on_done=partial(records.health.report, "journal", None), beat=beat
+        )
+        self._plan = plan
         self._settings = settings
-        self._pool = pool
-        self._observe = observe
-        self._keeper = KeepsNothing() if keeper is None else keeper
         self._beat = beat
         self._now = now
 
@@ -173,7 +87,7 @@ class Cycle:
 
     async def run(self, job: Job) -> Job:
         """The job, settled."""
-        course = _Course(job, self._plan)
+        course = JobInProgress(job, self._plan)
         started = self._now()
         try:
             settlement = await self._carry_out(course)
@@ -191,7 +105,7 @@ class Cycle:
 
     async def resume(self, job: Job) -> Job:
         """A job that a restart found in flight, settled: sent again bit-identical, or withdrawn (154)."""
-        course = _Course(job, self._plan, job.report, transfer=job.transfer)  # what is known of it stays its own
+        course = JobInProgress(job, self._plan, job.report, transfer=job.transfer)  # what is known of it stays its own
         handshake = self._settings.transfer.handshake
         if not job.sent or self._link is None or not handshake:
             detail = "nothing of it was sent" if not job.sent else "whether it was taken cannot be known"
@@ -228,7 +142,7 @@ class Cycle:
 
     # --- the steps ----------------------------------------------------------------------------------------------
 
-    async def _carry_out(self, course: _Course) -> Settlement:
+    async def _carry_out(self, course: JobInProgress) -> Settlement:
         job = course.job
         recipe = course.recipe = _recipe(job, course.plan)
         course.thickness_mm = job.trigger.thickness_um / 1000 if job.trigger.thickness_um else recipe.thickness_mm
@@ -250,11 +164,10 @@ class Cycle:
         course.report["pages_ms"] = self._since(before)
         if self._settings.observe:
             return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
-        lasts_s = self._settings.lifetime_s
-        lifetime = Lifetime(stamped_at + lasts_s, job.taken_at_s, lasts_s, self._now)
+        lifetime = self._lifetime(job, self._settings.lifetime_s, stamped_at)
         return await self._send(self._link, course, stamp, lifetime)
 
-    async def _send(self, link: Link, course: _Course, stamp: Stamp, lifetime: Lifetime) -> Settlement:
+    async def _send(self, link: Link, course: JobInProgress, stamp: Stamp, lifetime: Lifetime) -> Settlement:
         """Bring the pages to the controller, all that is known of the job being durable before anything is sent."""
         job, pages, target = course.job, course.pages, self._settings.target
         course.transfer = _figures(stamp, pages)
@@ -262,8 +175,8 @@ class Cycle:
 
         async def before_sending() -> None:
             await self._drafted(job, drafted)  # first: with its pages in the journal a restart would send it
-            known = course.terms, course.report, course.transfer
-            await self._durably(self._journal.store_pages, job.job_id, stamp.session, pages, *known, target=target)
+            known = stamp.session, pages, course.progress
+            await self._durable.until_done(self._journal.store_pages, job.job_id, *known, target=target)
 
         transfer = self._transfer(link, job, stamp.session, pages, lifetime, before_sending=before_sending)
         before = self._now()
@@ -285,7 +198,7 @@ class Cycle:
         return round((self._now() - started) * 1000, 1)
 
     async def _make_pages(
-        self, course: _Course, stamp: Stamp, frame: Frame, measurement: Measurement
+        self, course: JobInProgress, stamp: Stamp, frame: Frame, measurement: Measurement
     ) -> tuple[Page, ...]:
         assert course.recipe is not None
         course.envelope = self._envelope(course.job, course.recipe, stamp, frame)
@@ -392,31 +305,21 @@ class Cycle:
         """before_sending: None where the job was sent before."""
 
         async def before_withdrawal(reason: Reason) -> None:
-            await self._durably(self._journal.store_withdrawal, job.job_id, reason)
+            await self._durable.until_done(self._journal.store_withdrawal, job.job_id, reason)
 
         def on_stuck(why: str) -> None:
             self._health.report("in-flight", Fault(Reason.CONTROLLER_TIMEOUT, why))
 
-        return Transfer(
-            link,
-            self._settings.transfer,
-            self._counter,
-            job_id=job.job_id,
-            session=session,
-            pages=pages,
-            withdrawal=withdrawal(job.job_id, session, self._settings.mailbox.word_order),
-            lifetime=lifetime,
-            validity=self._validity(pages),
-            before_sending=before_sending or _nothing,
-            before_withdrawal=before_withdrawal,
-            on_stuck=on_stuck,
-            sent=before_sending is None,
-            beat=self._beat,
-        )
+        back = withdrawal(job.job_id, session, self._settings.mailbox.word_order)
+        sent = before_sending is None
+        outgoing = Outgoing(job.job_id, session, pages, back, self._validity(pages), sent)
+        steps = TransferSteps(before_sending or _nothing, before_withdrawal, on_stuck, self._beat)
+        return Transfer(link, self._settings.transfer, self._counter, outgoing, lifetime, steps)
 
-    def _lifetime(self, job: Job, lasts_s: float) -> Lifetime:
-        """From now on, and not longer than that since it was taken."""
-        return Lifetime(self._now() + lasts_s, job.taken_at_s, lasts_s, self._now)
+    def _lifetime(self, job: Job, lasts_s: float, since_s: float | None = None) -> Lifetime:
+        """From `since_s` on, monotonic, or from now on, and not longer than that since it was taken."""
+        since_s = self._now() if since_s is None else since_s
+        return Lifetime(since_s + lasts_s, job.taken_at_s, lasts_s, self._now)
 
     def _validity(self, pages: tuple[Page, ...]) -> Validity:
         if not pages:
@@ -426,45 +329,31 @@ class Cycle:
 
     # --- the end ------------------------------------------------------------------------------------------------
 
-    async def _settle(self, job: Job, settlement: Settlement, course: _Course) -> Job:
-        settled = await self._durably(
+    async def _settle(self, job: Job, settlement: Settlement, course: JobInProgress) -> Job:
+        settled = await self._durable.until_done(
             self._journal.settle,
             job.job_id,
             settlement.outcome,
             settlement.reason,
             settlement.detail,
-            course.report,
-            course.terms,
-            course.transfer,
+            course.progress,
         )
         self._keeper.keep(course.evidence(settled))
         return settled
 
-    async def _durably(self, write: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Read or write the journal, again and again until it is done: no step goes on without it."""
-        told = ""
-        while True:
-            self._beat()
-            try:
-                result = await asyncio.to_thread(write, *args, **kwargs)
-            except JournalError as error:
-                self._health.report("journal", journal_fault(error))
-                if str(error) != told:
-                    log.error("journal: %s", error)
-                told = str(error)
-                await asyncio.sleep(JOURNAL_PAUSE_S)
-            else:
-                self._health.report("journal", None)
-                return result
+    def _journal_fails(self, error: JournalError, again: bool) -> None:
+        self._health.report("journal", journal_fault(error))
+        if not again:
+            log.error("journal: %s", error)
 
-    def _abort(self, course: _Course) -> None:
+    def _abort(self, course: JobInProgress) -> None:
         """At shutdown: a job of which nothing was sent ends here, one that was sent is settled by the next start."""
         job = course.job
         try:
             known = self._journal.find(job.job_id)
             if known is not None and known.outcome is None and not known.sent:
                 end = Outcome.FAILED, Reason.ABORTED, "the service was stopped"
-                settled = self._journal.settle(job.job_id, *end, course.report, course.terms, course.transfer)
+                settled = self._journal.settle(job.job_id, *end, course.progress)
                 self._keeper.keep(course.evidence(settled))
                 log.warning("job %d failed: %d aborted", job.job_id, Reason.ABORTED)
                 return
@@ -475,7 +364,7 @@ class Cycle:
     async def _end_defect(self, job: Job, error: Exception) -> Settlement:
         """A defect's settlement; a job that was sent is withdrawn first."""
         detail = f"{type(error).__name__}: {error}"
-        known = await self._durably(self._journal.find, job.job_id)
+        known = await self._durable.until_done(self._journal.find, job.job_id)
         never_answered = self._link is None or not self._settings.transfer.handshake
         if known is None or not known.sent or known.session is None or never_answered:
             return Settlement(Outcome.FAILED, Reason.INTERNAL_ERROR, detail)

@@ -7,8 +7,9 @@ import logging
 import secrets
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
-from typing import ParamSpec, Protocol, TypeVar
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Protocol
 
 from drivers.controller.mailbox.mailbox import TEST_VALUE, ServiceBlock
 from service.jobs.health import Fault, Health, journal_fault
@@ -16,15 +17,13 @@ from service.jobs.job_log import log_end
 from service.jobs.trigger_queue import Queued, Ticket, TriggerQueue, TriggerRefused
 from service.link.link import Link, LinkListener
 from service.reasons import Reason
-from service.records.journal import GoneOn, Job, Journal, JournalError, TriggerStamp
+from service.records.durable_journal import DurableJournal
+from service.records.job import Job, TriggerStamp
+from service.records.journal import GoneOn, Journal, JournalError
 from service.state import State
 
 log = logging.getLogger("combtrace.jobs")
 
-P = ParamSpec("P")
-R = TypeVar("R")
-
-JOURNAL_PAUSE_S = 1.0
 QUEUE_LOOK_S = 0.25  # how often those that wait are looked at where nothing else wakes the loop
 IDLE_LOOK_S = 1.0  # a loop that turns shows that it lives
 ROOM = 1000  # protocol: a start numbers from at least so far above all it finds, for another may hold the same journal
@@ -44,6 +43,17 @@ class JobRunner(Protocol):
         """Why a job found in flight cannot be settled as the service is configured now; None where it can."""
 
 
+@dataclass(frozen=True)
+class Intake:
+    """Which triggers are taken. queue: where they wait while a job is executed; without room they are refused as busy.
+
+    controller: its own trigger too.
+    """
+
+    controller: bool = False
+    queue: TriggerQueue = field(default_factory=lambda: TriggerQueue(0, 0.0))
+
+
 def missed_between(last: tuple[int, int], session: int, counter: int) -> int:
     """Trigger values of the controller that were skipped between the pair last taken and (session, counter)."""
     before = last[1] if last[0] == session else 0
@@ -59,20 +69,19 @@ class Executor(LinkListener):
         runner: JobRunner,
         health: Health,
         link: Link | None,
+        intake: Intake,
         *,
-        controller_triggers: bool,
-        queue: TriggerQueue | None = None,
-        on_settled: Callable[[Job], None] | None = None,
         beat: Callable[[], None] = lambda: None,
     ) -> None:
-        """queue: where triggers wait while a job is executed; None = they are refused as busy."""
         self._journal = journal
         self._runner = runner
         self._health = health
         self._link = link
-        self._controller_triggers = controller_triggers and link is not None
-        self._queue = TriggerQueue(0, 0.0) if queue is None else queue
-        self.on_settled = [] if on_settled is None else [on_settled]  # told of each job's end; they must not block
+        self._durable = DurableJournal(self._journal_fails, on_done=partial(health.report, "journal", None))
+        self._in_flight = DurableJournal(self._jobs_in_flight_unknown, beat=beat)
+        self._controller_triggers = intake.controller and link is not None
+        self._queue = intake.queue
+        self.on_settled: list[Callable[[Job], None]] = []  # told of each job's end; they must not block
         self._beat = beat
         self._tickets: dict[int, asyncio.Future[Job]] = {}
         self.counts: Counter[tuple[str, str]] = Counter()
@@ -123,10 +132,10 @@ class Executor(LinkListener):
             found = replace(found, job_id=0, settled_job=0, trigger_ack=0)  # whatever stands there, it is no service's
         session = self._link.view.session if self._link.view else 0
         running = self._health.job or 0
-        gone_on = await self._until_done(self._journal.go_on_above, found, session, self._room, running)
+        gone_on = await self._durable.until_done(self._journal.go_on_above, found, session, self._room, running)
         self._numbered_above_last_job = False
-        self._last_pair = await self._until_done(self._journal.last_controller_trigger)
-        taken = await self._until_done(self._journal.last_taken)
+        self._last_pair = await self._durable.until_done(self._journal.last_controller_trigger)
+        taken = await self._durable.until_done(self._journal.last_taken)
         if taken is None or taken.job_id <= found.job_id:
             self._link.publish(job_id=found.job_id)
         if found.settled_job > self.settled_job:
@@ -151,19 +160,15 @@ class Executor(LinkListener):
         if gone_on.in_flight is not None:
             log.log(level, "%s: job %d, which had not ended, is taken back", whose, gone_on.in_flight)
 
-    async def _until_done(self, access: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        while True:
-            try:
-                result = await asyncio.to_thread(access, *args, **kwargs)
-            except JournalError as error:
-                self._tell(f"journal: {error}")
-                self._health.report("journal", journal_fault(error))
-                if self._link is not None:
-                    self._link.beat()  # its task waits here, and is alive
-                await asyncio.sleep(JOURNAL_PAUSE_S)
-            else:
-                self._health.report("journal", None)
-                return result
+    def _journal_fails(self, error: JournalError, _again: bool) -> None:
+        self._tell(f"journal: {error}")
+        self._health.report("journal", journal_fault(error))
+        if self._link is not None:
+            self._link.beat()  # its task waits here, and is alive
+
+    def _jobs_in_flight_unknown(self, error: JournalError, _again: bool) -> None:
+        self._tell(f"journal: {error}")
+        self._health.report("in-flight", journal_fault(error))
 
     @property
     def missed(self) -> int:
@@ -369,7 +374,9 @@ class Executor(LinkListener):
             self._refuse_queued(waiting, refused)
 
     async def _settle_in_flight(self) -> None:
-        for job in await self._unsettled():
+        # Until they are known, no trigger is taken; in this thread, so that none may come in between.
+        unsettled = await self._in_flight.until_done_here(self._journal.unsettled)
+        for job in unsettled:
             if self._submitted is not None and job.job_id == self._submitted.job.job_id:
                 continue
             hindrance = self._runner.hindrance(job)
@@ -387,17 +394,6 @@ class Executor(LinkListener):
     def _report_in_flight(self, job_id: int) -> None:
         text = f"job {job_id} of before the restart is not settled yet"
         self._health.report("in-flight", Fault(Reason.SERVICE_RESTARTED, text))
-
-    async def _unsettled(self) -> tuple[Job, ...]:
-        """Jobs of before the start without an end; until they are known, no trigger is taken."""
-        while True:
-            try:
-                return self._journal.unsettled()  # in this thread: no trigger may come in between
-            except JournalError as error:
-                self._beat()
-                self._tell(f"journal: {error}")
-                self._health.report("in-flight", journal_fault(error))
-                await asyncio.sleep(JOURNAL_PAUSE_S)
 
     def _pending(self) -> TriggerStamp | None:
         """The controller's open trigger, where there is one and it can be taken now."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from service.logs import event
 from service.reasons import Outcome
-from service.records.journal import Job
+from service.records.job import Job
 
 STAGES = ("frame_ms", "pages_ms", "transfer_ms", "total_ms")
 

@@ -35,7 +35,7 @@ ENUMS = {
 }
 
 
-class ToldController:
+class LoggedController:
     """The same controller; what goes to it and what changes in its block is logged. registers: pages word by word."""
 
     def __init__(self, controller: Controller, layout: MailboxLayout, *, registers: bool = False) -> None:

@@ -38,7 +38,8 @@ from service.records.evidence import (
     plain_bytes,
     table_digest,
 )
-from service.records.journal import Job, JournalError
+from service.records.job import Job
+from service.records.journal import JournalError
 
 log = logging.getLogger("combtrace.archive")
 

@@ -30,7 +30,8 @@ from service.measuring.table_file import TableFileError, TableRecord, load_table
 from service.reasons import Reason
 from service.records.archive import DRAFT, PLAIN_FRAME, TABLES, document_of, folder_of
 from service.records.evidence import FRAME, VERSION, Evidence
-from service.records.journal import Job, pages_from_text
+from service.records.job import Job
+from service.records.journal import pages_from_text
 
 LARGEST_DOCUMENT = 200_000_000
 

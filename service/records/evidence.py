@@ -25,7 +25,8 @@ from service.config.config import Recipe
 from service.link.contour_message import Envelope
 from service.measuring.measure import Measurement, Measurer
 from service.measuring.table_file import TableRecord
-from service.records.journal import Job, pages_to_text
+from service.records.job import Job
+from service.records.journal import pages_to_text
 from service.records.pictures import caption
 
 VERSION = 1

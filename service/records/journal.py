@@ -15,7 +15,7 @@ import threading
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import chain
 from pathlib import Path
@@ -23,6 +23,7 @@ from typing import Any
 
 from drivers.controller.mailbox.mailbox import Page, ServiceBlock
 from service.reasons import Outcome, Reason
+from service.records.job import Job, Progress, Terms, TriggerStamp
 from service.records.journal_schema import COLUMNS, SCHEMA_VERSION, TABLES, migration
 
 HEADER_REGISTERS = 31
@@ -55,65 +56,6 @@ class JournalDamaged(JournalError):
 
 class JournalConflict(Exception):
     """A job is not there, or has ended already: a defect of the caller, which trying again does not mend."""
-
-
-@dataclass(frozen=True)
-class TriggerStamp:
-    """Where a job came from. `session` and `counter` are set for triggers of the controller only.
-
-    line: the serial port over which it is acknowledged and told its end, as configured; None where nobody is told.
-    recipe 0 means the configured default, thickness_um 0 the recipe's.
-    """
-
-    kind: str
-    recipe: int = 0
-    thickness_um: int = 0
-    session: int | None = None
-    counter: int | None = None
-    line: str | None = None
-
-
-@dataclass(frozen=True)
-class Terms:
-    """With what a job was carried out: its recipe's settings in whole, and the hash of the calibration's content."""
-
-    recipe: dict[str, Any]
-    calibration: str | None = None
-
-
-@dataclass(frozen=True)
-class Job:
-    """One job as the journal holds it.
-
-    session: set once any request of a transfer may have been sent, and pages with it, until the job has ended.
-    terms: None where it came to no recipe. transfer: figures of it, empty where nothing was to be sent.
-    target: at which controller it was sent and how laid out there, by configuration key; empty where that is not known.
-    """
-
-    job_id: int
-    taken_at: str
-    trigger: TriggerStamp
-    session: int | None = None
-    pages: tuple[Page, ...] = ()
-    withdraw_reason: Reason | None = None
-    outcome: Outcome | None = None
-    reason: Reason | None = None
-    detail: str | None = None
-    settled_at: str | None = None
-    report: dict[str, Any] = field(default_factory=dict)
-    terms: Terms | None = None
-    transfer: dict[str, Any] = field(default_factory=dict)
-    target: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def taken_at_s(self) -> float:
-        """When it was taken, Unix time by the machine's own clock."""
-        return datetime.fromisoformat(self.taken_at).timestamp()
-
-    @property
-    def sent(self) -> bool:
-        """True where a request of a transfer may have been sent: such a job is never called failed by ourselves."""
-        return self.session is not None
 
 
 @dataclass(frozen=True)
@@ -362,9 +304,7 @@ class Journal:
         job_id: int,
         session: int,
         pages: tuple[Page, ...],
-        terms: Terms | None = None,
-        report: dict[str, Any] | None = None,
-        transfer: dict[str, Any] | None = None,
+        progress: Progress | None = None,
         *,
         target: Mapping[str, Any] | None = None,
     ) -> None:
@@ -372,25 +312,19 @@ class Journal:
 
         target: at which controller they are to be sent and how laid out there, by configuration key.
         """
-        texts = pages_to_text(pages), json.dumps(report or {}), json.dumps(transfer) if transfer else None
-        values = session, *texts, json.dumps(dict(target or {}))
-        self._update(job_id, "session = ?, pages = ?, report = ?, transfer = ?, target = ?", values, terms)
+        known = progress or Progress()
+        values = session, pages_to_text(pages), *_texts(known), json.dumps(dict(target or {}))
+        self._update(job_id, "session = ?, pages = ?, report = ?, transfer = ?, target = ?", values, known.terms)
 
     def store_withdrawal(self, job_id: int, reason: Reason) -> None:
         """Make durable that the job is being withdrawn, and why; the first reason stands."""
         self._update(job_id, "withdraw_reason = COALESCE(withdraw_reason, ?)", (int(reason),))
 
     def settle(
-        self,
-        job_id: int,
-        outcome: Outcome,
-        reason: Reason | None,
-        detail: str | None,
-        report: dict[str, Any] | None = None,
-        terms: Terms | None = None,
-        transfer: dict[str, Any] | None = None,
+        self, job_id: int, outcome: Outcome, reason: Reason | None, detail: str | None, progress: Progress | None = None
     ) -> Job:
         """The job with its final state, durable; its pages are dropped. A job settles once: raise JournalConflict."""
+        known = progress or Progress()
         return self._update(
             job_id,
             "outcome = ?, reason = ?, detail = ?, settled_at = ?, report = ?, transfer = ?, pages = NULL",
@@ -400,10 +334,9 @@ class Journal:
                 # Whatever a text holds, a job that was taken ends.
                 None if detail is None else detail.encode("utf-8", "backslashreplace").decode(),
                 self._stamp(),
-                json.dumps(report or {}),
-                json.dumps(transfer) if transfer else None,
+                *_texts(known),
             ),
-            terms,
+            known.terms,
         )
 
     def note(self, who: str | None, address: str, action: str, detail: str | None = None) -> int:
@@ -511,6 +444,11 @@ def _is_later(pair: tuple[int, int], than: tuple[int, int], session: int) -> boo
     if pair[0] != session or 0 in pair:
         return False
     return than[0] != session or 0 < (pair[1] - than[1]) % 65536 < LATER
+
+
+def _texts(known: Progress) -> tuple[str, str | None]:
+    """Report and transfer as they stand in their columns."""
+    return json.dumps(known.report), json.dumps(known.transfer) if known.transfer else None
 
 
 def readable_text(stored: bytes) -> str:

@@ -19,7 +19,7 @@ from starlette.routing import Route
 from service.reasons import Language, Reason
 from service.records.archived_job import EvidenceError, load_archived
 from service.records.evidence import FRAME, Evidence, job_fields
-from service.records.journal import Job
+from service.records.job import Job
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 from service.web import models as answers
 from service.web.commands import Orders, Refusal

@@ -21,7 +21,8 @@ from service.jobs.trigger_queue import Queued
 from service.link.link import Link
 from service.measuring.calibration_guard import CalibrationGuard
 from service.records.archive_writer import ArchiveWriter
-from service.records.journal import Job, Journal, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
 from service.state import State
 
 T = TypeVar("T")

@@ -18,8 +18,8 @@ JOURNAL, OWNERSHIP, CLOCK = (
     "service/link/ownership.py",
     "service/link/controller_clock.py",
 )
-CONNECTION, READING, WRITING, NUMBERS = (
-    f"service/link/{name}.py" for name in ("connection", "reading", "writing", "job_numbers")
+CONNECTION, READING, WRITING, NUMBERS, TRANSFER_TERMS = (
+    f"service/link/{name}.py" for name in ("connection", "reading", "writing", "job_numbers", "transfer_terms")
 )
 IN_CLOCK, IN_DOUBT = "tests/service/link/test_controller_clock.py", "tests/service/link/test_transfer_in_doubt.py"
 TRIGGERS, IN_ANSWERS = "service/jobs/triggers.py", "tests/service/jobs/test_serial_answers.py"

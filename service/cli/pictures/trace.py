@@ -287,7 +287,8 @@ def _make_folder(path: Path) -> None:
 
 
 def _table(config: Config) -> TableRecord | None:
-    from service.wiring import WiringError, find_table
+    from service.wiring.errors import WiringError
+    from service.wiring.plan import find_table
 
     try:
         return find_table(config)

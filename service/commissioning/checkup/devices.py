@@ -19,7 +19,9 @@ from service.commissioning.checkup.finding import Finding, fault, ok, warning
 from service.commissioning.checkup.running import other_user_of_controller
 from service.config.config import Config, FilesCamera, ModbusRtu, SerialTrigger, V4l2Camera
 from service.link.link import Link, LinkSettings
-from service.wiring import WiringError, find_guard, make_camera, make_controller, make_serial_port
+from service.wiring.devices import make_camera, make_controller, make_serial_port
+from service.wiring.errors import WiringError
+from service.wiring.plan import find_guard
 
 CONTROLLER_BOUND_S = 5.0
 CAMERA_BOUND_S = 5.0

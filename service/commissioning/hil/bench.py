@@ -46,7 +46,7 @@ from service.config.mistakes import describe
 from service.jobs.executor import ROOM
 from service.link.controller_clock import BEATS_TO_HOLD
 from service.link.ownership import WATCH_S
-from service.wiring import mailbox_layout, make_controller
+from service.wiring.devices import mailbox_layout, make_controller
 
 HEARTBEAT_S = 0.4
 HOLDS_S = 3.0  # two changes of a heartbeat that changes once a second, and more

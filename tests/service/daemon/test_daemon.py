@@ -23,16 +23,18 @@ from service.config.config import Recipe
 from service.daemon.daemon import Daemon, Parts
 from service.daemon.lock import Lock, LockError
 from service.daemon.systemd import Notifier, Watchdog
-from service.jobs.cycle import Cycle, CycleSettings
-from service.jobs.executor import Executor
+from service.jobs.cycle import Cycle
+from service.jobs.cycle_terms import CycleSettings, Devices, Plan, Records
+from service.jobs.executor import Executor, Intake
 from service.jobs.health import Health
 from service.jobs.trigger_queue import TriggerRefused
 from service.link.link import Link, LinkSettings
-from service.link.transfer import TransferCounter, TransferSettings
+from service.link.transfer_terms import TransferCounter, TransferSettings
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Journal, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
 from service.state import State, StateMachine
-from tests.support.service.cycle_rig import Plan
+from tests.support.service.cycle_rig import FixedMeasurer
 from tests.support.service.scripted_controller import ScriptedController
 
 QUICK = TransferSettings(ready_timeout_s=0.3, ack_timeout_s=0.2, max_repeats=2, poll_period_s=0.01)
@@ -53,17 +55,12 @@ class Built:
         pool = ThreadPoolExecutor(1)
         settings = CycleSettings(transfer=QUICK, camera_timeout_s=0.3)
         cycle = Cycle(
-            self.camera,
-            Plan(),  # type: ignore[arg-type]
-            {1: Recipe(number=1, name="one")},
-            journal,
-            health,
-            link,
-            TransferCounter(50),
+            Devices(self.camera, pool, link, TransferCounter(50)),
+            Records(journal, health),
+            Plan(FixedMeasurer(), {1: Recipe(number=1, name="one")}),  # type: ignore[arg-type]
             settings,
-            pool,
         )
-        executor = Executor(journal, cycle, health, link, controller_triggers=True)
+        executor = Executor(journal, cycle, health, link, Intake(controller=True))
         self.parts = Parts(self.camera, journal, health, executor, link, pool, Lock(folder / "lock"))
         self.daemon = Daemon(self.parts)
 

@@ -12,7 +12,7 @@ import pytest
 
 from drivers.controller.mailbox.mailbox import Answer, Page, ServiceBlock
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Terms, TriggerStamp
+from service.records.job import Job, Progress, Terms, TriggerStamp
 from tests.support.service.cycle_rig import QUICK, SETTINGS, Rig, rig
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.transferring import page
@@ -44,7 +44,7 @@ async def test_what_was_known_of_a_job_before_the_restart_stays_its_own(tmp_path
     report, figures, terms = {"vertices": 4, "area_mm2": 5000.0}, {"pages": 1}, Terms({"number": 1}, "sha256:aa")
     async with rig(tmp_path) as built:
         prepare = built.journal.store_pages
-        job = await resumed(built, lambda job_id: prepare(job_id, 9, (page(job_id),), terms, report, figures))
+        job = await resumed(built, lambda job_id: prepare(job_id, 9, (page(job_id),), Progress(terms, report, figures)))
         assert job.outcome is Outcome.ACCEPTED
         assert (job.report, job.transfer, job.terms) == (report, figures, terms)
         assert [(kept.job, kept.frame) for kept in built.keeper.kept] == [(job, None)], "the archive has the rest"

@@ -14,12 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller.mailbox.mailbox import LinkBlock, ServiceBlock
-from service.jobs.executor import ROOM, Executor, missed_between
+from service.jobs.executor import ROOM, Executor, Intake, missed_between
 from service.jobs.health import Fault, Health
 from service.jobs.trigger_queue import TriggerRefused
 from service.link.link import Link, LinkSettings
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Journal, JournalError, TriggerStamp
+from service.records.job import Job, Progress, TriggerStamp
+from service.records.journal import Journal, JournalError
 from service.state import State, StateMachine
 from tests.support.service.waiting import until
 
@@ -40,7 +41,7 @@ class HeldRunner:
     async def run(self, job: Job) -> Job:
         self.begun.append(job.job_id)
         await self.go.wait()
-        return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"vertices": 4})
+        return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, Progress(report={"vertices": 4}))
 
     def hindrance(self, job: Job) -> str | None:
         return self.hindered
@@ -67,9 +68,8 @@ class Bench:
         self.runner = HeldRunner(self.journal)
         self.link = Link(DeafController(), LinkSettings(observe=observe), now=lambda: 0.0)  # type: ignore[arg-type]
         self.settled: list[Job] = []
-        self.executor = Executor(
-            self.journal, self.runner, self.health, self.link, controller_triggers=True, on_settled=self._note
-        )
+        self.executor = Executor(self.journal, self.runner, self.health, self.link, Intake(controller=True))
+        self.executor.on_settled.append(self._note)
 
     def _note(self, job: Job) -> None:
         self.settled.append(job)
@@ -325,7 +325,7 @@ async def test_an_open_trigger_of_the_controller_goes_before_a_trigger_of_ours(t
 async def test_no_trigger_is_taken_before_the_journal_has_told_what_is_in_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.jobs.executor.JOURNAL_PAUSE_S", 0.02)
+    monkeypatch.setattr("service.records.durable_journal.PAUSE_S", 0.02)
     bench = Bench(tmp_path)
     unsettled, failures = bench.journal.unsettled, [JournalError("disk I/O error")] * 2
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from drivers.controller.mailbox.mailbox import Answer, LinkBlock, ServiceBlock
 from service.link.link import Link, LinkListener
 from service.link.ownership import ForeignOwner, Ownership
-from service.link.transfer import Settlement, TransferSettings, Validity
+from service.link.transfer_terms import Settlement, TransferSettings, Validity
 from service.reasons import Outcome, Reason
 from tests.service.link.test_link import QUICK, linked
 from tests.support.service.scripted_controller import ScriptedController

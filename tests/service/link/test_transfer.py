@@ -10,7 +10,7 @@ import pytest
 
 from drivers.controller.mailbox.mailbox import Answer, LinkBlock, Page, ServiceBlock, withdrawal
 from service.link.reading import READS_FOR_TWO_ALIKE
-from service.link.transfer import Settlement, TransferCounter, TransferSettings
+from service.link.transfer_terms import Settlement, TransferCounter, TransferSettings
 from service.reasons import Outcome, Reason
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.transferring import JOB, QUICK, SESSION, page, transferring

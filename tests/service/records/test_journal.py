@@ -12,7 +12,8 @@ import pytest
 
 from drivers.controller.mailbox.mailbox import Page
 from service.reasons import Outcome, Reason
-from service.records.journal import Journal, JournalConflict, JournalError, JournalFull, Terms, TriggerStamp
+from service.records.job import Progress, Terms, TriggerStamp
+from service.records.journal import Journal, JournalConflict, JournalError, JournalFull
 from service.records.journal_reader import reading
 
 PAGE = Page(tuple(range(31)), (1, 2, 3, 4, 0xFFFF, 0))
@@ -39,7 +40,9 @@ def test_a_job_ends_whatever_characters_its_detail_holds(journal: Journal) -> No
 def test_a_taken_job_is_unsettled_until_it_is_settled(journal: Journal) -> None:
     job = journal.take(TriggerStamp("serial", recipe=3))
     assert [found.job_id for found in journal.unsettled()] == [job.job_id]
-    settled = journal.settle(job.job_id, Outcome.REFUSED, Reason.NO_BLOCK_FOUND, "empty", {"total_ms": 1.5})
+    settled = journal.settle(
+        job.job_id, Outcome.REFUSED, Reason.NO_BLOCK_FOUND, "empty", Progress(report={"total_ms": 1.5})
+    )
     assert (settled.outcome, settled.reason, settled.detail) == (Outcome.REFUSED, Reason.NO_BLOCK_FOUND, "empty")
     assert settled.report == {"total_ms": 1.5}
     assert journal.unsettled() == ()
@@ -97,7 +100,8 @@ def test_a_killed_process_leaves_its_taken_job_behind(tmp_path: Path) -> None:
     code = f"""
         import os
         from pathlib import Path
-        from service.records.journal import Journal, TriggerStamp
+        from service.records.job import TriggerStamp
+        from service.records.journal import Journal
         job = Journal(Path({str(path)!r})).take(TriggerStamp("serial", recipe=4))
         print(job.job_id, flush=True)
         os.kill(os.getpid(), 9)
@@ -166,7 +170,7 @@ def test_a_full_disk_is_called_so_and_the_journal_works_again_once_there_is_room
     def fill() -> None:
         while True:
             job = journal.take(TriggerStamp("serial"))
-            journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"x": "y" * 500})
+            journal.settle(job.job_id, Outcome.ACCEPTED, None, None, Progress(report={"x": "y" * 500}))
 
     with pytest.raises(JournalFull, match="disk is full"):
         fill()
@@ -253,7 +257,7 @@ def test_a_journal_of_version_1_opens_with_all_it_held_and_goes_on(tmp_path: Pat
     assert (journal.owner, journal.last_controller_trigger()) == (4711, (9, 7))
     assert journal.take(TriggerStamp("serial")).job_id == 7
     terms = Terms({"number": 1}, "sha256:00")
-    assert journal.settle(7, Outcome.ACCEPTED, None, None, {}, terms).terms == terms
+    assert journal.settle(7, Outcome.ACCEPTED, None, None, Progress(terms)).terms == terms
     journal.close()
     again = Journal(tmp_path / "journal.sqlite")
     assert again.last_taken() is not None
@@ -299,15 +303,15 @@ def test_a_job_keeps_the_whole_settings_it_was_carried_out_with_once_for_all_job
     terms = [Terms({"number": 1, "tolerance_mm": value}, "sha256:aa") for value in (0.1, 0.1, 0.2)]
     for one in terms:
         job = journal.take(TriggerStamp("serial"))
-        journal.store_pages(job.job_id, 9, (PAGE,), one)
-        settled = journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {}, one, {"pages": 1})
+        journal.store_pages(job.job_id, 9, (PAGE,), Progress(one))
+        settled = journal.settle(job.job_id, Outcome.ACCEPTED, None, None, Progress(one, transfer={"pages": 1}))
         assert (settled.terms, settled.transfer) == (one, {"pages": 1})
     assert journal._one("SELECT COUNT(*) FROM recipe_settings")[0] == 2
 
 
 def test_a_job_that_a_restart_found_in_flight_knows_its_settings(journal: Journal) -> None:
     job = journal.take(TriggerStamp("serial"))
-    journal.store_pages(job.job_id, 9, (PAGE,), Terms({"number": 3}))
+    journal.store_pages(job.job_id, 9, (PAGE,), Progress(Terms({"number": 3})))
     assert journal.unsettled()[0].terms == Terms({"number": 3})
     assert journal.settle(job.job_id, Outcome.FAILED, Reason.SERVICE_RESTARTED, "").terms == Terms({"number": 3})
 

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from drivers.controller.mailbox.mailbox import Page
 from service.reasons import Outcome
-from service.records.journal import Journal, JournalDamaged, JournalError, TriggerStamp
+from service.records.job import Progress, TriggerStamp
+from service.records.journal import Journal, JournalDamaged, JournalError
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 from service.records.journal_recovery import _move_aside, highest_archived, highest_job, open_journal, set_aside
 
@@ -25,8 +26,9 @@ UNIX_S = 1_795_000_000
 def filled(path: Path, jobs: int) -> None:
     """A journal of `jobs` settled jobs, then one of the controller's in flight, closed as after a clean stop."""
     journal = Journal(path)
+    long = Progress(report={"text": "x" * 300})
     for _ in range(jobs):
-        journal.settle(journal.take(TriggerStamp("serial")).job_id, Outcome.ACCEPTED, None, None, {"text": "x" * 300})
+        journal.settle(journal.take(TriggerStamp("serial")).job_id, Outcome.ACCEPTED, None, None, long)
     job = journal.take(TriggerStamp("controller", session=9, counter=5))
     journal.store_pages(job.job_id, 9, (PAGE,))
     journal.close()

@@ -12,12 +12,12 @@ import pytest
 from drivers.controller.modbus.requests import READ_REGISTERS
 from drivers.controller.simulated.controller import SimulatedController
 from drivers.controller.simulated.program import Pace
-from service import wiring
 from service.jobs.executor import ROOM
 from service.reasons import Outcome
-from service.records.journal import TriggerStamp
+from service.records.job import TriggerStamp
 from service.state import State
-from service.wiring import WiringError
+from service.wiring.bounds import target
+from service.wiring.errors import WiringError
 from tests.support.controller.fault_proxy import Fate, FaultProxy
 from tests.support.processes.wired_daemon import WiredDaemon, wired
 from tests.support.service.waiting import until
@@ -201,7 +201,7 @@ async def test_an_observer_settles_no_job_in_flight_and_says_what_to_put_back(tm
         async with wired(tmp_path, tcp(controller.port)) as one:
             await one.ready()
             job = one.parts.journal.take(TriggerStamp("serial"))
-            one.parts.journal.store_pages(job.job_id, 9, (), target=wiring._target(one.config))
+            one.parts.journal.store_pages(job.job_id, 9, (), target=target(one.config))
         async with wired(tmp_path, tcp(controller.port, mode="observe")) as observer:
             await until(lambda: "Put back controller.mode: send" in observer.reason)
             assert observer.parts.health.state is State.ERROR

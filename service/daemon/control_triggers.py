@@ -13,7 +13,8 @@ from service.jobs.trigger_lines import LARGEST_RECIPE, UNKNOWN_RECIPE, ack, nak,
 from service.jobs.trigger_queue import Queued, TriggerRefused
 from service.jobs.triggers import result_line
 from service.records.job import Job, TriggerStamp
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.control")
 

@@ -33,7 +33,8 @@ from service.poll_timing import until_beat
 from service.reasons import Reason
 from service.records.archive_writer import ArchiveWriter
 from service.records.job import Job, TriggerStamp
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 from service.state import State
 
 log = logging.getLogger("combtrace.daemon")

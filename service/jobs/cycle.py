@@ -26,7 +26,7 @@ from service.measuring.measure import Measurement, Measurer
 from service.reasons import Outcome, Reason
 from service.records.durable_journal import DurableJournal
 from service.records.job import Job, Terms
-from service.records.journal import JournalError
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.cycle")
 

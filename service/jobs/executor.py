@@ -19,7 +19,9 @@ from service.link.link import Link, LinkListener
 from service.reasons import Reason
 from service.records.durable_journal import DurableJournal
 from service.records.job import Job, TriggerStamp
-from service.records.journal import GoneOn, Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
+from service.records.journal_restart import GoneOn
 from service.state import State
 
 log = logging.getLogger("combtrace.jobs")

@@ -28,7 +28,8 @@ from service.jobs.trigger_queue import Queued, Ticket, TriggerRefused
 from service.reasons import Outcome, Reason
 from service.records.durable_journal import DurableJournal
 from service.records.job import Job, TriggerStamp
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.triggers")
 

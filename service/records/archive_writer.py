@@ -39,7 +39,7 @@ from service.records.evidence import (
     table_digest,
 )
 from service.records.job import Job
-from service.records.journal import JournalError
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.archive")
 

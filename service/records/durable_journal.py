@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import ParamSpec, TypeVar
 
-from service.records.journal import JournalError
+from service.records.journal_file import JournalError
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -16,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
+from service.link.job_numbers import LARGEST_JOB
 from service.reasons import Language, Reason
 from service.records.archived_job import EvidenceError, load_archived
 from service.records.evidence import FRAME, Evidence, job_fields
@@ -35,8 +36,6 @@ M = TypeVar("M", bound=BaseModel)
 Endpoint = Callable[[Request], Awaitable[Response]]
 
 log = logging.getLogger("combtrace.page")
-
-LARGEST_JOB = 0xFFFFFFFF
 
 
 class Api:

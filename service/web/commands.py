@@ -10,7 +10,8 @@ from typing import TypeVar
 from service.daemon.control import CommandRefused
 from service.jobs.trigger_queue import TriggerRefused
 from service.reasons import Reason
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 from service.web.daemon_access import DaemonSilent, Window
 from service.web.tokens import (
     COMMANDS,

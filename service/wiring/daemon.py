@@ -32,7 +32,8 @@ from service.measuring.measure import Measurer
 from service.records.archive import Archive, ArchiveLimits
 from service.records.archive_writer import ArchiveWriter
 from service.records.evidence import KeepsNothing
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 from service.state import State, StateMachine
 from service.wiring.bounds import cycle_settings
 from service.wiring.devices import controller_names, make_camera, make_controller

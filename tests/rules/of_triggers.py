@@ -14,6 +14,7 @@ from tests.rules.rule import (
     IN_RESUMING,
     IN_TRANSFER,
     JOURNAL,
+    RESTART,
     TRANSFER,
     TRIGGERS,
     Rule,
@@ -96,8 +97,8 @@ RULES = (
         "Trigger 3: journalled durably before it is acknowledged",
         f"{JOURNAL}::Journal.take",
         f"{IN_EXECUTOR}::test_a_trigger_becomes_a_durable_job_before_the_ticket_is_handed_out",
-        "with self._transaction() as db:\n            highest",
-        "self._db.execute('BEGIN')\n        for db in (self._db,):\n            highest",
+        "with self._file.transaction() as db:\n            highest",
+        "self._file.db.execute('BEGIN')\n        for db in (self._file.db,):\n            highest",
     ),
     Rule(
         "Trigger 3: then job_id, trigger_ack and session_ack are written",
@@ -136,7 +137,7 @@ RULES = (
     ),
     Rule(
         "Always: a lost journal repeats no trigger: the service block says which was taken",
-        f"{JOURNAL}::Journal.go_on_above",
+        f"{RESTART}::go_on_above",
         f"{IN_EXECUTOR}::test_a_trigger_that_a_lost_journal_held_is_not_taken_again",
         "if later:",
         "if False:",

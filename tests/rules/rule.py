@@ -13,8 +13,9 @@ TRANSFER, LINK, EXECUTOR, CYCLE = (
     "service/jobs/executor.py",
     "service/jobs/cycle.py",
 )
-JOURNAL, OWNERSHIP, CLOCK = (
+JOURNAL, RESTART, OWNERSHIP, CLOCK = (
     "service/records/journal.py",
+    "service/records/journal_restart.py",
     "service/link/ownership.py",
     "service/link/controller_clock.py",
 )

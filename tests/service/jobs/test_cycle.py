@@ -324,12 +324,12 @@ async def test_a_journal_that_fails_during_a_job_holds_it_up_is_told_once_and_lo
     monkeypatch.setattr("service.records.durable_journal.PAUSE_S", 0.01)
     async with rig(tmp_path) as built:
         taken = built.journal.take(TriggerStamp("serial"))
-        built.journal._db.execute("PRAGMA query_only = ON")
+        built.journal._file.db.execute("PRAGMA query_only = ON")
         task = asyncio.ensure_future(built.cycle.run(taken))
         await asyncio.sleep(0.3)
         assert built.controller.count("write_page") == 0, "nothing is sent that is not durable"
         assert built.health.first().reason is Reason.INTERNAL_ERROR
-        built.journal._db.execute("PRAGMA query_only = OFF")
+        built.journal._file.db.execute("PRAGMA query_only = OFF")
         assert (await asyncio.wait_for(task, 10)).outcome is Outcome.ACCEPTED
     assert sum("journal" in record.message for record in caplog.records if record.name == "combtrace.cycle") == 1
 

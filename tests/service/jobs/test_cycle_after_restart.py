@@ -125,7 +125,7 @@ async def test_a_sent_job_whose_pages_cannot_be_read_any_more_is_withdrawn_with_
     async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
         taken = built.journal.take(TriggerStamp("serial"))
         built.journal.store_pages(taken.job_id, 9, (Page((0,) * 31, ()),))
-        built.journal._db.execute("UPDATE jobs SET pages = 'rotten' || substr(pages, 7)")
+        built.journal._file.db.execute("UPDATE jobs SET pages = 'rotten' || substr(pages, 7)")
         (job,) = built.journal.unsettled()
         settled = await asyncio.wait_for(built.cycle.resume(job), 15)
         assert (settled.outcome, settled.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
@@ -141,7 +141,7 @@ async def test_a_job_taken_longer_ago_than_it_is_valid_is_taken_back_after_a_res
         def prepare(job_id: int) -> None:
             built.journal.store_pages(job_id, 9, (page(job_id),))
             six_hours_ago = (datetime.now(UTC) - timedelta(hours=6)).isoformat(timespec="milliseconds")
-            built.journal._db.execute("UPDATE jobs SET taken_at = ?", (six_hours_ago,))
+            built.journal._file.db.execute("UPDATE jobs SET taken_at = ?", (six_hours_ago,))
 
         job = await resumed(built, prepare)
         assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.EXPIRED)

@@ -20,7 +20,8 @@ from service.jobs.trigger_queue import TriggerRefused
 from service.link.link import Link, LinkSettings
 from service.reasons import Outcome, Reason
 from service.records.job import Job, Progress, TriggerStamp
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 from service.state import State, StateMachine
 from tests.support.service.waiting import until
 
@@ -265,7 +266,7 @@ async def test_a_job_id_is_above_the_controllers_last_job(tmp_path: Path) -> Non
 
 async def test_a_journal_that_cannot_be_written_acknowledges_nothing(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
-        bench.journal._db.execute("PRAGMA query_only = ON")
+        bench.journal._file.db.execute("PRAGMA query_only = ON")
         with pytest.raises(TriggerRefused):
             await bench.executor.submit(TriggerStamp("serial"))
         assert bench.health.state is State.ERROR
@@ -274,7 +275,7 @@ async def test_a_journal_that_cannot_be_written_acknowledges_nothing(tmp_path: P
         assert bench.link.published.trigger_ack == 0
         with pytest.raises(JournalError):
             bench.journal.probe()
-        bench.journal._db.execute("PRAGMA query_only = OFF")
+        bench.journal._file.db.execute("PRAGMA query_only = OFF")
         assert bench.journal.last_taken() is None
         bench.journal.probe()
         bench.health.report("journal", None)

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from drivers.controller.mailbox.mailbox import Page
 from service.reasons import Outcome
 from service.records.job import Progress, TriggerStamp
-from service.records.journal import Journal, JournalDamaged, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalDamaged, JournalError
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 from service.records.journal_recovery import _move_aside, highest_archived, highest_job, open_journal, set_aside
 

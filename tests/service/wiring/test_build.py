@@ -11,7 +11,7 @@ import pytest
 
 from service.config.config import Config
 from service.records.archive_writer import ArchiveWriter
-from service.records.journal import JournalError
+from service.records.journal_file import JournalError
 from service.wiring import daemon as wiring
 from service.wiring import triggers
 from service.wiring.daemon import build, opening_of

@@ -73,8 +73,8 @@ class ControlTriggers:
 
 
 def _ended(job: Job) -> dict[str, Any]:
-    told = {"line": result_line(job), "job": job.job_id}
-    return told if job.reason is None else {**told, "why": job.detail}
+    answer = {"line": result_line(job), "job": job.job_id}
+    return answer if job.reason is None else {**answer, "why": job.detail}
 
 
 def _number(request: Mapping[str, Any], name: str) -> int:

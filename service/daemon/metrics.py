@@ -67,7 +67,7 @@ class Metrics:
         text = "Time of a stage, or of the whole job"
         self._stages = Histogram("combtrace_stage_seconds", text, ("stage",), buckets=BUCKETS, registry=self.registry)
         self._ended_at = self._gauge("combtrace_job_last_ended_timestamp_seconds", "Unix time of the last job's end")
-        self._picture = {name: self._gauge(*told) for name, told in PICTURE.items()}
+        self._picture = {name: self._gauge(*described) for name, described in PICTURE.items()}
         self._uncertainty = self._gauge(*UNCERTAINTY)
         self.registry.register(_Moment(sources))
         ProcessCollector(registry=self.registry)

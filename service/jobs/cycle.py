@@ -87,29 +87,29 @@ class Cycle:
 
     async def run(self, job: Job) -> Job:
         """The job, settled."""
-        course = JobInProgress(job, self._plan)
+        ongoing = JobInProgress(job, self._plan)
         started = self._now()
         try:
-            settlement = await self._carry_out(course)
+            settlement = await self._carry_out(ongoing)
         except _Stop as stop:
             settlement = stop.settlement
         except asyncio.CancelledError:
-            self._abort(course)
+            self._abort(ongoing)
             raise
         except Exception as error:  # the one owner of defects: a job that was taken always ends
             log.exception("job %d: internal error", job.job_id)
             settlement = await self._end_defect(job, error)
         self._health.report("in-flight", None)  # the controller has decided, however long it took
-        course.report["total_ms"] = self._since(started)
-        return await self._settle(job, settlement, course)
+        ongoing.report["total_ms"] = self._since(started)
+        return await self._settle(job, settlement, ongoing)
 
     async def resume(self, job: Job) -> Job:
         """A job that a restart found in flight, settled: sent again bit-identical, or withdrawn (154)."""
-        course = JobInProgress(job, self._plan, job.report, transfer=job.transfer)  # what is known of it stays its own
+        ongoing = JobInProgress(job, self._plan, job.report, transfer=job.transfer)  # what is known of it stays its own
         handshake = self._settings.transfer.handshake
         if not job.sent or self._link is None or not handshake:
             detail = "nothing of it was sent" if not job.sent else "whether it was taken cannot be known"
-            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), course)
+            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), ongoing)
         assert job.session is not None
         validity = self._validity(job.pages)
         lasts_s = validity.valid_for / 1000 or self._settings.lifetime_s
@@ -124,7 +124,7 @@ class Cycle:
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
         else:
             settlement = await transfer.run()
-        return await self._settle(job, settlement, course)
+        return await self._settle(job, settlement, ongoing)
 
     def hindrance(self, job: Job) -> str | None:
         """Why a job found in flight cannot be settled as the service is configured now; None where it can."""
@@ -142,46 +142,49 @@ class Cycle:
 
     # --- the steps ----------------------------------------------------------------------------------------------
 
-    async def _carry_out(self, course: JobInProgress) -> Settlement:
-        job = course.job
-        recipe = course.recipe = _recipe(job, course.plan)
-        course.thickness_mm = job.trigger.thickness_um / 1000 if job.trigger.thickness_um else recipe.thickness_mm
-        course.terms = Terms(recipe.model_dump(mode="json"), course.plan.measurer.calibration_digest)
+    async def _carry_out(self, ongoing: JobInProgress) -> Settlement:
+        job = ongoing.job
+        recipe = ongoing.recipe = _recipe(job, ongoing.plan)
+        given_mm = job.trigger.thickness_um / 1000
+        thickness_mm = ongoing.thickness_mm = given_mm or recipe.thickness_mm
+        ongoing.terms = Terms(recipe.model_dump(mode="json"), ongoing.plan.measurer.calibration_digest)
         stamp = await self._stamp(job)
         stamped_at = self._now()
-        frame = course.frame = await self._frame(course.report)
+        frame = ongoing.frame = await self._frame(ongoing.report)
         self._beat()
-        measurement = course.measurement = await self._measure(course.plan.measurer, frame, recipe, course.thickness_mm)
+        measurement = ongoing.measurement = await self._measure(
+            ongoing.plan.measurer, frame, recipe, ongoing.thickness_mm
+        )
         self._beat()
-        course.report.update(measurement.summary())
+        ongoing.report.update(measurement.summary())
         self._observe(Observation(job, frame, measurement))
         if measurement.reasons:
             raise _Stop(measurement.reasons[0], "; ".join(measurement.texts))
         if self._link is None:
             return Settlement(Outcome.WRITTEN, None, "no controller is configured")
         before = self._now()
-        pages = await self._make_pages(course, stamp, frame, measurement)
-        course.report["pages_ms"] = self._since(before)
+        pages = await self._make_pages(ongoing, stamp, frame, measurement)
+        ongoing.report["pages_ms"] = self._since(before)
         if self._settings.observe:
             return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
         lifetime = self._lifetime(job, self._settings.lifetime_s, stamped_at)
-        return await self._send(self._link, course, stamp, lifetime)
+        return await self._send(self._link, ongoing, stamp, lifetime)
 
-    async def _send(self, link: Link, course: JobInProgress, stamp: Stamp, lifetime: Lifetime) -> Settlement:
+    async def _send(self, link: Link, ongoing: JobInProgress, stamp: Stamp, lifetime: Lifetime) -> Settlement:
         """Bring the pages to the controller, all that is known of the job being durable before anything is sent."""
-        job, pages, target = course.job, course.pages, self._settings.target
-        course.transfer = _figures(stamp, pages)
-        drafted = self._keeper.draft(course.evidence(job))
+        job, pages, target = ongoing.job, ongoing.pages, self._settings.target
+        ongoing.transfer = _figures(stamp, pages)
+        drafted = self._keeper.draft(ongoing.evidence(job))
 
         async def before_sending() -> None:
             await self._drafted(job, drafted)  # first: with its pages in the journal a restart would send it
-            known = stamp.session, pages, course.progress
+            known = stamp.session, pages, ongoing.progress
             await self._durable.until_done(self._journal.store_pages, job.job_id, *known, target=target)
 
         transfer = self._transfer(link, job, stamp.session, pages, lifetime, before_sending=before_sending)
         before = self._now()
         settlement = await transfer.run()
-        course.report["transfer_ms"] = self._since(before)
+        ongoing.report["transfer_ms"] = self._since(before)
         return settlement
 
     async def _drafted(self, job: Job, drafted: Future[None] | None) -> None:
@@ -198,18 +201,18 @@ class Cycle:
         return round((self._now() - started) * 1000, 1)
 
     async def _make_pages(
-        self, course: JobInProgress, stamp: Stamp, frame: Frame, measurement: Measurement
+        self, ongoing: JobInProgress, stamp: Stamp, frame: Frame, measurement: Measurement
     ) -> tuple[Page, ...]:
-        assert course.recipe is not None
-        course.envelope = self._envelope(course.job, course.recipe, stamp, frame)
+        assert ongoing.recipe is not None
+        ongoing.envelope = self._envelope(ongoing.job, ongoing.recipe, stamp, frame)
         try:
             loop = asyncio.get_running_loop()  # in the pool: a large contour would hold the heartbeat up
-            course.pages = await loop.run_in_executor(self._pool, self._pages, measurement, course.envelope)
+            ongoing.pages = await loop.run_in_executor(self._pool, self._pages, measurement, ongoing.envelope)
         except ContourTooLarge as error:
             raise _Stop(Reason.TOO_MANY_POINTS, str(error)) from error
         except MailboxError as error:  # what passed the checks in float64 degenerates in whole micrometres
             raise _Stop(Reason.SELF_INTERSECTING, str(error)) from error
-        return course.pages
+        return ongoing.pages
 
     async def _stamp(self, job: Job) -> Stamp:
         """Session and clock of the controller, read before the exposure."""
@@ -329,16 +332,16 @@ class Cycle:
 
     # --- the end ------------------------------------------------------------------------------------------------
 
-    async def _settle(self, job: Job, settlement: Settlement, course: JobInProgress) -> Job:
+    async def _settle(self, job: Job, settlement: Settlement, ongoing: JobInProgress) -> Job:
         settled = await self._durable.until_done(
             self._journal.settle,
             job.job_id,
             settlement.outcome,
             settlement.reason,
             settlement.detail,
-            course.progress,
+            ongoing.progress,
         )
-        self._keeper.keep(course.evidence(settled))
+        self._keeper.keep(ongoing.evidence(settled))
         return settled
 
     def _journal_fails(self, error: JournalError, again: bool) -> None:
@@ -346,15 +349,15 @@ class Cycle:
         if not again:
             log.error("journal: %s", error)
 
-    def _abort(self, course: JobInProgress) -> None:
+    def _abort(self, ongoing: JobInProgress) -> None:
         """At shutdown: a job of which nothing was sent ends here, one that was sent is settled by the next start."""
-        job = course.job
+        job = ongoing.job
         try:
             known = self._journal.find(job.job_id)
             if known is not None and known.outcome is None and not known.sent:
                 end = Outcome.FAILED, Reason.ABORTED, "the service was stopped"
-                settled = self._journal.settle(job.job_id, *end, course.progress)
-                self._keeper.keep(course.evidence(settled))
+                settled = self._journal.settle(job.job_id, *end, ongoing.progress)
+                self._keeper.keep(ongoing.evidence(settled))
                 log.warning("job %d failed: %d aborted", job.job_id, Reason.ABORTED)
                 return
         except JournalError as error:

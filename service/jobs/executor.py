@@ -91,7 +91,7 @@ class Executor(LinkListener):
         self._submitted: Ticket | None = None
         self._taking = False
         self._missed = 0
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
         self.settled_job = 0
         self.last_settled: Job | None = None
         self._last_pair = journal.last_controller_trigger()
@@ -163,13 +163,13 @@ class Executor(LinkListener):
             log.log(level, "%s: job %d, which had not ended, is taken back", whose, gone_on.in_flight)
 
     def _journal_fails(self, error: JournalError, _again: bool) -> None:
-        self._tell(f"journal: {error}")
+        self._log_once(f"journal: {error}")
         self._health.report("journal", journal_fault(error))
         if self._link is not None:
             self._link.beat()  # its task waits here, and is alive
 
     def _jobs_in_flight_unknown(self, error: JournalError, _again: bool) -> None:
-        self._tell(f"journal: {error}")
+        self._log_once(f"journal: {error}")
         self._health.report("in-flight", journal_fault(error))
 
     @property
@@ -237,12 +237,12 @@ class Executor(LinkListener):
     def _refused(self, trigger: TriggerStamp, refused: TriggerRefused) -> None:
         self.counts[trigger.kind, refused.reason.label] += 1
         self._count_missed(1)
-        self._tell(f"trigger {trigger.kind} not taken: {refused.reason.label}: {refused}")
+        self._log_once(f"trigger {trigger.kind} not taken: {refused.reason.label}: {refused}")
 
-    def _tell(self, refusal: str) -> None:
+    def _log_once(self, refusal: str) -> None:
         """Log a refusal, once until a trigger is taken: at intervals it would come back all night."""
-        log.log(logging.DEBUG if refusal in self._told else logging.WARNING, refusal)
-        self._told.add(refusal)
+        log.log(logging.DEBUG if refusal in self._logged else logging.WARNING, refusal)
+        self._logged.add(refusal)
 
     def _check_free(self) -> None:
         if self._health.job is not None or self._submitted is not None or self._taking:
@@ -279,7 +279,7 @@ class Executor(LinkListener):
             raise TriggerRefused(fault.reason, fault.text) from error
         self._health.report("journal", None)
         self._numbered_above_last_job = True
-        self._told.clear()
+        self._logged.clear()
         self.counts[trigger.kind, "taken"] += 1
         log.debug("job %d taken: trigger %s, recipe %s", job.job_id, trigger.kind, trigger.recipe or "default")
         if self._link is not None:
@@ -421,7 +421,7 @@ class Executor(LinkListener):
         try:
             job = await self._take(trigger)
         except TriggerRefused as refused:  # it stays pending, and is taken once the journal works again
-            self._tell(f"trigger controller not taken yet: {refused.reason.label}: {refused}")
+            self._log_once(f"trigger controller not taken yet: {refused.reason.label}: {refused}")
             return
         finally:
             self._taking = False

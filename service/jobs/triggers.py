@@ -208,7 +208,7 @@ class SerialTrigger:
             await self._cross_off([job.job_id])
 
     async def _cross_off(self, job_ids: list[int]) -> None:
-        await self._durable.until_done(self._journal.told, job_ids)
+        await self._durable.until_done(self._journal.cross_off, job_ids)
         self._acknowledged.difference_update(job_ids)
 
     def _journal_fails(self, error: JournalError, again: bool) -> None:

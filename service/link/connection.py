@@ -31,7 +31,7 @@ class Connection:
         self.trouble: str | None = "not connected yet"
         self._served = False
         self._lost_at: float | None = None
-        self._told_at = 0.0
+        self._reminded_at = 0.0
         self._failing = ""
 
     def fault(self) -> str | None:
@@ -72,14 +72,14 @@ class Connection:
         """Note why; one line of log from one success to the next, and one a minute, however often it is tried."""
         now = self._now()
         attempt = "request" if self._up.is_set() else "connection"
-        if attempt != self._failing or self._lost_at is None or now - self._told_at >= REMINDER_S:
+        if attempt != self._failing or self._lost_at is None or now - self._reminded_at >= REMINDER_S:
             # Else the reason stays: two ways in which nobody answers would take turns in log and state all night.
             self._failing, self.trouble = attempt, str(error)
         if self._lost_at is None:
-            self._lost_at = self._told_at = now
+            self._lost_at = self._reminded_at = now
             log.warning("link: the controller cannot be reached; it is tried again by itself: %s", error)
-        elif now - self._told_at >= REMINDER_S:
-            self._told_at = now
+        elif now - self._reminded_at >= REMINDER_S:
+            self._reminded_at = now
             log.warning("link: still not reached after %.0f s: %s", now - self._lost_at, error)
         else:
             log.debug("link: %s", error)

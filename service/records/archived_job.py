@@ -228,8 +228,8 @@ def recipe_with(archived: ArchivedJob, changes: dict[str, Any]) -> Recipe:
     try:
         return Recipe.model_validate(settings)
     except ValidationError as error:
-        told = "; ".join(f"recipe.{line}" for line in describe(error, Recipe))
-        raise EvidenceError(f"job {archived.job_id}: {told}") from error
+        mistakes = "; ".join(f"recipe.{line}" for line in describe(error, Recipe))
+        raise EvidenceError(f"job {archived.job_id}: {mistakes}") from error
 
 
 def _sha256(pixels: NDArray[np.uint8]) -> str:

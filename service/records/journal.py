@@ -225,7 +225,7 @@ class Journal:
         """Jobs that have ended, and whose end this line has not been told, oldest first."""
         return self._jobs("WHERE owed = 1 AND line = ? AND outcome IS NOT NULL ORDER BY job_id", (line,))
 
-    def told(self, job_ids: Iterable[int]) -> None:
+    def cross_off(self, job_ids: Iterable[int]) -> None:
         """Make durable that the ends of these jobs are owed to their line no more."""
         with self._file.transaction() as db:
             db.executemany("UPDATE jobs SET owed = 0 WHERE job_id = ?", [(job_id,) for job_id in job_ids])

@@ -103,7 +103,7 @@ def replay(archived: ArchivedJob, settings: Settings) -> Replayed:
     registers = sum(len(page.header) + len(page.payload) for page in archived.pages)
     taken_at = archived.document["job"]["taken_at"]
     return Replayed(
-        archived.job_id, taken_at, were, reasons, seen.texts, tuple(changes), registers, _told(known), _told(now)
+        archived.job_id, taken_at, were, reasons, seen.texts, tuple(changes), registers, _shown(known), _shown(now)
     )
 
 
@@ -144,7 +144,7 @@ def _fields(known: dict[str, Any], now: dict[str, Any]) -> Iterator[Change]:
             yield Change(name, known[name], now[name])
 
 
-def _told(fields: dict[str, Any]) -> dict[str, Any]:
+def _shown(fields: dict[str, Any]) -> dict[str, Any]:
     return {name: fields[name] for name in COMPARED}
 
 

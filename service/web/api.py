@@ -22,9 +22,9 @@ from service.records.archived_job import EvidenceError, load_archived
 from service.records.evidence import FRAME, Evidence, job_fields
 from service.records.job import Job
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
-from service.web import models as answers
-from service.web.commands import Orders, Refusal
-from service.web.daemon_access import DaemonSilent, Window
+from service.web import models
+from service.web.commands import Commands, RequestRefused
+from service.web.daemon_access import DaemonAccess, DaemonSilent
 from service.web.drawing import drawing
 from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept, tag_of
 from service.web.guard import BodyTooLarge, plain_address
@@ -41,23 +41,23 @@ log = logging.getLogger("combtrace.page")
 class Api:
     """The endpoints."""
 
-    def __init__(self, window: Window, orders: Orders, version: str) -> None:
-        self._window = window
-        self._orders = orders
-        self._archive = window.sources.archive_path
-        self._journal = window.sources.journal_path
+    def __init__(self, daemon: DaemonAccess, commands: Commands, version: str) -> None:
+        self._daemon = daemon
+        self._commands = commands
+        self._archive = daemon.sources.archive_path
+        self._journal = daemon.sources.journal_path
         self._pictures = Pictures()
-        self.live = Live(window)
-        if window.sources.archive is not None:
-            window.sources.archive.on_stored = self._stored
+        self.live = Live(daemon)
+        if daemon.sources.archive is not None:
+            daemon.sources.archive.on_stored = self._stored
         self._document = json.dumps(document(OPERATIONS, version), ensure_ascii=False).encode()
         self._reasons = _encoded(_reasons())
 
     def close(self) -> None:
         """Let go of threads."""
         self.live.close()
-        if self._window.sources.archive is not None:
-            self._window.sources.archive.on_stored = lambda _evidence: None
+        if self._daemon.sources.archive is not None:
+            self._daemon.sources.archive.on_stored = lambda _evidence: None
         self._pictures.close()
 
     def _stored(self, evidence: Evidence) -> None:
@@ -88,15 +88,15 @@ class Api:
         }
         asking = {"/trigger": self.trigger, "/halt": self.halt, "/resume": self.resume}
         return [
-            *(Route(PREFIX + path, told(endpoint), methods=["GET"]) for path, endpoint in looking.items()),
-            *(Route(PREFIX + path, told(endpoint), methods=["POST"]) for path, endpoint in asking.items()),
+            *(Route(PREFIX + path, with_problems(endpoint), methods=["GET"]) for path, endpoint in looking.items()),
+            *(Route(PREFIX + path, with_problems(endpoint), methods=["POST"]) for path, endpoint in asking.items()),
         ]
 
     # --- looking ------------------------------------------------------------------------------------------------
 
     async def state(self, _request: Request) -> Response:
         """The service now."""
-        return _answer(answers.ServiceState.model_validate(await self._window.state()))
+        return _answer(models.ServiceState.model_validate(await self._daemon.state()))
 
     async def jobs(self, request: Request) -> Response:
         """The newest jobs."""
@@ -104,24 +104,24 @@ class Api:
         limit = _whole(request, "limit", MOST_JOBS, 24)
         return _answer(await asyncio.to_thread(self._found_jobs, wanted, limit))
 
-    def _found_jobs(self, wanted: JobFilter, limit: int | None) -> answers.Jobs:
+    def _found_jobs(self, wanted: JobFilter, limit: int | None) -> models.Jobs:
         with reading(self._journal) as journal:
             found = journal.jobs(wanted, limit)
-        return answers.Jobs(jobs=[self._told(job) for job in reversed(found)])
+        return models.Jobs(jobs=[self._job_answer(job) for job in reversed(found)])
 
     async def job(self, request: Request) -> Response:
         """One job."""
-        return _answer(await asyncio.to_thread(lambda: self._told(self._found(_job_number(request)))))
+        return _answer(await asyncio.to_thread(lambda: self._job_answer(self._found(_job_number(request)))))
 
     def _found(self, number: int) -> Job:
         with reading(self._journal) as journal:
             job = journal.find(number)
         if job is None:
-            raise Refusal(404, f"the journal has no job {number}")
+            raise RequestRefused(404, f"the journal has no job {number}")
         return job
 
-    def _told(self, job: Job) -> answers.Job:
-        return answers.Job(**job_fields(job), files=files_kept(self._archive, job))
+    def _job_answer(self, job: Job) -> models.Job:
+        return models.Job(**job_fields(job), files=files_kept(self._archive, job))
 
     async def file(self, request: Request) -> Response:
         """A file of a job's evidence, to be saved."""
@@ -134,7 +134,7 @@ class Api:
         number = _job_number(request)
         width_px = _whole(request, "width", WIDTHS_PX[-1], WIDTHS_PX[-1])
         if width_px is None or width_px not in WIDTHS_PX:
-            raise Refusal(400, f"width is {width_px}, expected one of {', '.join(map(str, WIDTHS_PX))}")
+            raise RequestRefused(400, f"width is {width_px}, expected one of {', '.join(map(str, WIDTHS_PX))}")
         path = await asyncio.to_thread(self._kept, number, FRAME)
         tag = tag_of(path)
         etag = f'"{tag}-{width_px}"'
@@ -144,16 +144,16 @@ class Api:
         try:
             picture = await self._pictures.small(path, tag, width_px)
         except NoPicture as error:
-            raise Refusal(404, f"job {number}: {error}") from error
+            raise RequestRefused(404, f"job {number}: {error}") from error
         return Response(picture, media_type="image/jpeg", headers=headers)
 
     def _kept(self, number: int, name: str) -> Path:
         try:
             path = file_of(self._archive, self._found(number), name)
         except KeyError as error:
-            raise Refusal(404, f"there are only {', '.join(FILES)}") from error
+            raise RequestRefused(404, f"there are only {', '.join(FILES)}") from error
         if path is None:
-            raise Refusal(404, f"{name} of job {number} is not kept. See archive.max_bytes")
+            raise RequestRefused(404, f"{name} of job {number} is not kept. See archive.max_bytes")
         return path
 
     async def drawing(self, request: Request) -> Response:
@@ -164,7 +164,7 @@ class Api:
     async def events(self, _request: Request) -> Response:
         """The state, as it changes."""
         if self.live.full:
-            raise Refusal(503, f"{MOST_VIEWERS} viewers watch already", again_s=PERIOD_S)
+            raise RequestRefused(503, f"{MOST_VIEWERS} viewers watch already", again_s=PERIOD_S)
         return EventStream(self.live)
 
     async def reasons(self, _request: Request) -> Response:
@@ -181,43 +181,43 @@ class Api:
         limit = _whole(request, "limit", MOST_NOTES, 100)
         return _answer(await asyncio.to_thread(self._notes, limit or 0))
 
-    def _notes(self, limit: int) -> answers.Notes:
+    def _notes(self, limit: int) -> models.Notes:
         with reading(self._journal) as journal:
-            return answers.Notes(notes=[answers.NoteEntry(**vars(note)) for note in journal.notes(limit)])
+            return models.Notes(notes=[models.NoteEntry(**vars(note)) for note in journal.notes(limit)])
 
     # --- asking -------------------------------------------------------------------------------------------------
 
     async def trigger(self, request: Request) -> Response:
         """One job."""
         who, address = await self._holder(request), _address(request)
-        asked = await _body(request, answers.TriggerRequest)
-        job = await self._orders.trigger(who, address, asked.recipe, asked.thickness_mm)
-        return _answer(answers.Triggered(job=job), 202)
+        asked = await _body(request, models.TriggerRequest)
+        job = await self._commands.trigger(who, address, asked.recipe, asked.thickness_mm)
+        return _answer(models.Triggered(job=job), 202)
 
     async def halt(self, request: Request) -> Response:
         """No trigger from now on."""
         who, address = await self._holder(request), _address(request)
-        asked = await _body(request, answers.HaltRequest)
-        return _answer(answers.StateAfter(state=await self._orders.halt(who, address, asked.reason)))
+        asked = await _body(request, models.HaltRequest)
+        return _answer(models.StateAfter(state=await self._commands.halt(who, address, asked.reason)))
 
     async def resume(self, request: Request) -> Response:
         """The end of a halt."""
         who, address = await self._holder(request), _address(request)
-        await _body(request, answers.Nothing)
-        return _answer(answers.StateAfter(state=await self._orders.resume(who, address)))
+        await _body(request, models.Nothing)
+        return _answer(models.StateAfter(state=await self._commands.resume(who, address)))
 
     async def _holder(self, request: Request) -> str:
-        return await self._orders.holder(request.headers.get("authorization"), _address(request))
+        return await self._commands.holder(request.headers.get("authorization"), _address(request))
 
 
-def told(endpoint: Endpoint) -> Endpoint:
+def with_problems(endpoint: Endpoint) -> Endpoint:
     """The endpoint, with what it refuses told as a Problem."""
 
     async def answered(request: Request) -> Response:
         try:
             return await endpoint(request)
-        except Refusal as refusal:
-            return problem(refusal.status, str(refusal), refusal.reason, refusal.again_s)
+        except RequestRefused as refused:
+            return problem(refused.status, str(refused), refused.reason, refused.again_s)
         except (DaemonSilent, JournalUnreadable) as error:
             return problem(503, str(error))
         except EvidenceError as error:
@@ -233,10 +233,10 @@ def problem(status: int, text: str, reason: Reason | None = None, again_s: float
     headers = {"www-authenticate": "Bearer"} if status == 401 else {}
     if again_s is not None:
         headers["retry-after"] = str(math.ceil(again_s))
-    told = answers.Problem(
+    body = models.Problem(
         error=text, code=None if reason is None else int(reason), name=None if reason is None else reason.label
     )
-    return _answer(told, status, headers)
+    return _answer(body, status, headers)
 
 
 def _answer(model: BaseModel, status: int = 200, headers: dict[str, str] | None = None) -> Response:
@@ -254,7 +254,7 @@ def _address(request: Request) -> str:
 def _job_number(request: Request) -> int:
     text = request.path_params["job"]
     if not (text.isascii() and text.isdecimal() and len(text) <= 10 and 0 < int(text) <= LARGEST_JOB):
-        raise Refusal(404, "a job is a number from 1 on")
+        raise RequestRefused(404, "a job is a number from 1 on")
     return int(text)
 
 
@@ -263,14 +263,14 @@ def _whole(request: Request, name: str, most: int, otherwise: int | None) -> int
     if text is None:
         return otherwise
     if not (text.isascii() and text.isdecimal() and len(text) <= 10 and 1 <= int(text) <= most):
-        raise Refusal(400, f"{name} is {text[:20]!r}, expected a whole number from 1 to {most}")
+        raise RequestRefused(400, f"{name} is {text[:20]!r}, expected a whole number from 1 to {most}")
     return int(text)
 
 
 def _truth(request: Request, name: str) -> bool:
     text = request.query_params.get(name, "false")
     if text not in ("true", "false"):
-        raise Refusal(400, f"{name} is {text[:20]!r}, expected true or false")
+        raise RequestRefused(400, f"{name} is {text[:20]!r}, expected true or false")
     return text == "true"
 
 
@@ -280,16 +280,16 @@ async def _body(request: Request, model: type[M]) -> M:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(map(str, first["loc"])) or "the body"
-        raise Refusal(422, f"{where}: {first['msg']}") from error
+        raise RequestRefused(422, f"{where}: {first['msg']}") from error
 
 
-def _reasons() -> answers.Reasons:
+def _reasons() -> models.Reasons:
     def text(reason: Reason, language: Language) -> Any:
-        told = reason.explained(language)
-        return answers.ReasonText(sentence=told.sentence, next_action=told.next_action)
+        words = reason.explained(language)
+        return models.ReasonText(sentence=words.sentence, next_action=words.next_action)
 
     entries = [
-        answers.ReasonEntry(
+        models.ReasonEntry(
             code=int(reason),
             name=reason.label,
             outcome=str(reason.outcome),
@@ -298,4 +298,4 @@ def _reasons() -> answers.Reasons:
         )
         for reason in Reason
     ]
-    return answers.Reasons(reasons=entries)
+    return models.Reasons(reasons=entries)

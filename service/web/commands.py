@@ -12,7 +12,7 @@ from service.jobs.trigger_queue import TriggerRefused
 from service.reasons import Reason
 from service.records.journal import Journal
 from service.records.journal_file import JournalError
-from service.web.daemon_access import DaemonSilent, Window
+from service.web.daemon_access import DaemonAccess, DaemonSilent
 from service.web.tokens import (
     COMMANDS,
     COMMANDS_WITHIN_S,
@@ -29,7 +29,7 @@ log = logging.getLogger("combtrace.page")
 T = TypeVar("T")
 
 
-class Refusal(Exception):
+class RequestRefused(Exception):
     """A command is not carried out: HTTP status, why, the reason where the table has one, when to try again."""
 
     def __init__(self, status: int, text: str, reason: Reason | None = None, *, again_s: float | None = None) -> None:
@@ -39,11 +39,11 @@ class Refusal(Exception):
         self.again_s = again_s
 
 
-class Orders:
-    """Checks who asks, notes it, has it done. All methods raise Refusal."""
+class Commands:
+    """Checks who asks, notes it, has it done. All methods raise RequestRefused."""
 
-    def __init__(self, window: Window, journal: Journal, tokens: TokenFile | None) -> None:
-        self._window = window
+    def __init__(self, daemon: DaemonAccess, journal: Journal, tokens: TokenFile | None) -> None:
+        self._daemon = daemon
         self._journal = journal
         self._tokens = tokens
         self._guesses = Rate(GUESSES, GUESSES_WITHIN_S)
@@ -52,29 +52,29 @@ class Orders:
     async def holder(self, authorization: str | None, address: str) -> str:
         """Who gives the command. Each wrong token counts against the address, and a right one too while it waits."""
         if self._tokens is None:
-            raise Refusal(403, "the page can only be looked at: set page.token_file")
+            raise RequestRefused(403, "the page can only be looked at: set page.token_file")
         network = network_of(address)
         wait_s = self._guesses.wait_s(network)
         if wait_s > 0:
-            raise Refusal(429, f"too many wrong tokens from {network}", again_s=wait_s)
+            raise RequestRefused(429, f"too many wrong tokens from {network}", again_s=wait_s)
         kind, _, token = (authorization or "").partition(" ")
         if kind.lower() != "bearer" or not token.strip():
-            raise Refusal(401, "a token is needed: Authorization: Bearer …")
+            raise RequestRefused(401, "a token is needed: Authorization: Bearer …")
         self._guesses.add(network)  # before it is looked at: many at once would all pass
         try:
             who = await asyncio.to_thread(self._tokens.holder, token.strip())
         except TokenFileError as error:
             self._guesses.take_back(network)
             log.warning("page: %s", error)
-            raise Refusal(503, "the service's token file cannot be used; its log says why") from error
+            raise RequestRefused(503, "the service's token file cannot be used; its log says why") from error
         if who is None:
             log.warning("page: a wrong token from %s", address)
             await self._noted(None, address, "wrong token", None)
-            raise Refusal(401, "the token is not known")
+            raise RequestRefused(401, "the token is not known")
         self._guesses.take_back(network)
         wait_s = self._commands.wait_s(who)
         if wait_s > 0:
-            raise Refusal(429, f"{COMMANDS} commands within {COMMANDS_WITHIN_S:g} s are allowed", again_s=wait_s)
+            raise RequestRefused(429, f"{COMMANDS} commands within {COMMANDS_WITHIN_S:g} s are allowed", again_s=wait_s)
         self._commands.add(who)
         return who
 
@@ -83,11 +83,11 @@ class Orders:
         detail = f"recipe {recipe or 'default'}" + (f", thickness {thickness_mm:g} mm" if thickness_mm else "")
         number = await self._noted(who, address, "trigger", detail)
         if number is None:
-            raise Refusal(503, "the journal cannot be written, so nothing is triggered", Reason.STORAGE_FULL)
+            raise RequestRefused(503, "the journal cannot be written, so nothing is triggered", Reason.STORAGE_FULL)
         log.info("page: trigger by %s from %s, %s", who, address, detail)
 
         async def do() -> tuple[int | None, str]:
-            job = await self._window.trigger(recipe, round(thickness_mm * 1000))
+            job = await self._daemon.trigger(recipe, round(thickness_mm * 1000))
             return job, "waits for its turn" if job is None else f"job {job}"
 
         return await self._done(number, do)
@@ -97,7 +97,7 @@ class Orders:
         number = await self._noted(who, address, "halt", reason or None)
 
         async def do() -> tuple[str, str]:
-            state = await self._window.halt(f"{who} from {address}", reason)
+            state = await self._daemon.halt(f"{who} from {address}", reason)
             return state, state
 
         return await self._done(number, do)
@@ -106,10 +106,10 @@ class Orders:
         """The state after it. Not done where it cannot be noted."""
         number = await self._noted(who, address, "resume", None)
         if number is None:
-            raise Refusal(503, "the journal cannot be written, so the halt stays", Reason.STORAGE_FULL)
+            raise RequestRefused(503, "the journal cannot be written, so the halt stays", Reason.STORAGE_FULL)
 
         async def do() -> tuple[str, str]:
-            state = await self._window.resume(f"{who} from {address}")
+            state = await self._daemon.resume(f"{who} from {address}")
             return state, state
 
         return await self._done(number, do)
@@ -117,17 +117,17 @@ class Orders:
     async def _done(self, number: int | None, do: Callable[[], Awaitable[tuple[T, str]]]) -> T:
         """What `do` gives; what became of it is noted, however it ends."""
         try:
-            given, told = await do()
+            given, result = await do()
         except TriggerRefused as refused:
             await self._note_result(number, f"refused: {refused.reason.label}: {refused}")
-            raise Refusal(409, str(refused), refused.reason) from refused
+            raise RequestRefused(409, str(refused), refused.reason) from refused
         except CommandRefused as refused:
             await self._note_result(number, f"refused: {refused}")
-            raise Refusal(409, str(refused)) from refused
+            raise RequestRefused(409, str(refused)) from refused
         except DaemonSilent as silent:
             await self._note_result(number, f"not known: {silent}")
-            raise Refusal(503, str(silent)) from silent
-        await self._note_result(number, told)
+            raise RequestRefused(503, str(silent)) from silent
+        await self._note_result(number, result)
         return given
 
     async def _note_result(self, number: int | None, result: str) -> None:

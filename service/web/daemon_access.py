@@ -54,7 +54,7 @@ class Sources:
     storage: StorageWatch | None = None
 
 
-class Window:
+class DaemonAccess:
     """The daemon as the page sees it; `open` is called in the daemon's loop, before anything else."""
 
     def __init__(self, sources: Sources) -> None:
@@ -88,15 +88,15 @@ class Window:
     async def _state(self) -> dict[str, Any]:
         """In the daemon's loop, so that all of it is of one moment."""
         assert self._operations is not None
-        told = await self._operations.status({}, "page")
+        status = await self._operations.status({}, "page")
         outcomes = sorted(self._outcomes.items())
         return {
-            **told,
+            **status,
             "outcomes": [
                 {"outcome": outcome, "reason": reason or None, "count": count} for (outcome, reason), count in outcomes
             ],
             "recipes": [{"number": number, "name": name} for number, name in self.sources.recipes()],
-            "camera": {"what": self.sources.camera, "up": "camera" not in told["faults"]},
+            "camera": {"what": self.sources.camera, "up": "camera" not in status["faults"]},
             "link": self._link(),
             "calibration": self._calibration(),
             "disk": self._disk(),

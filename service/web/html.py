@@ -17,7 +17,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from service.reasons import Language, Reason
-from service.web.daemon_access import DaemonSilent, Window
+from service.web.daemon_access import DaemonAccess, DaemonSilent
 
 TYPES = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml", "json": "application/json"}
 PAGE = "page.html"
@@ -38,9 +38,9 @@ KINDS = {
 class Pages:
     """The page and what it is made of, all in memory: a request names none of the file system's paths."""
 
-    def __init__(self, window: Window, language: str) -> None:
+    def __init__(self, daemon: DaemonAccess, language: str) -> None:
         """language: of visitors who have not chosen."""
-        self._window = window
+        self._daemon = daemon
         self._language = language
         folder = files("service.web") / "static"
         self._files = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != PAGE}
@@ -73,7 +73,7 @@ class Pages:
         language = _one_of(request.cookies.get("language"), LANGUAGES, self._language)
         theme = _one_of(request.cookies.get("theme"), THEMES, "auto")
         try:
-            state: dict[str, Any] | None = await self._window.state()
+            state: dict[str, Any] | None = await self._daemon.state()
         except DaemonSilent:
             state = None
         text = self._templates[language]
@@ -104,9 +104,9 @@ class Pages:
 
 
 def _why(code: int, text: str, language: str) -> str:
-    told = Reason(code).explained(Language(language))
+    words = Reason(code).explained(Language(language))
     return (
-        f"<li><strong>{html.escape(told.sentence)}</strong> {html.escape(told.next_action)}"
+        f"<li><strong>{html.escape(words.sentence)}</strong> {html.escape(words.next_action)}"
         f"<small>{html.escape(text)}</small></li>"
     )
 

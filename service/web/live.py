@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
-from service.web.daemon_access import DaemonSilent, Window
+from service.web.daemon_access import DaemonAccess, DaemonSilent
 from service.web.models import ServiceState
 
 log = logging.getLogger("combtrace.page")
@@ -24,8 +24,8 @@ STALLED_S = 10.0  # a viewer who does not read that long is let go
 class Live:
     """Looks while somebody watches. All in the page's loop, but for `close`."""
 
-    def __init__(self, window: Window, *, period_s: float = PERIOD_S) -> None:
-        self._window = window
+    def __init__(self, daemon: DaemonAccess, *, period_s: float = PERIOD_S) -> None:
+        self._daemon = daemon
         self._period_s = period_s
         self._viewers = 0
         self._latest = b""
@@ -53,14 +53,14 @@ class Live:
     def close(self) -> None:
         """Let all viewers go; from any thread."""
         self._closed = True
-        self._window.on_change = lambda: None
+        self._daemon.on_change = lambda: None
 
     async def watch(self, show: Callable[[bytes], Awaitable[None]]) -> None:
         """Have each new state shown, as long as `show` takes it in time."""
         self._viewers += 1
         if self._looking is None:
             self._loop = asyncio.get_running_loop()
-            self._window.on_change = self.look_soon
+            self._daemon.on_change = self.look_soon
             self._looking = asyncio.create_task(self._look())
         try:
             shown = self._latest  # which may be a second old: a look is due at once
@@ -82,7 +82,7 @@ class Live:
         while self._viewers and not self._closed:
             self._nudge.clear()
             try:
-                state = ServiceState.model_validate(await self._window.state())
+                state = ServiceState.model_validate(await self._daemon.state())
             except DaemonSilent as silent:
                 log.debug("page: %s", silent)
             else:

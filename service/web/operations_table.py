@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.web import models as answers
+from service.web import models
 from service.web.evidence_files import FILES, WIDTHS_PX
 from service.web.openapi import Operation, Parameter
 
@@ -23,12 +23,12 @@ _ORDER = {
 _JOB = Parameter("job", {"type": "integer", "minimum": 1}, "Its number.", required=True)
 
 OPERATIONS = (
-    Operation("GET", "/state", "The service now", answers.ServiceState, _SILENT),
+    Operation("GET", "/state", "The service now", models.ServiceState, _SILENT),
     Operation(
         "GET",
         "/jobs",
         "The newest jobs, newest first",
-        answers.Jobs,
+        models.Jobs,
         {400: _PARAMETER, **_SILENT},
         (
             Parameter("limit", {"type": "integer", "minimum": 1, "maximum": MOST_JOBS, "default": 24}, "Most of them."),
@@ -36,7 +36,7 @@ OPERATIONS = (
             Parameter("only_refused", {"type": "boolean", "default": False}, "Only those refused or failed."),
         ),
     ),
-    Operation("GET", "/jobs/{job}", "One job", answers.Job, _NO_JOB, (_JOB,)),
+    Operation("GET", "/jobs/{job}", "One job", models.Job, _NO_JOB, (_JOB,)),
     Operation(
         "GET",
         "/jobs/{job}/files/{name}",
@@ -53,16 +53,16 @@ OPERATIONS = (
         {400: _PARAMETER, **_NO_JOB},
         (_JOB, Parameter("width", {"type": "integer", "enum": list(WIDTHS_PX)}, "At most so wide, px.")),
     ),
-    Operation("GET", "/jobs/{job}/drawing", "What is drawn over its frame", answers.Drawing, _NO_JOB, (_JOB,)),
+    Operation("GET", "/jobs/{job}/drawing", "What is drawn over its frame", models.Drawing, _NO_JOB, (_JOB,)),
     Operation(
         "GET", "/events", "The service's state, again each second and after each change", "text/event-stream", _SILENT
     ),
-    Operation("GET", "/reasons", "Why jobs are not accepted, in words", answers.Reasons, {}),
+    Operation("GET", "/reasons", "Why jobs are not accepted, in words", models.Reasons, {}),
     Operation(
         "GET",
         "/audit",
         "Who asked for what, newest first",
-        answers.Notes,
+        models.Notes,
         {400: _PARAMETER, **{code: text for code, text in _ORDER.items() if code not in (409, 422)}},
         (Parameter("limit", {"type": "integer", "minimum": 1, "maximum": MOST_NOTES, "default": 100}, "Most."),),
         token=True,
@@ -71,9 +71,9 @@ OPERATIONS = (
         "POST",
         "/trigger",
         "One job: taken, or, with job null, waiting for its turn",
-        answers.Triggered,
+        models.Triggered,
         _ORDER,
-        request=answers.TriggerRequest,
+        request=models.TriggerRequest,
         status=202,
         token=True,
     ),
@@ -81,10 +81,10 @@ OPERATIONS = (
         "POST",
         "/halt",
         "No trigger is taken until the halt is ended, over restarts too",
-        answers.StateAfter,
+        models.StateAfter,
         _ORDER,
-        request=answers.HaltRequest,
+        request=models.HaltRequest,
         token=True,
     ),
-    Operation("POST", "/resume", "End a halt", answers.StateAfter, _ORDER, request=answers.Nothing, token=True),
+    Operation("POST", "/resume", "End a halt", models.StateAfter, _ORDER, request=models.Nothing, token=True),
 )

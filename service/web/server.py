@@ -21,8 +21,8 @@ from service.config.config import Page as PageSettings
 from service.daemon.listening_socket import bound
 from service.daemon.operations import Operations
 from service.web.api import Api, problem
-from service.web.commands import Orders
-from service.web.daemon_access import Sources, Window
+from service.web.commands import Commands
+from service.web.daemon_access import DaemonAccess, Sources
 from service.web.guard import Guard
 from service.web.html import Pages
 from service.web.tokens import TokenFile, TokenFileError
@@ -78,15 +78,15 @@ class PageServer:
         except TokenFileError as error:
             raise PageError(f"page: {error}") from error
         check_certificate(settings)
-        self.window = Window(sources)
-        self._pages = Pages(self.window, settings.language)
-        orders = Orders(self.window, sources.journal, tokens)
-        self._make_api: Callable[[], Api] = lambda: Api(self.window, orders, version)
+        self.daemon = DaemonAccess(sources)
+        self._pages = Pages(self.daemon, settings.language)
+        commands = Commands(self.daemon, sources.journal, tokens)
+        self._make_api: Callable[[], Api] = lambda: Api(self.daemon, commands, version)
         self._socket: socket.socket | None = _bound(settings.host, settings.port)
 
     async def run(self, operations: Operations) -> None:
         """Serve for ever; in the daemon's loop."""
-        self.window.open(operations)
+        self.daemon.open(operations)
         if self._socket is None:
             self._socket = _bound(self._settings.host, self._settings.port)
         listener, self._socket = self._socket, None

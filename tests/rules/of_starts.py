@@ -172,8 +172,8 @@ RULES = (
         f"{CYCLE}::Cycle._carry_out",
         f"{IN_CYCLE}::test_captured_at_was_read_before_the_exposure",
         "stamp = await self._stamp(job)\n        stamped_at = self._now()\n"
-        "        frame = course.frame = await self._frame(course.report)",
-        "frame = course.frame = await self._frame(course.report)\n        await asyncio.sleep(0.05)\n"
+        "        frame = ongoing.frame = await self._frame(ongoing.report)",
+        "frame = ongoing.frame = await self._frame(ongoing.report)\n        await asyncio.sleep(0.05)\n"
         "        stamp = await self._stamp(job)\n"
         "        stamped_at = self._now()",
     ),

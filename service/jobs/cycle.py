@@ -152,9 +152,7 @@ class Cycle:
         stamped_at = self._now()
         frame = ongoing.frame = await self._frame(ongoing.report)
         self._beat()
-        measurement = ongoing.measurement = await self._measure(
-            ongoing.plan.measurer, frame, recipe, ongoing.thickness_mm
-        )
+        measurement = ongoing.measurement = await self._measure(ongoing.plan.measurer, frame, recipe, thickness_mm)
         self._beat()
         ongoing.report.update(measurement.summary())
         self._observe(Observation(job, frame, measurement))

@@ -97,7 +97,7 @@ class Daemon:
         self._on_stop = on_stop
         self._stop = asyncio.Event()
         self._asked_to_stop = False
-        self.supervisor = Supervisor(parts.health, beat=parts.watchdog.beat)
+        self.supervisor = Supervisor(parts.health, feed_watchdog=parts.watchdog.feed)
         self.abandoned = False  # a call that hangs was left behind: the process must not wait for its thread
 
     def stop(self) -> None:
@@ -168,9 +168,13 @@ class Daemon:
     # --- parts --------------------------------------------------------------------------------------------------
 
     def _start(self, triggers: Iterable[tuple[str, Callable[[], Awaitable[None]]]]) -> asyncio.Task[None]:
-        parts, beat = self._parts, self._parts.watchdog.beat
+        parts = self._parts
         watch = CameraWatch(
-            parts.camera, parts.pool, parts.health, warm_up_s=parts.warm_up_s, beat=partial(beat, "camera")
+            parts.camera,
+            parts.pool,
+            parts.health,
+            warm_up_s=parts.warm_up_s,
+            feed_watchdog=partial(parts.watchdog.feed, "camera"),
         )
         watch.start()
         add = self.supervisor.add

@@ -61,7 +61,7 @@ class Watchdog:
         """Parts that have got nothing done since systemd was told last."""
         return frozenset(self._silent)
 
-    def beat(self, part: str) -> None:
+    def feed(self, part: str) -> None:
         """A part has got something done."""
         self._silent.discard(part)
         if self._silent or not self._parts or not self._notifier.watchdog_s:

@@ -39,14 +39,14 @@ class CameraWatch:
         health: Health,
         *,
         warm_up_s: float = 0.0,
-        beat: Callable[[], None] = lambda: None,
+        feed_watchdog: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._camera = camera
         self._pool = pool
         self._health = health
         self._warm_up_s = warm_up_s
-        self._beat = beat
+        self._feed_watchdog = feed_watchdog
         self._now = now
         self._logged: str | None = None
         self._lost_at_s: float | None = None
@@ -64,7 +64,7 @@ class CameraWatch:
         """Look after the camera for ever."""
         while True:
             await self.look()
-            self._beat()
+            self._feed_watchdog()
             await asyncio.sleep(until_beat(asyncio.get_running_loop().time(), WATCH_PERIOD_S))
 
     async def look(self) -> None:

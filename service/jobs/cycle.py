@@ -52,7 +52,7 @@ class Cycle:
         plan: Plan,
         settings: CycleSettings,
         *,
-        beat: Callable[[], None] = lambda: None,
+        feed_watchdog: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._camera = devices.camera
@@ -64,11 +64,11 @@ class Cycle:
         self._keeper = records.keeper
         self._observe = records.observe
         self._durable = DurableJournal(
-            self._journal_fails, on_done=partial(records.health.report, "journal", None), beat=beat
+            self._journal_fails, on_done=partial(records.health.report, "journal", None), feed_watchdog=feed_watchdog
         )
         self._plan = plan
         self._settings = settings
-        self._beat = beat
+        self._feed_watchdog = feed_watchdog
         self._now = now
 
     def use(self, plan: Plan) -> None:
@@ -151,9 +151,9 @@ class Cycle:
         stamp = await self._stamp(job)
         stamped_at = self._now()
         frame = ongoing.frame = await self._frame(ongoing.report)
-        self._beat()
+        self._feed_watchdog()
         measurement = ongoing.measurement = await self._measure(ongoing.plan.measurer, frame, recipe, thickness_mm)
-        self._beat()
+        self._feed_watchdog()
         ongoing.report.update(measurement.summary())
         self._observe(Observation(job, frame, measurement))
         if measurement.reasons:
@@ -187,7 +187,7 @@ class Cycle:
 
     async def _drafted(self, job: Job, drafted: Future[None] | None) -> None:
         """Return once its evidence is durable, or cannot be: a contour does not wait for a disk that hangs."""
-        self._beat()
+        self._feed_watchdog()
         if drafted is not None:
             _, waiting = await asyncio.wait([asyncio.wrap_future(drafted)], timeout=EVIDENCE_WAIT_S)
             if not waiting:
@@ -243,7 +243,7 @@ class Cycle:
         loop = asyncio.get_running_loop()
         try:
             await loop.run_in_executor(self._pool, self._camera.open)
-            self._beat()
+            self._feed_watchdog()
             frame = await loop.run_in_executor(self._pool, self._camera.grab, asked_at, self._settings.camera_timeout_s)
         except CameraUnavailable as error:
             self._health.report("camera", Fault(Reason.NO_FRAME, str(error)))
@@ -314,7 +314,7 @@ class Cycle:
         back = withdrawal(job.job_id, session, self._settings.mailbox.word_order)
         sent = before_sending is None
         outgoing = Outgoing(job.job_id, session, pages, back, self._validity(pages), sent)
-        steps = TransferSteps(before_sending or _nothing, before_withdrawal, on_stuck, self._beat)
+        steps = TransferSteps(before_sending or _nothing, before_withdrawal, on_stuck, self._feed_watchdog)
         return Transfer(link, self._settings.transfer, self._counter, outgoing, lifetime, steps)
 
     def _lifetime(self, job: Job, lasts_s: float, since_s: float | None = None) -> Lifetime:

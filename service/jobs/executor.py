@@ -73,18 +73,18 @@ class Executor(LinkListener):
         link: Link | None,
         intake: Intake,
         *,
-        beat: Callable[[], None] = lambda: None,
+        feed_watchdog: Callable[[], None] = lambda: None,
     ) -> None:
         self._journal = journal
         self._runner = runner
         self._health = health
         self._link = link
         self._durable = DurableJournal(self._journal_fails, on_done=partial(health.report, "journal", None))
-        self._in_flight = DurableJournal(self._jobs_in_flight_unknown, beat=beat)
+        self._in_flight = DurableJournal(self._jobs_in_flight_unknown, feed_watchdog=feed_watchdog)
         self._controller_triggers = intake.controller and link is not None
         self._queue = intake.queue
         self.on_settled: list[Callable[[Job], None]] = []  # told of each job's end; they must not block
-        self._beat = beat
+        self._feed_watchdog = feed_watchdog
         self._tickets: dict[int, asyncio.Future[Job]] = {}
         self.counts: Counter[tuple[str, str]] = Counter()
         self._wake = asyncio.Event()
@@ -166,7 +166,7 @@ class Executor(LinkListener):
         self._log_once(f"journal: {error}")
         self._health.report("journal", journal_fault(error))
         if self._link is not None:
-            self._link.beat()  # its task waits here, and is alive
+            self._link.feed_watchdog()  # its task waits here, and is alive
 
     def _jobs_in_flight_unknown(self, error: JournalError, _again: bool) -> None:
         self._log_once(f"journal: {error}")
@@ -304,7 +304,7 @@ class Executor(LinkListener):
         """Execute jobs for ever; first those that a restart found in flight."""
         self._found = True
         while True:
-            self._beat()
+            self._feed_watchdog()
             self._wake.clear()
             if self._found and not self._taking:  # a job that is only being taken is none of before
                 self._found = False

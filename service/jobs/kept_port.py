@@ -34,18 +34,24 @@ class KeptPort:
     """A serial port that is served for ever; while it is away its fault is told, and it is opened again."""
 
     def __init__(
-        self, port: Port, name: str, health: Health, pool: ThreadPool, *, beat: Callable[[], None] = lambda: None
+        self,
+        port: Port,
+        name: str,
+        health: Health,
+        pool: ThreadPool,
+        *,
+        feed_watchdog: Callable[[], None] = lambda: None,
     ) -> None:
         """pool: in which it is opened and listened to."""
         self._port = port
         self.name = name
         self._health = health
         self._pool = pool
-        self.beat = beat
+        self.feed_watchdog = feed_watchdog
 
     async def listen(self, call: Callable[[float], T]) -> T:
         """What is heard within a moment by `call`, which blocks."""
-        self.beat()
+        self.feed_watchdog()
         return await asyncio.get_running_loop().run_in_executor(self._pool, call, READ_TIMEOUT_S)
 
     async def serve(self, call: Callable[[float], T], serve: Callable[[T], Awaitable[None]]) -> None:

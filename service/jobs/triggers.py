@@ -214,7 +214,7 @@ class SerialTrigger:
     def _journal_fails(self, error: JournalError, again: bool) -> None:
         if not again:
             log.warning("serial %s: what is owed to it: %s", self._port.name, error)
-        self._port.beat()
+        self._port.feed_watchdog()
 
     async def _send(self, text: str) -> None:
         await asyncio.get_running_loop().run_in_executor(None, self._line.write_line, text)

@@ -60,13 +60,13 @@ class Link:
         controller: Controller,
         settings: LinkSettings,
         *,
-        beat: Callable[[], None] = lambda: None,
+        feed_watchdog: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """beat: told after each round or attempt, well or not."""
+        """feed_watchdog: called after each round or attempt, well or not."""
         self.controller = controller
         self.settings = settings
-        self.beat = beat
+        self.feed_watchdog = feed_watchdog
         self._now = now
         self._listener = LinkListener()
         self.connection = Connection(controller, on_lost=self._lost, now=now)
@@ -212,7 +212,7 @@ class Link:
                 await self.writing.keep()
             if self.connection.serves():
                 self._changed()
-            self.beat()
+            self.feed_watchdog()
             await self._timer.pause()
 
     def _lost(self) -> None:
@@ -220,7 +220,7 @@ class Link:
         self.ownership.disconnected()
         self._well_or_failed = True
         self._changed()
-        self.beat()
+        self.feed_watchdog()
 
     def _must_write(self) -> bool:
         return not self.settings.observe and self.writing.due
@@ -233,5 +233,5 @@ class Link:
         """True where nothing is to be written and the controller's block, read now, shows what it showed."""
         if not self.settings.handshake or self._must_write() or not self.reading.shows_nothing_new():
             return False
-        self.beat()
+        self.feed_watchdog()
         return True

@@ -1,4 +1,4 @@
-"""When the link looks again: at the common beats of the poll period, or as soon as something is to be written."""
+"""When the link looks again: at the common moments of the poll period, or as soon as something is to be written."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class PollTimer:
         self._wake.set()
 
     async def pause(self) -> None:
-        """Wait until woken, or until a beat of the poll period finds something to do."""
+        """Wait until woken, or until a moment of the poll period finds something to do."""
         self._set()
         try:
             await self._wake.wait()

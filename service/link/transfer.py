@@ -123,7 +123,7 @@ class Transfer:
 
     async def _see(self) -> LinkBlock:
         """The controller's block, empty where it says nothing; raise _Ended where it ends the job."""
-        self._steps.beat()
+        self._steps.feed_watchdog()
         view = await self._link.look()
         if view.session == 0 or echo_fault(view) is not None:
             return LinkBlock()  # it is being filled, or misread: nothing is concluded from it
@@ -388,7 +388,7 @@ class Transfer:
     async def _connected(self) -> None:
         """Wait for the link's connection, however long. To wait for the link, which shows its own life, is no hang."""
         while True:
-            self._steps.beat()
+            self._steps.feed_watchdog()
             with suppress(TimeoutError):
                 async with asyncio.timeout(WAIT_SLICE_S):
                     await self._link.wait_connected()

@@ -95,13 +95,14 @@ class TransferSteps:
     """What is done besides, at which step of a transfer.
 
     before_sending: once, before the first request that carries any of the job; before_withdrawal: before the first that
-    takes it back. Both make it durable. on_stuck: told why a withdrawal gets no decision. beat: a sign of life.
+    takes it back. Both make it durable. on_stuck: told why a withdrawal gets no decision. feed_watchdog: at each sign
+    of life.
     """
 
     before_sending: Callable[[], Awaitable[None]] = _nothing
     before_withdrawal: Callable[[Reason], Awaitable[None]] = _no_reason
     on_stuck: Callable[[str], None] = lambda _why: None
-    beat: Callable[[], None] = lambda: None
+    feed_watchdog: Callable[[], None] = lambda: None
 
 
 class TransferCounter:

@@ -22,12 +22,15 @@ class DurableJournal:
         on_trouble: Callable[[JournalError, bool], None],
         *,
         on_done: Callable[[], None] = lambda: None,
-        beat: Callable[[], None] = lambda: None,
+        feed_watchdog: Callable[[], None] = lambda: None,
     ) -> None:
-        """on_trouble: told of each attempt in vain, and whether it says what the one before said. beat: before each."""
+        """on_trouble: told of each attempt in vain, and whether it says what the one before said.
+
+        feed_watchdog: called before each attempt.
+        """
         self._on_trouble = on_trouble
         self._on_done = on_done
-        self._beat = beat
+        self._feed_watchdog = feed_watchdog
 
     async def until_done(self, access: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """What `access` to the journal gives, made in a thread."""
@@ -44,7 +47,7 @@ class DurableJournal:
     async def _until_done(self, attempt: Callable[[], Awaitable[R]]) -> R:
         said = None
         while True:
-            self._beat()
+            self._feed_watchdog()
             try:
                 result = await attempt()
             except JournalError as error:

@@ -77,7 +77,7 @@ def build(
         held, journal, refused = _make_journal(config, opening, opened)
         notifier = Notifier()
         watchdog = Watchdog(notifier)
-        link = None if refused else _make_link(config, listen, partial(watchdog.beat, "link"))
+        link = None if refused else _make_link(config, listen, partial(watchdog.feed, "link"))
         health = Health(StateMachine(_publisher(link)))
         health.report("calibration", calibration_fault)
         health.report("journal", refused.fault if refused else _not_written(journal))
@@ -87,7 +87,7 @@ def build(
         _tell_exports(config)
         devices = Devices(camera, pool, link, TransferCounter(secrets.randbelow(0xFFFF) + 1))
         records = Records(journal, health, archive or KeepsNothing(), observe)
-        cycle = Cycle(devices, records, plan, cycle_settings(config), beat=partial(watchdog.beat, "jobs"))
+        cycle = Cycle(devices, records, plan, cycle_settings(config), feed_watchdog=partial(watchdog.feed, "jobs"))
         executor = _make_executor(config, records, cycle, link, watchdog)
         parts = Parts(camera, journal, health, executor, link, pool, held, notifier=notifier, watchdog=watchdog)
         parts.opening = held if refused else None
@@ -133,7 +133,9 @@ def _make_executor(config: Config, records: Records, cycle: Cycle, link: Link | 
     queue = TriggerQueue(config.service.queue_depth, cycle_settings(config).lifetime_s)
     intake = Intake(any(isinstance(trigger, ControllerTrigger) for trigger in config.triggers), queue)
     try:
-        return Executor(records.journal, cycle, records.health, link, intake, beat=partial(watchdog.beat, "jobs"))
+        return Executor(
+            records.journal, cycle, records.health, link, intake, feed_watchdog=partial(watchdog.feed, "jobs")
+        )
     except JournalError as error:
         raise WiringError(str(error)) from error
 
@@ -167,7 +169,9 @@ def _not_written(journal: Journal) -> Fault | None:
     return None
 
 
-def _make_link(config: Config, listen: Callable[[Controller], Controller], beat: Callable[[], None]) -> Link | None:
+def _make_link(
+    config: Config, listen: Callable[[Controller], Controller], feed_watchdog: Callable[[], None]
+) -> Link | None:
     controller = make_controller(config)
     if controller is None or isinstance(config.controller, NoController):
         return None
@@ -180,7 +184,7 @@ def _make_link(config: Config, listen: Callable[[Controller], Controller], beat:
             settings.heartbeat_timeout_s,
             observe=settings.mode == "observe",
         ),
-        beat=beat,
+        feed_watchdog=feed_watchdog,
     )
 
 

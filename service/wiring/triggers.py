@@ -42,8 +42,8 @@ def _interval(executor: Executor, period_s: float) -> Callable[[], Awaitable[Non
 def _serial(parts: Parts, trigger: SerialTriggerSettings) -> Callable[[], Awaitable[None]]:
     assert parts.serial_pool is not None
     driver = make_serial_port(trigger)
-    beat = partial(parts.watchdog.beat, f"serial {trigger.port}")
-    port = KeptPort(driver, trigger.port, parts.health, parts.serial_pool, beat=beat)
+    feed = partial(parts.watchdog.feed, f"serial {trigger.port}")
+    port = KeptPort(driver, trigger.port, parts.health, parts.serial_pool, feed_watchdog=feed)
     parts.ports.append(trigger.port)
     if not isinstance(driver, SerialLineTrigger):
         return SerialPulses(driver, port, TriggerStamp(trigger.mode), parts.executor).run

@@ -105,9 +105,9 @@ class Systemd:
         parts = built.parts
         parts.notifier = Notifier({"NOTIFY_SOCKET": self._address, "WATCHDOG_USEC": "300000"})
         parts.watchdog = Watchdog(parts.notifier)
-        parts.executor._beat = lambda: parts.watchdog.beat("jobs")
+        parts.executor._feed_watchdog = lambda: parts.watchdog.feed("jobs")
         if parts.link is not None:
-            parts.link.beat = lambda: parts.watchdog.beat("link")
+            parts.link.feed_watchdog = lambda: parts.watchdog.feed("link")
         return parts
 
     def heard(self) -> list[str]:

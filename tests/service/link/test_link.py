@@ -416,7 +416,7 @@ async def test_a_link_that_only_looks_shows_that_it_lives(observe: bool) -> None
     controller = Glanced()
     async with linked(controller, replace(QUICK, observe=observe)) as link:
         rounds: list[int] = []
-        link.beat = lambda: rounds.append(1)
+        link.feed_watchdog = lambda: rounds.append(1)
         if not observe:
             link.publish(owner=100)
             await until(lambda: link.fault() is None)

@@ -45,7 +45,7 @@ class MetricsError(Exception):
 
 
 @dataclass(frozen=True)
-class Sources:
+class MetricsSources:
     """What is looked at in each scrape; None where the daemon has no such part."""
 
     version: str
@@ -58,9 +58,9 @@ class Sources:
 
 
 class Metrics:
-    """The daemon's registry; `job_ended` counts, all else is looked up in `Sources`."""
+    """The daemon's registry; `job_ended` counts, all else is looked up in `MetricsSources`."""
 
-    def __init__(self, sources: Sources, *, now: Callable[[], float] = time.time) -> None:
+    def __init__(self, sources: MetricsSources, *, now: Callable[[], float] = time.time) -> None:
         self.registry = CollectorRegistry()
         self._now = now
         self._jobs = self._counter("combtrace_jobs", "Jobs that have ended", ("outcome", "reason"))
@@ -104,7 +104,7 @@ def _set(gauge: Gauge, value: float | None) -> None:
 class _Moment(Collector):
     """Gauges that are read when they are asked for; called in the server's thread, so it only reads."""
 
-    def __init__(self, sources: Sources) -> None:
+    def __init__(self, sources: MetricsSources) -> None:
         self._sources = sources
 
     def collect(self) -> Iterator[Metric]:
@@ -203,7 +203,7 @@ class MetricsServer:
         self._thread.join()
 
 
-def serve(settings: Any, sources: Sources) -> tuple[Metrics, MetricsServer]:
+def serve(settings: Any, sources: MetricsSources) -> tuple[Metrics, MetricsServer]:
     """Metrics of a daemon, served as `config.Metrics` says."""
     metrics = Metrics(sources)
     return metrics, MetricsServer(metrics, settings.host, settings.port)

@@ -36,7 +36,7 @@ class DaemonSilent(Exception):
 
 
 @dataclass(frozen=True)
-class Sources:
+class PageSources:
     """The daemon's parts; None where it has no such part."""
 
     health: Health
@@ -57,7 +57,7 @@ class Sources:
 class DaemonAccess:
     """The daemon as the page sees it; `open` is called in the daemon's loop, before anything else."""
 
-    def __init__(self, sources: Sources) -> None:
+    def __init__(self, sources: PageSources) -> None:
         self.sources = sources
         self._loop: asyncio.AbstractEventLoop | None = None
         self._operations: Operations | None = None

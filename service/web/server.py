@@ -22,7 +22,7 @@ from service.daemon.listening_socket import bound
 from service.daemon.operations import Operations
 from service.web.api import Api, problem
 from service.web.commands import Commands
-from service.web.daemon_access import DaemonAccess, Sources
+from service.web.daemon_access import DaemonAccess, PageSources
 from service.web.guard import Guard
 from service.web.html import Pages
 from service.web.tokens import TokenFile, TokenFileError
@@ -68,7 +68,7 @@ class _BoundedHttp(H11Protocol):
 class PageServer:
     """Serves page and REST interface; listens from the start, answers while `run` runs."""
 
-    def __init__(self, settings: PageSettings, sources: Sources, version: str) -> None:
+    def __init__(self, settings: PageSettings, sources: PageSources, version: str) -> None:
         """Raise PageError where the token file, the certificate or the address cannot be used."""
         self._settings = settings
         tokens = None if settings.token_file is None else TokenFile(settings.token_file)
@@ -179,6 +179,6 @@ def check_certificate(settings: PageSettings) -> None:
         ) from error
 
 
-def make_page(settings: PageSettings, sources: Sources) -> PageServer:
+def make_page(settings: PageSettings, sources: PageSources) -> PageServer:
     """The page as the configuration has it; raise PageError."""
     return PageServer(settings, sources, importlib.metadata.version("combtrace"))

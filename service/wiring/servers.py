@@ -17,12 +17,12 @@ def add_metrics(config: Config, parts: Parts, cycle: Cycle, opened: ExitStack) -
     if config.metrics is None:
         return
     try:
-        from service.daemon.metrics import MetricsError, Sources, serve
+        from service.daemon.metrics import MetricsError, MetricsSources, serve
     except ImportError as error:
         raise WiringError(
             f"metrics: {error.name} is not installed. Install combtrace[metrics], or remove metrics"
         ) from error
-    sources = Sources(
+    sources = MetricsSources(
         importlib.metadata.version("combtrace"),
         parts.health,
         parts.executor,
@@ -44,11 +44,11 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
     if config.page is None:
         return
     try:
-        from service.web.daemon_access import Sources
+        from service.web.daemon_access import PageSources
         from service.web.server import PageError, make_page
     except ModuleNotFoundError as error:
         raise WiringError(f"page: {error.name} is not installed. Install combtrace[page], or remove page") from error
-    sources = Sources(
+    sources = PageSources(
         parts.health,
         parts.executor,
         parts.journal,

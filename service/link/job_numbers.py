@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from service.link.reading import LinkReading
-from service.link.writing import ServiceBlockWriting
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # who reads the journal wants LARGEST_JOB, and no event loop with it
+    from service.link.reading import LinkReading
+    from service.link.writing import ServiceBlockWriting
 
 LARGEST_JOB = (1 << 32) - 1
 LARGEST_STEP = 1_000_000  # protocol: a last_job further above all that is known is a fault of the controller

@@ -366,7 +366,7 @@ async def test_a_contour_that_became_too_old_while_it_was_made_durable_is_not_co
         async def slow_disk() -> None:
             await asyncio.sleep(0.2)
 
-        run.transfer._before_sending = slow_disk
+        run.transfer._steps = replace(run.transfer._steps, before_sending=slow_disk)
         settlement = await run.end()
     assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.EXPIRED)
     assert controller.page == withdrawal(JOB, SESSION, "big")
@@ -411,7 +411,7 @@ async def test_a_withdrawal_that_nobody_decides_is_told() -> None:
     controller = ScriptedController([None])
     stuck: list[str] = []
     async with transferring(controller, replace(QUICK, max_repeats=1)) as run:
-        run.transfer._on_stuck = stuck.append
+        run.transfer._steps = replace(run.transfer._steps, on_stuck=stuck.append)
         task = asyncio.ensure_future(run.end())
         while not stuck:
             await asyncio.sleep(0.02)
@@ -450,7 +450,7 @@ async def test_without_handshake_a_contour_that_became_too_old_on_its_way_is_not
         async def slow_disk() -> None:
             await asyncio.sleep(0.2)
 
-        run.transfer._before_sending = slow_disk
+        run.transfer._steps = replace(run.transfer._steps, before_sending=slow_disk)
         settlement = await run.end()
     assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.EXPIRED)
     assert controller.count("commit") == 0
@@ -466,7 +466,7 @@ async def test_a_connection_that_was_opened_anew_begins_again_with_transfer_0(ha
             await controller.close()  # a heartbeat finds it out, while the transfer waits for the disk
             await until(lambda: controller.connects == 2 and run.link.fault() is None)
 
-        run.transfer._before_sending = slow_disk
+        run.transfer._steps = replace(run.transfer._steps, before_sending=slow_disk)
         settlement = await run.end()
     assert settlement.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
     steps = [name for name, _ in controller.requests if name in ("clear", "write_page", "commit")]

@@ -18,13 +18,13 @@ from statistics import median
 import cv2
 import numpy as np
 
-from service import wiring
 from service.config.config_file import load_config
 from service.daemon.daemon import Daemon, Parts
 from service.reasons import Outcome
 from service.records.archive import document_of
-from service.records.journal import Job, TriggerStamp
+from service.records.job import Job, TriggerStamp
 from service.state import State
+from service.wiring.daemon import build
 from tests.support.processes.cell import SAMPLES
 from tests.support.processes.processes import Process, free_port
 
@@ -101,7 +101,7 @@ async def measured(folder: Path, jobs: int = JOBS) -> JobTimes:
     path.write_text(CONFIG.format(port=port))
     controller = Process(folder / "controller.log", "simulate-controller", "--tcp", f"127.0.0.1:{port}")
     try:
-        parts = wiring.build(load_config(path))
+        parts = build(load_config(path))
         daemon = Daemon(parts)
         task = asyncio.ensure_future(daemon.run())
         try:

@@ -27,17 +27,13 @@ import numpy as np
 from benchmarks.link.recovery import recoveries
 from benchmarks.link.tcp_clients import CLIENTS, TURNS, Taken, Write, compare, send
 from benchmarks.rest import medians_percent
-from drivers.controller.mailbox.mailbox import (
-    ContourMessage,
-    MailboxLayout,
-    Page,
-    ServiceBlock,
-    encode_pages,
-    micrometres,
-)
+from drivers.controller.mailbox.blocks import ServiceBlock
+from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.mailbox.page_spans import page_starts, spans
-from drivers.controller.modbus.client import ModbusRtuController, SerialLine
+from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages, micrometres
+from drivers.controller.modbus.client import ModbusRtuController
 from drivers.controller.modbus.requests import LONGEST_WRITE
+from drivers.controller.modbus.serial_line import SerialLine
 from service.link.link import Link, LinkSettings
 from tests.support.interop.programs import libmodbus_rtu
 from tests.support.processes.cell import Cell

@@ -17,7 +17,8 @@ from statistics import median
 
 from pymodbus.client import AsyncModbusTcpClient
 
-from drivers.controller.mailbox.mailbox import MailboxLayout, Page
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import Page
 from drivers.controller.modbus.client import ModbusController, ModbusTcpController
 from tests.support.interop.programs import compiled, libmodbus_tcp
 

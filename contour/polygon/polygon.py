@@ -11,8 +11,9 @@ from contour.calibration.calibration import Calibration, scales
 from contour.errors import MarginImpossible, ParameterError
 from contour.geometry.arrays import Float64s, Indices
 from contour.geometry.offset import offset_contour
-from contour.geometry.rings import Contour, area, contour_defect, oriented_contour, simplify_indices
+from contour.geometry.rings import Contour, area, contour_defect, oriented_contour
 from contour.geometry.segments import distances_to_ring
+from contour.geometry.simplification import simplify_indices
 from contour.polygon.start_vertex import Start, begun_at, first_vertices
 from contour.polygon.vertex_budget import within_budget
 

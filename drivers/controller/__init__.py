@@ -13,7 +13,8 @@ from drivers.controller.errors import (
     ControllerUnavailable,
     MailboxError,
 )
-from drivers.controller.mailbox.mailbox import LinkBlock, Page, ServiceBlock
+from drivers.controller.mailbox.blocks import LinkBlock, ServiceBlock
+from drivers.controller.mailbox.pages import Page
 
 __all__ = [
     "ContourTooLarge",

@@ -7,7 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from drivers.controller.mailbox.mailbox import BLOCK_REGISTERS, HEADER_REGISTERS
+from drivers.controller.mailbox.blocks import BLOCK_REGISTERS
+from drivers.controller.mailbox.pages import HEADER_REGISTERS
 from service.config.values import REGISTERS, Host, Model, Port, Register, Seconds
 
 

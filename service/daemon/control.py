@@ -63,15 +63,15 @@ class ControlServer:
 
     async def run(self) -> None:
         """Serve for ever, from when the disk lets the socket be made."""
-        told = False
+        warned = False
         while True:
             try:
                 await self._run()
             except OSError as error:
                 if error.errno not in REFUSALS:
                     raise
-                log.log(logging.DEBUG if told else logging.WARNING, "no control socket, tried again: %s", error)
-                told = True
+                log.log(logging.DEBUG if warned else logging.WARNING, "no control socket, tried again: %s", error)
+                warned = True
             await asyncio.sleep(RETRY_S)
 
     async def _run(self) -> None:
@@ -180,7 +180,7 @@ def answers(folder: Path, request: Mapping[str, Any], bound_s: float) -> Iterato
             client.sendall(_line(request))
             with client.makefile("rb") as lines:
                 while line := lines.readline():
-                    yield _told(line, path)
+                    yield _answer_of(line, path)
                     client.settimeout(max(give_up_at_s - time.monotonic(), 0.001))
     except ConnectionResetError:
         return  # it went: whoever waits for more sees that there is none
@@ -194,14 +194,14 @@ def answers(folder: Path, request: Mapping[str, Any], bound_s: float) -> Iterato
         raise ControlError(f"{path}: the daemon does not answer: {error.strerror or error}") from error
 
 
-def _told(line: bytes, path: Path) -> dict[str, Any]:
+def _answer_of(line: bytes, path: Path) -> dict[str, Any]:
     try:
-        told = json.loads(line)
+        answer = json.loads(line)
     except ValueError as error:
         raise ControlError(f"{path}: the daemon ended before it answered. See its log") from error
-    if not told.pop("ok", False):
-        raise ControlError(str(told.get("error", "refused")))
-    return dict(told)
+    if not answer.pop("ok", False):
+        raise ControlError(str(answer.get("error", "refused")))
+    return dict(answer)
 
 
 @contextlib.contextmanager

@@ -12,7 +12,9 @@ from service.jobs.executor import Executor
 from service.jobs.trigger_lines import LARGEST_RECIPE, UNKNOWN_RECIPE, ack, nak, wait
 from service.jobs.trigger_queue import Queued, TriggerRefused
 from service.jobs.triggers import result_line
-from service.records.journal import Job, Journal, JournalError, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.control")
 
@@ -71,8 +73,8 @@ class ControlTriggers:
 
 
 def _ended(job: Job) -> dict[str, Any]:
-    told = {"line": result_line(job), "job": job.job_id}
-    return told if job.reason is None else {**told, "why": job.detail}
+    answer = {"line": result_line(job), "job": job.job_id}
+    return answer if job.reason is None else {**answer, "why": job.detail}
 
 
 def _number(request: Mapping[str, Any], name: str) -> int:

@@ -32,7 +32,9 @@ from service.link.link import Link
 from service.poll_timing import until_beat
 from service.reasons import Reason
 from service.records.archive_writer import ArchiveWriter
-from service.records.journal import Job, Journal, JournalError, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 from service.state import State
 
 log = logging.getLogger("combtrace.daemon")
@@ -95,7 +97,7 @@ class Daemon:
         self._on_stop = on_stop
         self._stop = asyncio.Event()
         self._asked_to_stop = False
-        self.supervisor = Supervisor(parts.health, beat=parts.watchdog.beat)
+        self.supervisor = Supervisor(parts.health, feed_watchdog=parts.watchdog.feed)
         self.abandoned = False  # a call that hangs was left behind: the process must not wait for its thread
 
     def stop(self) -> None:
@@ -166,9 +168,13 @@ class Daemon:
     # --- parts --------------------------------------------------------------------------------------------------
 
     def _start(self, triggers: Iterable[tuple[str, Callable[[], Awaitable[None]]]]) -> asyncio.Task[None]:
-        parts, beat = self._parts, self._parts.watchdog.beat
+        parts = self._parts
         watch = CameraWatch(
-            parts.camera, parts.pool, parts.health, warm_up_s=parts.warm_up_s, beat=partial(beat, "camera")
+            parts.camera,
+            parts.pool,
+            parts.health,
+            warm_up_s=parts.warm_up_s,
+            feed_watchdog=partial(parts.watchdog.feed, "camera"),
         )
         watch.start()
         add = self.supervisor.add
@@ -188,7 +194,6 @@ class Daemon:
         if parts.link is not None:
             add("link", parts.link.run)
             add("link watch", partial(self._watch_link, parts.link))
-            parts.link.on_round = partial(beat, "link")
             watched.append("link")
             self._report_link(parts.link)
         parts.watchdog.watch(watched)

@@ -22,7 +22,7 @@ from service.jobs.health import PARTS, Health
 from service.link.link import Link
 from service.measuring.calibration_guard import CalibrationGuard
 from service.records.archive_writer import ArchiveWriter
-from service.records.journal import Job
+from service.records.job import Job
 from service.state import State
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class MetricsError(Exception):
 
 
 @dataclass(frozen=True)
-class Sources:
+class MetricsSources:
     """What is looked at in each scrape; None where the daemon has no such part."""
 
     version: str
@@ -59,16 +59,16 @@ class Sources:
 
 
 class Metrics:
-    """The daemon's registry; `job_ended` counts, all else is looked up in `Sources`."""
+    """The daemon's registry; `job_ended` counts, all else is looked up in `MetricsSources`."""
 
-    def __init__(self, sources: Sources, *, now: Callable[[], float] = time.time) -> None:
+    def __init__(self, sources: MetricsSources, *, now: Callable[[], float] = time.time) -> None:
         self.registry = CollectorRegistry()
         self._now = now
         self._jobs = self._counter("combtrace_jobs", "Jobs that have ended", ("outcome", "reason"))
         text = "Time of a stage, or of the whole job"
         self._stages = Histogram("combtrace_stage_seconds", text, ("stage",), buckets=BUCKETS, registry=self.registry)
         self._ended_at = self._gauge("combtrace_job_last_ended_timestamp_seconds", "Unix time of the last job's end")
-        self._picture = {name: self._gauge(*told) for name, told in PICTURE.items()}
+        self._picture = {name: self._gauge(*described) for name, described in PICTURE.items()}
         self._uncertainty = self._gauge(*UNCERTAINTY)
         self.registry.register(_Moment(sources))
         ProcessCollector(registry=self.registry)
@@ -105,7 +105,7 @@ def _set(gauge: Gauge, value: float | None) -> None:
 class _Moment(Collector):
     """Gauges that are read when they are asked for; called in the server's thread, so it only reads."""
 
-    def __init__(self, sources: Sources) -> None:
+    def __init__(self, sources: MetricsSources) -> None:
         self._sources = sources
 
     def collect(self) -> Iterator[Metric]:
@@ -150,9 +150,11 @@ class _Moment(Collector):
 
     def _controller(self, link: Link) -> Iterator[Metric]:
         yield _one("combtrace_controller_up", "1 where the controller is reached and runs", link.fault() is None)
-        yield CounterMetricFamily("combtrace_controller_connections", "Connections opened", value=link.connections)
+        yield CounterMetricFamily(
+            "combtrace_controller_connections", "Connections opened", value=link.connection.opened
+        )
         text = "Time of the last read of the controller's block"
-        yield _one("combtrace_controller_round_trip_seconds", text, link.round_trip_s)
+        yield _one("combtrace_controller_round_trip_seconds", text, link.reading.round_trip_s)
 
     def _storage(self) -> Iterator[Metric]:
         storage, archive = self._sources.storage, self._sources.archive
@@ -202,7 +204,7 @@ class MetricsServer:
         self._thread.join()
 
 
-def serve(settings: Any, sources: Sources) -> tuple[Metrics, MetricsServer]:
+def serve(settings: Any, sources: MetricsSources) -> tuple[Metrics, MetricsServer]:
     """Metrics of a daemon, served as `config.Metrics` says."""
     metrics = Metrics(sources)
     return metrics, MetricsServer(metrics, settings.host, settings.port)

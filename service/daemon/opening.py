@@ -12,7 +12,8 @@ from service.atomic_file import REFUSALS
 from service.daemon.lock import Held, Lock, LockError, Locks, NameLock, journal_lock
 from service.jobs.health import Fault
 from service.reasons import Reason
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 from service.records.journal_recovery import open_journal
 
 PASSING = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)

@@ -21,7 +21,7 @@ from service.jobs.executor import Executor
 from service.jobs.health import Fault, Health
 from service.jobs.trigger_queue import TriggerRefused
 from service.reasons import Reason
-from service.records.journal import Job
+from service.records.job import Job
 from service.state import State
 
 log = logging.getLogger("combtrace.control")
@@ -112,7 +112,7 @@ class Operations:
             "job": health.job,
             "waiting": executor.waiting,
             "settled_job": executor.settled_job,
-            "last_job": _told(executor.last_settled),
+            "last_job": _last_job(executor.last_settled),
             "missed_triggers": executor.missed,
             "triggers": [
                 {"kind": kind, "what": what, "count": count} for (kind, what), count in sorted(executor.counts.items())
@@ -177,7 +177,7 @@ def _fault(fault: Fault) -> dict[str, Any]:
     }
 
 
-def _told(job: Job | None) -> dict[str, Any] | None:
+def _last_job(job: Job | None) -> dict[str, Any] | None:
     if job is None:
         return None
     return {

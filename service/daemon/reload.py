@@ -12,7 +12,7 @@ from pydantic import BaseModel
 
 from service.config.config import Config
 from service.config.config_file import ConfigError, load_config
-from service.jobs.cycle import Plan
+from service.jobs.cycle_terms import Plan
 from service.jobs.health import Health
 from service.logs import event
 
@@ -75,8 +75,8 @@ class Reloader:
             lines = str(error).splitlines()
             for line in lines:  # an event each, or some of many would be held back
                 log.error("not reloaded: %s", line, extra=event("reload", mistake=line))
-            told = event("reload", reloaded=False)
-            log.warning("the configuration of before stays in force, all of it", extra=told)
+            fields = event("reload", reloaded=False)
+            log.warning("the configuration of before stays in force, all of it", extra=fields)
             more = f" (and {len(lines) - 1} more)" if lines[1:] else ""
             self._health.warn(PART, f"not reloaded: {lines[0]}{more}")
             return
@@ -87,8 +87,8 @@ class Reloader:
         self._health.warn(PART, None)
         job = self._health.job
         since = "from the next job on" if job is None else f"from the job after {job} on"
-        told = event("reload", reloaded=True, changed=changed)
-        log.info("configuration reloaded, %s: %s", since, changed, extra=told)
+        fields = event("reload", reloaded=True, changed=changed)
+        log.info("configuration reloaded, %s: %s", since, changed, extra=fields)
 
 
 def differences(old: BaseModel, new: BaseModel, path: str = "") -> Iterator[str]:

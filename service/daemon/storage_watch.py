@@ -11,7 +11,8 @@ from service.jobs.health import Fault, Health
 from service.reasons import Reason
 from service.records.archive import free_bytes
 from service.records.archive_writer import ArchiveWriter
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.storage")
 

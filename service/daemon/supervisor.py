@@ -48,10 +48,10 @@ class Part:
 class Supervisor:
     """Runs parts in one task group. A failed part is a fault of the service until it runs again."""
 
-    def __init__(self, health: Health, *, beat: Callable[[str], None] = lambda _name: None) -> None:
-        """beat: told of each start of a part, which is a sign of its life."""
+    def __init__(self, health: Health, *, feed_watchdog: Callable[[str], None] = lambda _name: None) -> None:
+        """feed_watchdog: told of each start of a part, which is a sign of its life."""
         self._health = health
-        self._beat = beat
+        self._feed_watchdog = feed_watchdog
         self.parts: list[Part] = []
 
     def add(self, name: str, run: Callable[[], Awaitable[None]]) -> None:
@@ -88,12 +88,12 @@ class Supervisor:
             part.failures += 1
             text = f"part {part.name} has failed and is started again in {pause_s:g} s: {error}"
             self._health.report(f"part {part.name}", Fault(Reason.INTERNAL_ERROR, text))
-            self._beat(part.name)
+            self._feed_watchdog(part.name)
             await self._until_cancelled_or_done(part, asyncio.sleep(pause_s))
 
     async def _run_once(self, part: Part) -> str | None:
         """Run a part until it fails: its error; None where it was asked to start anew."""
-        self._beat(part.name)
+        self._feed_watchdog(part.name)
         loop = asyncio.get_running_loop()
         sound = loop.call_later(SOUND_AFTER_S, self._health.report, f"part {part.name}", None)
         begun = loop.time()

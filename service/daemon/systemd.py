@@ -49,7 +49,7 @@ class Watchdog:
         self._now = now
         self._parts: frozenset[str] = frozenset()
         self._silent: set[str] = set()
-        self._told_at = -1e9
+        self._sent_at = -1e9
 
     def watch(self, parts: Iterable[str]) -> None:
         """The parts without whose work nothing is told."""
@@ -61,12 +61,12 @@ class Watchdog:
         """Parts that have got nothing done since systemd was told last."""
         return frozenset(self._silent)
 
-    def beat(self, part: str) -> None:
+    def feed(self, part: str) -> None:
         """A part has got something done."""
         self._silent.discard(part)
         if self._silent or not self._parts or not self._notifier.watchdog_s:
             return
-        if self._now() - self._told_at >= self._notifier.watchdog_s / SENDS_A_LIMIT:
-            self._told_at = self._now()
+        if self._now() - self._sent_at >= self._notifier.watchdog_s / SENDS_A_LIMIT:
+            self._sent_at = self._now()
             self._silent = set(self._parts)
             self._notifier.send(WATCHDOG=1)

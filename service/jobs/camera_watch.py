@@ -39,16 +39,16 @@ class CameraWatch:
         health: Health,
         *,
         warm_up_s: float = 0.0,
-        beat: Callable[[], None] = lambda: None,
+        feed_watchdog: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._camera = camera
         self._pool = pool
         self._health = health
         self._warm_up_s = warm_up_s
-        self._beat = beat
+        self._feed_watchdog = feed_watchdog
         self._now = now
-        self._told: str | None = None
+        self._logged: str | None = None
         self._lost_at_s: float | None = None
         self._ever_open = False
         self._checked_at_s = now()
@@ -64,7 +64,7 @@ class CameraWatch:
         """Look after the camera for ever."""
         while True:
             await self.look()
-            self._beat()
+            self._feed_watchdog()
             await asyncio.sleep(until_beat(asyncio.get_running_loop().time(), WATCH_PERIOD_S))
 
     async def look(self) -> None:
@@ -87,7 +87,7 @@ class CameraWatch:
         if await self._tried(self._close_and_open):
             away_s = 0.0 if self._lost_at_s is None else self._now() - self._lost_at_s
             needed_s = min(self._warm_up_s, away_s) if self._ever_open else self._warm_up_s
-            self._ever_open, self._lost_at_s, self._told = True, None, None
+            self._ever_open, self._lost_at_s, self._logged = True, None, None
             self._checked_at_s = self._now()
             self._warm_at_s = self._now() + needed_s
             text = f"the camera warms up for {needed_s:.0f} s"
@@ -103,9 +103,9 @@ class CameraWatch:
         try:
             await asyncio.get_running_loop().run_in_executor(self._pool, call)
         except CameraError as error:
-            if str(error) != self._told:
+            if str(error) != self._logged:
                 log.warning("camera: %s", error)
-                self._told = str(error)
+                self._logged = str(error)
             self._report(Fault(Reason.NO_FRAME, str(error)))
             return False
         return True

@@ -6,114 +6,34 @@ import asyncio
 import logging
 import time
 from collections.abc import Awaitable, Callable, Mapping
-from concurrent.futures import Executor as ThreadPool
 from concurrent.futures import Future
-from dataclasses import dataclass, field
-from typing import Any, ParamSpec, TypeVar
+from functools import partial
+from typing import Any
 
 from contour.errors import ParameterError, PictureError
-from drivers.camera import Camera, CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
+from drivers.camera import CameraError, CameraUnavailable, Frame, FrameUnusable, SceneMoved
 from drivers.controller import ControllerError
-from drivers.controller.mailbox.mailbox import ContourTooLarge, MailboxError, Page, crc32_of, decode_header, withdrawal
+from drivers.controller.errors import ContourTooLarge, MailboxError
+from drivers.controller.mailbox.pages import Page, crc32_of, decode_header, withdrawal
 from service.config.recipes import Recipe
-from service.jobs.health import Fault, Health, journal_fault
+from service.jobs.cycle_terms import CycleSettings, Devices, JobInProgress, Observation, Plan, Records
+from service.jobs.health import Fault, journal_fault
 from service.link.contour_message import Envelope, contour_pages
 from service.link.controller_clock import Stamp
 from service.link.link import Link
-from service.link.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
+from service.link.transfer import Transfer
+from service.link.transfer_terms import Lifetime, Outgoing, Settlement, TransferSteps, Validity
 from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
 from service.reasons import Outcome, Reason
-from service.records.evidence import Evidence, Keeper, KeepsNothing
-from service.records.journal import Job, Journal, JournalError, Terms
+from service.records.durable_journal import DurableJournal
+from service.records.job import Job, Terms
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.cycle")
 
-P = ParamSpec("P")
-R = TypeVar("R")
-
 STAMP_WAIT_S = 3.0  # a lost connection is back within that, and a clock has held over two heartbeats
 EVIDENCE_WAIT_S = 2.0  # a slow disk has written a frame by then; one that hangs must not hold contours up
-JOURNAL_PAUSE_S = 1.0
-
-
-@dataclass(frozen=True)
-class MailboxFormat:
-    """How pages are laid out for this controller."""
-
-    word_order: Any = "big"
-    payload_capacity: int = 1984
-
-
-@dataclass(frozen=True)
-class CycleSettings:
-    """Bounds of one job. valid_for_s 0 = no limit by the controller's clock; job_timeout_s bounds it then.
-
-    observe: the pages are made and not sent.
-    target: which controller it is and how it is laid out, by configuration key: a job in flight is settled there only.
-    """
-
-    default_recipe: int = 1
-    camera_timeout_s: float = 5.0
-    valid_for_s: float = 30.0
-    job_timeout_s: float = 120.0
-    observe: bool = False
-    mailbox: MailboxFormat = field(default_factory=MailboxFormat)
-    transfer: TransferSettings = field(default_factory=TransferSettings)
-    target: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def lifetime_s(self) -> float:
-        """How old a contour may become, by whichever bound there is."""
-        return self.valid_for_s or self.job_timeout_s
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What jobs are measured by. A job keeps the plan that it began with."""
-
-    measurer: Measurer
-    recipes: Mapping[int, Recipe]
-    default_recipe: int = 1
-
-
-@dataclass(frozen=True)
-class Observation:
-    """What one job saw: for whoever draws, archives or prints it."""
-
-    job: Job
-    frame: Frame
-    measurement: Measurement
-
-
-@dataclass
-class _Course:
-    """What a job has come to so far; what it did not come to stays None."""
-
-    job: Job
-    plan: Plan
-    report: dict[str, Any] = field(default_factory=dict)
-    recipe: Recipe | None = None
-    thickness_mm: float = 0.0
-    frame: Frame | None = None
-    measurement: Measurement | None = None
-    envelope: Envelope | None = None
-    pages: tuple[Page, ...] = ()
-    transfer: dict[str, Any] = field(default_factory=dict)
-    terms: Terms | None = None
-
-    def evidence(self, job: Job) -> Evidence:
-        """What it leaves behind."""
-        return Evidence(
-            job,
-            self.plan.measurer,
-            self.recipe,
-            self.thickness_mm,
-            self.frame,
-            self.measurement,
-            self.envelope,
-            self.pages,
-        )
 
 
 class _Stop(Exception):
@@ -125,37 +45,32 @@ class _Stop(Exception):
 
 
 class Cycle:
-    """Carries jobs out, one at a time. Camera and tracing run in `pool`, so that the heartbeat goes on meanwhile."""
+    """Carries jobs out, one at a time."""
 
     def __init__(
         self,
-        camera: Camera,
-        measurer: Measurer,
-        recipes: Mapping[int, Recipe],
-        journal: Journal,
-        health: Health,
-        link: Link | None,
-        counter: TransferCounter,
+        devices: Devices,
+        records: Records,
+        plan: Plan,
         settings: CycleSettings,
-        pool: ThreadPool,
         *,
-        observe: Callable[[Observation], None] = lambda _observation: None,
-        keeper: Keeper | None = None,
-        beat: Callable[[], None] = lambda: None,
+        feed_watchdog: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """keeper: is handed what a job leaves behind; None = nothing is kept."""
-        self._camera = camera
-        self._plan = Plan(measurer, recipes, settings.default_recipe)
-        self._journal = journal
-        self._health = health
-        self._link = link
-        self._counter = counter
+        self._camera = devices.camera
+        self._pool = devices.pool
+        self._link = devices.link
+        self._counter = devices.counter
+        self._journal = records.journal
+        self._health = records.health
+        self._keeper = records.keeper
+        self._observe = records.observe
+        self._durable = DurableJournal(
+            self._journal_fails, on_done=partial(records.health.report, "journal", None), feed_watchdog=feed_watchdog
+        )
+        self._plan = plan
         self._settings = settings
-        self._pool = pool
-        self._observe = observe
-        self._keeper = KeepsNothing() if keeper is None else keeper
-        self._beat = beat
+        self._feed_watchdog = feed_watchdog
         self._now = now
 
     def use(self, plan: Plan) -> None:
@@ -174,29 +89,29 @@ class Cycle:
 
     async def run(self, job: Job) -> Job:
         """The job, settled."""
-        course = _Course(job, self._plan)
+        ongoing = JobInProgress(job, self._plan)
         started = self._now()
         try:
-            settlement = await self._carry_out(course)
+            settlement = await self._carry_out(ongoing)
         except _Stop as stop:
             settlement = stop.settlement
         except asyncio.CancelledError:
-            self._abort(course)
+            self._abort(ongoing)
             raise
         except Exception as error:  # the one owner of defects: a job that was taken always ends
             log.exception("job %d: internal error", job.job_id)
             settlement = await self._end_defect(job, error)
         self._health.report("in-flight", None)  # the controller has decided, however long it took
-        course.report["total_ms"] = self._since(started)
-        return await self._settle(job, settlement, course)
+        ongoing.report["total_ms"] = self._since(started)
+        return await self._settle(job, settlement, ongoing)
 
     async def resume(self, job: Job) -> Job:
         """A job that a restart found in flight, settled: sent again bit-identical, or withdrawn (154)."""
-        course = _Course(job, self._plan, job.report, transfer=job.transfer)  # what is known of it stays its own
+        ongoing = JobInProgress(job, self._plan, job.report, transfer=job.transfer)  # what is known of it stays its own
         handshake = self._settings.transfer.handshake
         if not job.sent or self._link is None or not handshake:
             detail = "nothing of it was sent" if not job.sent else "whether it was taken cannot be known"
-            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), course)
+            return await self._settle(job, Settlement(Outcome.FAILED, Reason.SERVICE_RESTARTED, detail), ongoing)
         assert job.session is not None
         validity = self._validity(job.pages)
         lasts_s = validity.valid_for / 1000 or self._settings.lifetime_s
@@ -211,7 +126,7 @@ class Cycle:
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
         else:
             settlement = await transfer.run()
-        return await self._settle(job, settlement, course)
+        return await self._settle(job, settlement, ongoing)
 
     def hindrance(self, job: Job) -> str | None:
         """Why a job found in flight cannot be settled as the service is configured now; None where it can."""
@@ -229,52 +144,52 @@ class Cycle:
 
     # --- the steps ----------------------------------------------------------------------------------------------
 
-    async def _carry_out(self, course: _Course) -> Settlement:
-        job = course.job
-        recipe = course.recipe = _recipe(job, course.plan)
-        course.thickness_mm = job.trigger.thickness_um / 1000 if job.trigger.thickness_um else recipe.thickness_mm
-        course.terms = Terms(recipe.model_dump(mode="json"), course.plan.measurer.calibration_digest)
+    async def _carry_out(self, ongoing: JobInProgress) -> Settlement:
+        job = ongoing.job
+        recipe = ongoing.recipe = _recipe(job, ongoing.plan)
+        given_mm = job.trigger.thickness_um / 1000
+        thickness_mm = ongoing.thickness_mm = given_mm or recipe.thickness_mm
+        ongoing.terms = Terms(recipe.model_dump(mode="json"), ongoing.plan.measurer.calibration_digest)
         stamp = await self._stamp(job)
         stamped_at = self._now()
-        frame = course.frame = await self._frame(course.report)
-        self._beat()
-        measurement = course.measurement = await self._measure(course.plan.measurer, frame, recipe, course.thickness_mm)
-        self._beat()
-        course.report.update(measurement.summary())
+        frame = ongoing.frame = await self._frame(ongoing.report)
+        self._feed_watchdog()
+        measurement = ongoing.measurement = await self._measure(ongoing.plan.measurer, frame, recipe, thickness_mm)
+        self._feed_watchdog()
+        ongoing.report.update(measurement.summary())
         self._observe(Observation(job, frame, measurement))
         if measurement.reasons:
             raise _Stop(measurement.reasons[0], "; ".join(measurement.texts))
         if self._link is None:
             return Settlement(Outcome.WRITTEN, None, "no controller is configured")
         before = self._now()
-        pages = await self._make_pages(course, stamp, frame, measurement)
-        course.report["pages_ms"] = self._since(before)
+        pages = await self._make_pages(ongoing, stamp, frame, measurement)
+        ongoing.report["pages_ms"] = self._since(before)
         if self._settings.observe:
             return Settlement(Outcome.WRITTEN, None, f"observed only: {len(pages)} page(s) made, nothing sent")
-        lasts_s = self._settings.lifetime_s
-        lifetime = Lifetime(stamped_at + lasts_s, job.taken_at_s, lasts_s, self._now)
-        return await self._send(self._link, course, stamp, lifetime)
+        lifetime = self._lifetime(job, self._settings.lifetime_s, stamped_at)
+        return await self._send(self._link, ongoing, stamp, lifetime)
 
-    async def _send(self, link: Link, course: _Course, stamp: Stamp, lifetime: Lifetime) -> Settlement:
+    async def _send(self, link: Link, ongoing: JobInProgress, stamp: Stamp, lifetime: Lifetime) -> Settlement:
         """Bring the pages to the controller, all that is known of the job being durable before anything is sent."""
-        job, pages, target = course.job, course.pages, self._settings.target
-        course.transfer = _figures(stamp, pages)
-        drafted = self._keeper.draft(course.evidence(job))
+        job, pages, target = ongoing.job, ongoing.pages, self._settings.target
+        ongoing.transfer = _figures(stamp, pages)
+        drafted = self._keeper.draft(ongoing.evidence(job))
 
         async def before_sending() -> None:
             await self._drafted(job, drafted)  # first: with its pages in the journal a restart would send it
-            known = course.terms, course.report, course.transfer
-            await self._durably(self._journal.store_pages, job.job_id, stamp.session, pages, *known, target=target)
+            known = stamp.session, pages, ongoing.progress
+            await self._durable.until_done(self._journal.store_pages, job.job_id, *known, target=target)
 
         transfer = self._transfer(link, job, stamp.session, pages, lifetime, before_sending=before_sending)
         before = self._now()
         settlement = await transfer.run()
-        course.report["transfer_ms"] = self._since(before)
+        ongoing.report["transfer_ms"] = self._since(before)
         return settlement
 
     async def _drafted(self, job: Job, drafted: Future[None] | None) -> None:
         """Return once its evidence is durable, or cannot be: a contour does not wait for a disk that hangs."""
-        self._beat()
+        self._feed_watchdog()
         if drafted is not None:
             _, waiting = await asyncio.wait([asyncio.wrap_future(drafted)], timeout=EVIDENCE_WAIT_S)
             if not waiting:
@@ -286,18 +201,18 @@ class Cycle:
         return round((self._now() - started) * 1000, 1)
 
     async def _make_pages(
-        self, course: _Course, stamp: Stamp, frame: Frame, measurement: Measurement
+        self, ongoing: JobInProgress, stamp: Stamp, frame: Frame, measurement: Measurement
     ) -> tuple[Page, ...]:
-        assert course.recipe is not None
-        course.envelope = self._envelope(course.job, course.recipe, stamp, frame)
+        assert ongoing.recipe is not None
+        ongoing.envelope = self._envelope(ongoing.job, ongoing.recipe, stamp, frame)
         try:
             loop = asyncio.get_running_loop()  # in the pool: a large contour would hold the heartbeat up
-            course.pages = await loop.run_in_executor(self._pool, self._pages, measurement, course.envelope)
+            ongoing.pages = await loop.run_in_executor(self._pool, self._pages, measurement, ongoing.envelope)
         except ContourTooLarge as error:
             raise _Stop(Reason.TOO_MANY_POINTS, str(error)) from error
         except MailboxError as error:  # what passed the checks in float64 degenerates in whole micrometres
             raise _Stop(Reason.SELF_INTERSECTING, str(error)) from error
-        return course.pages
+        return ongoing.pages
 
     async def _stamp(self, job: Job) -> Stamp:
         """Session and clock of the controller, read before the exposure."""
@@ -330,7 +245,7 @@ class Cycle:
         loop = asyncio.get_running_loop()
         try:
             await loop.run_in_executor(self._pool, self._camera.open)
-            self._beat()
+            self._feed_watchdog()
             frame = await loop.run_in_executor(self._pool, self._camera.grab, asked_at, self._settings.camera_timeout_s)
         except CameraUnavailable as error:
             self._health.report("camera", Fault(Reason.NO_FRAME, str(error)))
@@ -393,31 +308,21 @@ class Cycle:
         """before_sending: None where the job was sent before."""
 
         async def before_withdrawal(reason: Reason) -> None:
-            await self._durably(self._journal.store_withdrawal, job.job_id, reason)
+            await self._durable.until_done(self._journal.store_withdrawal, job.job_id, reason)
 
         def on_stuck(why: str) -> None:
             self._health.report("in-flight", Fault(Reason.CONTROLLER_TIMEOUT, why))
 
-        return Transfer(
-            link,
-            self._settings.transfer,
-            self._counter,
-            job_id=job.job_id,
-            session=session,
-            pages=pages,
-            withdrawal=withdrawal(job.job_id, session, self._settings.mailbox.word_order),
-            lifetime=lifetime,
-            validity=self._validity(pages),
-            before_sending=before_sending or _nothing,
-            before_withdrawal=before_withdrawal,
-            on_stuck=on_stuck,
-            sent=before_sending is None,
-            beat=self._beat,
-        )
+        back = withdrawal(job.job_id, session, self._settings.mailbox.word_order)
+        sent = before_sending is None
+        outgoing = Outgoing(job.job_id, session, pages, back, self._validity(pages), sent)
+        steps = TransferSteps(before_sending or _nothing, before_withdrawal, on_stuck, self._feed_watchdog)
+        return Transfer(link, self._settings.transfer, self._counter, outgoing, lifetime, steps)
 
-    def _lifetime(self, job: Job, lasts_s: float) -> Lifetime:
-        """From now on, and not longer than that since it was taken."""
-        return Lifetime(self._now() + lasts_s, job.taken_at_s, lasts_s, self._now)
+    def _lifetime(self, job: Job, lasts_s: float, since_s: float | None = None) -> Lifetime:
+        """From `since_s` on, monotonic, or from now on, and not longer than that since it was taken."""
+        since_s = self._now() if since_s is None else since_s
+        return Lifetime(since_s + lasts_s, job.taken_at_s, lasts_s, self._now)
 
     def _validity(self, pages: tuple[Page, ...]) -> Validity:
         if not pages:
@@ -427,46 +332,32 @@ class Cycle:
 
     # --- the end ------------------------------------------------------------------------------------------------
 
-    async def _settle(self, job: Job, settlement: Settlement, course: _Course) -> Job:
-        settled = await self._durably(
+    async def _settle(self, job: Job, settlement: Settlement, ongoing: JobInProgress) -> Job:
+        settled = await self._durable.until_done(
             self._journal.settle,
             job.job_id,
             settlement.outcome,
             settlement.reason,
             settlement.detail,
-            course.report,
-            course.terms,
-            course.transfer,
+            ongoing.progress,
         )
-        self._keeper.keep(course.evidence(settled))
+        self._keeper.keep(ongoing.evidence(settled))
         return settled
 
-    async def _durably(self, write: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Read or write the journal, again and again until it is done: no step goes on without it."""
-        told = ""
-        while True:
-            self._beat()
-            try:
-                result = await asyncio.to_thread(write, *args, **kwargs)
-            except JournalError as error:
-                self._health.report("journal", journal_fault(error))
-                if str(error) != told:
-                    log.error("journal: %s", error)
-                told = str(error)
-                await asyncio.sleep(JOURNAL_PAUSE_S)
-            else:
-                self._health.report("journal", None)
-                return result
+    def _journal_fails(self, error: JournalError, again: bool) -> None:
+        self._health.report("journal", journal_fault(error))
+        if not again:
+            log.error("journal: %s", error)
 
-    def _abort(self, course: _Course) -> None:
+    def _abort(self, ongoing: JobInProgress) -> None:
         """At shutdown: a job of which nothing was sent ends here, one that was sent is settled by the next start."""
-        job = course.job
+        job = ongoing.job
         try:
             known = self._journal.find(job.job_id)
             if known is not None and known.outcome is None and not known.sent:
                 end = Outcome.FAILED, Reason.ABORTED, "the service was stopped"
-                settled = self._journal.settle(job.job_id, *end, course.report, course.terms, course.transfer)
-                self._keeper.keep(course.evidence(settled))
+                settled = self._journal.settle(job.job_id, *end, ongoing.progress)
+                self._keeper.keep(ongoing.evidence(settled))
                 log.warning("job %d failed: %d aborted", job.job_id, Reason.ABORTED)
                 return
         except JournalError as error:
@@ -476,7 +367,7 @@ class Cycle:
     async def _end_defect(self, job: Job, error: Exception) -> Settlement:
         """A defect's settlement; a job that was sent is withdrawn first."""
         detail = f"{type(error).__name__}: {error}"
-        known = await self._durably(self._journal.find, job.job_id)
+        known = await self._durable.until_done(self._journal.find, job.job_id)
         never_answered = self._link is None or not self._settings.transfer.handshake
         if known is None or not known.sent or known.session is None or never_answered:
             return Settlement(Outcome.FAILED, Reason.INTERNAL_ERROR, detail)

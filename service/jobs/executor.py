@@ -7,24 +7,25 @@ import logging
 import secrets
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
-from typing import ParamSpec, Protocol, TypeVar
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Protocol
 
-from drivers.controller.mailbox.mailbox import TEST_VALUE, ServiceBlock
+from drivers.controller.mailbox.blocks import TEST_VALUE, ServiceBlock
 from service.jobs.health import Fault, Health, journal_fault
 from service.jobs.job_log import log_end
 from service.jobs.trigger_queue import Queued, Ticket, TriggerQueue, TriggerRefused
-from service.link.link import Link
+from service.link.link import Link, LinkListener
 from service.reasons import Reason
-from service.records.journal import GoneOn, Job, Journal, JournalError, TriggerStamp
+from service.records.durable_journal import DurableJournal
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
+from service.records.journal_restart import GoneOn
 from service.state import State
 
 log = logging.getLogger("combtrace.jobs")
 
-P = ParamSpec("P")
-R = TypeVar("R")
-
-JOURNAL_PAUSE_S = 1.0
 QUEUE_LOOK_S = 0.25  # how often those that wait are looked at where nothing else wakes the loop
 IDLE_LOOK_S = 1.0  # a loop that turns shows that it lives
 ROOM = 1000  # protocol: a start numbers from at least so far above all it finds, for another may hold the same journal
@@ -44,13 +45,24 @@ class JobRunner(Protocol):
         """Why a job found in flight cannot be settled as the service is configured now; None where it can."""
 
 
+@dataclass(frozen=True)
+class Intake:
+    """Which triggers are taken. queue: where they wait while a job is executed; without room they are refused as busy.
+
+    controller: its own trigger too.
+    """
+
+    controller: bool = False
+    queue: TriggerQueue = field(default_factory=lambda: TriggerQueue(0, 0.0))
+
+
 def missed_between(last: tuple[int, int], session: int, counter: int) -> int:
     """Trigger values of the controller that were skipped between the pair last taken and (session, counter)."""
     before = last[1] if last[0] == session else 0
     return (counter - before - 1) % COUNTER_VALUES
 
 
-class Executor:
+class Executor(LinkListener):
     """One job at a time, from any trigger. Jobs found in flight come first, then the controller's trigger."""
 
     def __init__(
@@ -59,21 +71,20 @@ class Executor:
         runner: JobRunner,
         health: Health,
         link: Link | None,
+        intake: Intake,
         *,
-        controller_triggers: bool,
-        queue: TriggerQueue | None = None,
-        on_settled: Callable[[Job], None] | None = None,
-        beat: Callable[[], None] = lambda: None,
+        feed_watchdog: Callable[[], None] = lambda: None,
     ) -> None:
-        """queue: where triggers wait while a job is executed; None = they are refused as busy."""
         self._journal = journal
         self._runner = runner
         self._health = health
         self._link = link
-        self._controller_triggers = controller_triggers and link is not None
-        self._queue = TriggerQueue(0, 0.0) if queue is None else queue
-        self.on_settled = [] if on_settled is None else [on_settled]  # told of each job's end; they must not block
-        self._beat = beat
+        self._durable = DurableJournal(self._journal_fails, on_done=partial(health.report, "journal", None))
+        self._in_flight = DurableJournal(self._jobs_in_flight_unknown, feed_watchdog=feed_watchdog)
+        self._controller_triggers = intake.controller and link is not None
+        self._queue = intake.queue
+        self.on_settled: list[Callable[[Job], None]] = []  # told of each job's end; they must not block
+        self._feed_watchdog = feed_watchdog
         self._tickets: dict[int, asyncio.Future[Job]] = {}
         self.counts: Counter[tuple[str, str]] = Counter()
         self._wake = asyncio.Event()
@@ -81,7 +92,7 @@ class Executor:
         self._submitting: asyncio.Future[Ticket] | None = None
         self._taking = False
         self._missed = 0
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
         self.settled_job = 0
         self.last_settled: Job | None = None
         self._last_pair = journal.last_controller_trigger()
@@ -93,7 +104,7 @@ class Executor:
         self._observing_since: tuple[int, int] | None = None
         self._restore_published()
         if link is not None:
-            link.on_found = self._begin_at
+            link.listen(self)
 
     def _restore_published(self) -> None:
         """What the service block said before the restart: it is true still."""
@@ -110,31 +121,31 @@ class Executor:
             reject_reason=int(settled.reason) if settled and settled.reason else 0,
             owner=self._journal.owner,
         )
-        self._link.highest_known = taken.job_id if taken else 0
+        self._link.numbers.highest_known = taken.job_id if taken else 0
 
-    async def _begin_at(self, block: ServiceBlock) -> None:
+    async def service_block_found(self, found: ServiceBlock) -> None:
         """Go on where the service block ends that stands at the controller, whoever wrote it.
 
         It may be another's, or our own of a journal that was lost or is older than it: a trigger that it shows as taken
         is not taken again, a job that had not ended there is taken back, and numbers go on well above.
         """
         assert self._link is not None
-        ours = block.owner == self._link.published.owner
-        if (block.protocol_version, block.test_value) != (ServiceBlock().protocol_version, TEST_VALUE):
-            block = replace(block, job_id=0, settled_job=0, trigger_ack=0)  # whatever stands there, it is no service's
+        ours = found.owner == self._link.published.owner
+        if (found.protocol_version, found.test_value) != (ServiceBlock().protocol_version, TEST_VALUE):
+            found = replace(found, job_id=0, settled_job=0, trigger_ack=0)  # whatever stands there, it is no service's
         view = self._link.view
         trigger = (view.session, view.trigger_counter) if view else (0, 0)
         running = self._health.job or 0
-        gone_on = await self._until_done(self._journal.go_on_above, block, trigger, self._room, running)
+        gone_on = await self._durable.until_done(self._journal.go_on_above, found, trigger, self._room, running)
         self._numbered_above_last_job = False
-        self._last_pair = await self._until_done(self._journal.last_controller_trigger)
-        taken = await self._until_done(self._journal.last_taken)
-        if taken is None or taken.job_id <= block.job_id:
-            self._link.publish(job_id=block.job_id)
-        if block.settled_job > self.settled_job:
-            self.settled_job = block.settled_job
-            self._link.publish(settled_job=block.settled_job, reject_reason=block.reject_reason)
-        self._link.highest_known = max(self._link.highest_known, block.job_id, block.settled_job)
+        self._last_pair = await self._durable.until_done(self._journal.last_controller_trigger)
+        taken = await self._durable.until_done(self._journal.last_taken)
+        if taken is None or taken.job_id <= found.job_id:
+            self._link.publish(job_id=found.job_id)
+        if found.settled_job > self.settled_job:
+            self.settled_job = found.settled_job
+            self._link.publish(settled_job=found.settled_job, reject_reason=found.reject_reason)
+        self._link.numbers.highest_known = max(self._link.numbers.highest_known, found.job_id, found.settled_job)
         self._link.publish(trigger_ack=self._last_pair[1], session_ack=self._last_pair[0])
         self._tell_found(gone_on, ours)
         if gone_on.in_flight is not None:
@@ -153,19 +164,15 @@ class Executor:
         if gone_on.in_flight is not None:
             log.log(level, "%s: job %d, which had not ended, is taken back", whose, gone_on.in_flight)
 
-    async def _until_done(self, access: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        while True:
-            try:
-                result = await asyncio.to_thread(access, *args, **kwargs)
-            except JournalError as error:
-                self._tell(f"journal: {error}")
-                self._health.report("journal", journal_fault(error))
-                if self._link is not None:
-                    self._link.on_round()  # its task waits here, and is alive
-                await asyncio.sleep(JOURNAL_PAUSE_S)
-            else:
-                self._health.report("journal", None)
-                return result
+    def _journal_fails(self, error: JournalError, _again: bool) -> None:
+        self._log_once(f"journal: {error}")
+        self._health.report("journal", journal_fault(error))
+        if self._link is not None:
+            self._link.feed_watchdog()  # its task waits here, and is alive
+
+    def _jobs_in_flight_unknown(self, error: JournalError, _again: bool) -> None:
+        self._log_once(f"journal: {error}")
+        self._health.report("in-flight", journal_fault(error))
 
     @property
     def missed(self) -> int:
@@ -175,6 +182,10 @@ class Executor:
     def wake(self) -> None:
         """Something changed that may let a job begin."""
         self._wake.set()
+
+    def link_changed(self) -> None:
+        """The controller may ask for a job, or be ready for one."""
+        self.wake()
 
     def ignore_controller(self) -> None:
         """Take no triggers of the controller; they stay pending."""
@@ -232,12 +243,12 @@ class Executor:
     def _refused(self, trigger: TriggerStamp, refused: TriggerRefused) -> None:
         self.counts[trigger.kind, refused.reason.label] += 1
         self._count_missed(1)
-        self._tell(f"trigger {trigger.kind} not taken: {refused.reason.label}: {refused}")
+        self._log_once(f"trigger {trigger.kind} not taken: {refused.reason.label}: {refused}")
 
-    def _tell(self, refusal: str) -> None:
+    def _log_once(self, refusal: str) -> None:
         """Log a refusal, once until a trigger is taken: at intervals it would come back all night."""
-        log.log(logging.DEBUG if refusal in self._told else logging.WARNING, refusal)
-        self._told.add(refusal)
+        log.log(logging.DEBUG if refusal in self._logged else logging.WARNING, refusal)
+        self._logged.add(refusal)
 
     def _check_free(self) -> None:
         if self._health.job is not None or self._submitted is not None or self._taking:
@@ -274,7 +285,7 @@ class Executor:
             raise TriggerRefused(fault.reason, fault.text) from error
         self._health.report("journal", None)
         self._numbered_above_last_job = True
-        self._told.clear()
+        self._logged.clear()
         self.counts[trigger.kind, "taken"] += 1
         log.debug("job %d taken: trigger %s, recipe %s", job.job_id, trigger.kind, trigger.recipe or "default")
         if self._link is not None:
@@ -283,7 +294,7 @@ class Executor:
 
     def _above(self) -> int:
         """What the controller's `last_job` has a new number be above."""
-        last_job = self._link.last_job if self._link else None
+        last_job = self._link.reading.last_job if self._link else None
         if not last_job:
             return 0
         return last_job if self._numbered_above_last_job else last_job + self._room
@@ -299,7 +310,7 @@ class Executor:
         """Execute jobs for ever; first those that a restart found in flight."""
         self._found = True
         while True:
-            self._beat()
+            self._feed_watchdog()
             self._wake.clear()
             if self._found and not self._taking:  # a job that is only being taken is none of before
                 self._found = False
@@ -371,7 +382,9 @@ class Executor:
             self._refuse_queued(waiting, refused)
 
     async def _settle_in_flight(self) -> None:
-        for job in await self._unsettled():
+        # Until they are known, no trigger is taken; in this thread, so that none may come in between.
+        unsettled = await self._in_flight.until_done_here(self._journal.unsettled)
+        for job in unsettled:
             if self._submitted is not None and job.job_id == self._submitted.job.job_id:
                 continue
             hindrance = self._runner.hindrance(job)
@@ -390,17 +403,6 @@ class Executor:
         text = f"job {job_id} of before the restart is not settled yet"
         self._health.report("in-flight", Fault(Reason.SERVICE_RESTARTED, text))
 
-    async def _unsettled(self) -> tuple[Job, ...]:
-        """Jobs of before the start without an end; until they are known, no trigger is taken."""
-        while True:
-            try:
-                return self._journal.unsettled()  # in this thread: no trigger may come in between
-            except JournalError as error:
-                self._beat()
-                self._tell(f"journal: {error}")
-                self._health.report("in-flight", journal_fault(error))
-                await asyncio.sleep(JOURNAL_PAUSE_S)
-
     def _pending(self) -> TriggerStamp | None:
         """The controller's open trigger, where there is one and it can be taken now."""
         if not self._controller_triggers or self._link is None or self._link.view is None:
@@ -408,7 +410,7 @@ class Executor:
         if self._health.state is not State.READY or self._taking:
             return None
         view = self._link.view
-        if view.session == 0 or self._link.fault() is not None or self._link.number_in_doubt() is not None:
+        if view.session == 0 or self._link.fault() is not None or self._link.numbers.in_doubt() is not None:
             return None
         pair = (view.session, view.trigger_counter)
         if self._link.settings.observe and self._observing_since is None:
@@ -425,7 +427,7 @@ class Executor:
         try:
             job = await self._take(trigger)
         except TriggerRefused as refused:  # it stays pending, and is taken once the journal works again
-            self._tell(f"trigger controller not taken yet: {refused.reason.label}: {refused}")
+            self._log_once(f"trigger controller not taken yet: {refused.reason.label}: {refused}")
             return
         finally:
             self._taking = False

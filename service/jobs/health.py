@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from service.reasons import Reason
-from service.records.journal import JournalError, JournalFull
+from service.records.journal_file import JournalError, JournalFull
 from service.state import State, StateMachine
 
 # In this order the first is told: what a person repairs first.

@@ -7,7 +7,7 @@ from typing import Any
 
 from service.logs import event
 from service.reasons import Outcome
-from service.records.journal import Job
+from service.records.job import Job
 
 STAGES = ("frame_ms", "pages_ms", "transfer_ms", "total_ms")
 
@@ -16,7 +16,7 @@ def log_end(log: logging.Logger, job: Job) -> None:
     """Log how a settled job ended; as a warning where it was not accepted or written."""
     done = job.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
     figures = " ".join(f"{name}={value}" for name, value in _figures(job).items() if value is not None)
-    sentence = f"job {job.job_id} {job.outcome}{_told(job, done)} {figures}"
+    sentence = f"job {job.job_id} {job.outcome}{_ending(job, done)} {figures}"
     log.log(logging.INFO if done else logging.WARNING, sentence, extra=event("job", **fields(job)))
 
 
@@ -38,7 +38,7 @@ def fields(job: Job) -> dict[str, Any]:
     }
 
 
-def _told(job: Job, done: bool) -> str:
+def _ending(job: Job, done: bool) -> str:
     report = job.report
     if done and report.get("vertices"):
         area = report.get("area_mm2")

@@ -52,13 +52,13 @@ class Malformed:
     name: str
 
 
-Request = TriggerRequest | StatusRequest | PingRequest | Malformed
+SerialRequest = TriggerRequest | StatusRequest | PingRequest | Malformed
 
 
-_WORDS: dict[bytes, Request] = {b"TRIG": TriggerRequest(), b"STAT": StatusRequest(), b"PING": PingRequest()}
+_WORDS: dict[bytes, SerialRequest] = {b"TRIG": TriggerRequest(), b"STAT": StatusRequest(), b"PING": PingRequest()}
 
 
-def parse_line(line: bytes) -> Request | None:
+def parse_line(line: bytes) -> SerialRequest | None:
     """What a line asks for; None for one that is empty or blank, which is not answered. Never raises."""
     words = line.upper().split()
     if len(line) > LONGEST:
@@ -73,7 +73,7 @@ def parse_line(line: bytes) -> Request | None:
     return Malformed(*BAD_REQUEST)
 
 
-def _trigger(number: bytes) -> Request:
+def _trigger(number: bytes) -> SerialRequest:
     if not re.fullmatch(rb"[0-9]+", number) or int(number) > LARGEST_RECIPE:
         return Malformed(*UNKNOWN_RECIPE)
     return TriggerRequest(int(number) or None)

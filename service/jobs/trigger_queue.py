@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from service.reasons import Reason
-from service.records.journal import Job, TriggerStamp
+from service.records.job import Job, TriggerStamp
 
 
 class TriggerRefused(Exception):

@@ -5,13 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-from collections.abc import Awaitable, Callable, Coroutine
-from concurrent.futures import Executor as ThreadPool
-from typing import Any, ParamSpec, Protocol, TypeVar
+from collections.abc import Callable, Coroutine
+from typing import Any
 
 from drivers.trigger import LineTrigger, PulseTrigger, TriggerUnavailable
 from service.jobs.executor import Executor
-from service.jobs.health import Fault, Health
+from service.jobs.kept_port import KeptPort
 from service.jobs.trigger_lines import (
     Malformed,
     PingRequest,
@@ -27,21 +26,14 @@ from service.jobs.trigger_lines import (
 )
 from service.jobs.trigger_queue import Queued, Ticket, TriggerRefused
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Journal, JournalError, TriggerStamp
+from service.records.durable_journal import DurableJournal
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.triggers")
 
-READ_TIMEOUT_S = 0.25  # how long a stop waits for the thread that reads
-RETRY_PAUSES_S = (0.2, 0.5, 1.0)
 MOST_OWED = 20  # ends told to a line that was away, the newest: whoever has missed more must look into the journal
-
-P = ParamSpec("P")
-R = TypeVar("R")
-T = TypeVar("T")
-
-
-def _nothing() -> None:
-    return
 
 
 async def interval_trigger(executor: Executor, period_s: float) -> None:
@@ -61,81 +53,18 @@ async def interval_trigger(executor: Executor, period_s: float) -> None:
             continue
 
 
-class Port(Protocol):
-    """What all serial triggers can: open, also while open, and close."""
-
-    def open(self) -> None:
-        """Open it; raise TriggerUnavailable."""
-
-    def close(self) -> None:
-        """Let it go; never raises."""
-
-
-async def keep_open(
-    port: Port,
-    name: str,
-    health: Health,
-    pool: ThreadPool,
-    listen: Callable[[], Awaitable[T]],
-    serve: Callable[[T], Awaitable[None]],
-) -> None:
-    """Serve a port for ever; while it is away its fault is told, and it is opened again with growing pauses.
-
-    listen: hears for a moment. serve: gets what was heard first, and goes on until the port is lost.
-    """
-    part = f"serial {name}"
-    loop = asyncio.get_running_loop()
-    failures = 0
-    try:
-        while True:
-            try:
-                await loop.run_in_executor(pool, port.open)
-                heard = await listen()  # a port that opens and then cannot be read is not back
-                if failures:
-                    log.info("serial %s: is back", name)
-                failures = 0
-                health.report(part, None)
-                await serve(heard)
-            except TriggerUnavailable as error:
-                if failures == 0:
-                    log.warning("serial: %s", error)
-                health.report(part, Fault(Reason.NOT_READY, str(error)))
-                port.close()
-                await asyncio.sleep(RETRY_PAUSES_S[min(failures, len(RETRY_PAUSES_S) - 1)])
-                failures += 1
-    finally:
-        port.close()
-
-
 class SerialPulses:
     """Serves a port whose every pulse asks for a job. Nothing can be answered; the log and the counts tell."""
 
-    def __init__(
-        self,
-        port: PulseTrigger,
-        name: str,
-        trigger: TriggerStamp,
-        executor: Executor,
-        health: Health,
-        pool: ThreadPool,
-        *,
-        beat: Callable[[], None] = _nothing,
-    ) -> None:
+    def __init__(self, pulses: PulseTrigger, port: KeptPort, trigger: TriggerStamp, executor: Executor) -> None:
+        self._pulses = pulses
         self._port = port
-        self._name = name
         self._trigger = trigger
         self._executor = executor
-        self._health = health
-        self._pool = pool
-        self._beat = beat
 
     async def run(self) -> None:
         """Serve the port for ever."""
-        await keep_open(self._port, self._name, self._health, self._pool, self._listen, self._serve)
-
-    async def _listen(self) -> bool:
-        self._beat()
-        return await asyncio.get_running_loop().run_in_executor(self._pool, self._port.wait, READ_TIMEOUT_S)
+        await self._port.serve(self._pulses.wait, self._serve)
 
     async def _serve(self, pulse: bool) -> None:
         while True:
@@ -143,8 +72,8 @@ class SerialPulses:
                 try:
                     await self._executor.ask(self._trigger)
                 except TriggerRefused as refused:
-                    log.debug("serial %s: %s", self._name, refused)  # the executor has told and counted it
-            pulse = await self._listen()
+                    log.debug("serial %s: %s", self._port.name, refused)  # the executor has told and counted it
+            pulse = await self._port.listen(self._pulses.wait)
 
 
 class SerialTrigger:
@@ -155,25 +84,14 @@ class SerialTrigger:
     """
 
     def __init__(
-        self,
-        port: LineTrigger,
-        name: str,
-        executor: Executor,
-        health: Health,
-        journal: Journal,
-        status: Callable[[], str],
-        pool: ThreadPool,
-        *,
-        beat: Callable[[], None] = _nothing,
+        self, line: LineTrigger, port: KeptPort, executor: Executor, journal: Journal, status: Callable[[], str]
     ) -> None:
+        self._line = line
         self._port = port
-        self._name = name
         self._executor = executor
-        self._health = health
         self._journal = journal
+        self._durable = DurableJournal(self._journal_fails)
         self._status = status
-        self._pool = pool
-        self._beat = beat
         self._replies: set[asyncio.Task[None]] = set()
         self._look = asyncio.Event()
         self._telling = False
@@ -187,31 +105,27 @@ class SerialTrigger:
 
     def job_ended(self, job: Job) -> None:
         """Told of each job's end, which may be owed to this line."""
-        if job.trigger.line == self._name:
+        if job.trigger.line == self._port.name:
             self._look.set()
 
     async def run(self) -> None:
         """Serve the line for ever."""
-        last = await self._from_journal(self._journal.last_taken)
+        last = await self._durable.until_done(self._journal.last_taken)
         self._of_before = last.job_id if last else 0
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self._tell_ends())
-                await keep_open(self._port, self._name, self._health, self._pool, self._read, self._serve)
+                await self._port.serve(self._line.read_line, self._serve)
         finally:
             for task in self._replies:
                 task.cancel()
-
-    async def _read(self) -> bytes | None:
-        self._beat()
-        return await asyncio.get_running_loop().run_in_executor(self._pool, self._port.read_line, READ_TIMEOUT_S)
 
     async def _serve(self, line: bytes | None) -> None:
         self._look.set()
         while True:
             if line is not None:
                 await self._answer(line)
-            line = await self._read()
+            line = await self._port.listen(self._line.read_line)
 
     async def _answer(self, line: bytes) -> None:
         """Reply to a line; an empty one gets none."""
@@ -223,14 +137,14 @@ class SerialTrigger:
             case StatusRequest():
                 await self._send(self._status())
             case Malformed(code=code, name=name):
-                log.warning("serial %s: not understood: %r", self._name, line[:81])
+                log.warning("serial %s: not understood: %r", self._port.name, line[:81])
                 await self._send(nak(code, name))
             case TriggerRequest(recipe=recipe):
                 await self._trigger(recipe)
 
     async def _trigger(self, recipe: int | None) -> None:
         try:
-            taken = await self._executor.ask(TriggerStamp("serial", recipe or 0, line=self._name))
+            taken = await self._executor.ask(TriggerStamp("serial", recipe or 0, line=self._port.name))
         except TriggerRefused as refused:
             await self._send(nak(int(refused.reason), refused.reason.label))
             return
@@ -262,7 +176,7 @@ class SerialTrigger:
             else:
                 await self._acknowledge(ticket)
         except TriggerUnavailable as error:
-            log.warning("serial %s: a trigger that waited could not be answered: %s", self._name, error)
+            log.warning("serial %s: a trigger that waited could not be answered: %s", self._port.name, error)
 
     async def _tell_ends(self) -> None:
         """Tell the line, for ever, how its jobs have ended; what finds it gone is told when it is back."""
@@ -273,20 +187,20 @@ class SerialTrigger:
             try:
                 await self._tell_owed()
             except TriggerUnavailable as error:
-                log.warning("serial %s: the end of a job could not be told yet: %s", self._name, error)
+                log.warning("serial %s: the end of a job could not be told yet: %s", self._port.name, error)
             finally:
                 self._telling = False
 
     async def _tell_owed(self) -> None:
         owed = [
             job
-            for job in await self._from_journal(self._journal.owed, self._name)
+            for job in await self._durable.until_done(self._journal.owed, self._port.name)
             if job.job_id <= self._of_before or job.job_id in self._acknowledged
         ]
         if given_up := [job.job_id for job in owed[:-MOST_OWED]]:
             span = f"{given_up[0]} to {given_up[-1]}"
             log.warning(
-                "serial %s: was away; %d ends are not told any more, of jobs %s", self._name, len(given_up), span
+                "serial %s: was away; %d ends are not told any more, of jobs %s", self._port.name, len(given_up), span
             )
             await self._cross_off(given_up)
         for job in owed[-MOST_OWED:]:
@@ -294,24 +208,16 @@ class SerialTrigger:
             await self._cross_off([job.job_id])
 
     async def _cross_off(self, job_ids: list[int]) -> None:
-        await self._from_journal(self._journal.told, job_ids)
+        await self._durable.until_done(self._journal.cross_off, job_ids)
         self._acknowledged.difference_update(job_ids)
 
-    async def _from_journal(self, access: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Read or write the journal, again and again until it is done."""
-        trouble = ""
-        while True:
-            try:
-                return await asyncio.to_thread(access, *args, **kwargs)
-            except JournalError as error:
-                if str(error) != trouble:
-                    log.warning("serial %s: what is owed to it: %s", self._name, error)
-                trouble = str(error)
-                self._beat()
-                await asyncio.sleep(RETRY_PAUSES_S[-1])
+    def _journal_fails(self, error: JournalError, again: bool) -> None:
+        if not again:
+            log.warning("serial %s: what is owed to it: %s", self._port.name, error)
+        self._port.feed_watchdog()
 
     async def _send(self, text: str) -> None:
-        await asyncio.get_running_loop().run_in_executor(None, self._port.write_line, text)
+        await asyncio.get_running_loop().run_in_executor(None, self._line.write_line, text)
 
 
 def result_line(job: Job) -> str:

@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivers.controller.mailbox.mailbox import (
-    ContourMessage,
-    ContourTooLarge,
-    Page,
-    WordOrder,
-    encode_pages,
-    micrometres,
-)
+from drivers.controller.errors import ContourTooLarge
+from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages, micrometres
+from drivers.controller.mailbox.words import WordOrder
 from service.measuring.measurement import Measurement
 
 UNCERTAINTY_FACTOR = 1000.0  # mm to µm

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivers.controller.mailbox.mailbox import LinkBlock
+from drivers.controller.mailbox.blocks import LinkBlock
 
 TOLERANCE_MS = 1000  # protocol: a reading counts only if it fits the last one that counted within 1 s
 MODULUS = 1 << 32

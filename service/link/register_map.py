@@ -11,18 +11,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from enum import IntEnum
 from pathlib import Path
 
-from drivers.controller.mailbox.mailbox import (
-    HEADER_FIELDS,
-    HEADER_REGISTERS,
-    LINK_FIELDS,
-    SERVICE_FIELDS,
-    TEST_VALUE,
-    UNKNOWN_UNCERTAINTY,
-    Answer,
-    ControllerState,
-    Field,
-    MailboxLayout,
-)
+from drivers.controller.mailbox.blocks import LINK_FIELDS, SERVICE_FIELDS, TEST_VALUE, Answer, ControllerState
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import HEADER_FIELDS, HEADER_REGISTERS, UNKNOWN_UNCERTAINTY
+from drivers.controller.mailbox.words import Field
 from service.reasons import Reason
 from service.state import State
 

@@ -1,26 +1,32 @@
 """One job's pages to the controller, by the protocol's "A transfer": it ends only where the controller has decided.
 
-Of one job, `before_sending` is called once, before the first request that carries any of it; `before_withdrawal` before
-the first request that takes it back. Both make it durable, so that a restart goes on where this left off. `on_stuck` is
-told why a withdrawal gets no decision; it goes on all the same. While another service writes to the controller, nothing
-is sent, and what the controller's block says is all that can end the job.
+What is about to be sent, or taken back, is made durable first, so that a restart goes on where this left off; see
+`TransferSteps`. A withdrawal that gets no decision goes on all the same. While another service writes to the
+controller, nothing is sent, and what the controller's block says is all that can end the job.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import time
-from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import NoReturn
 
 from drivers.controller import ControllerError, ControllerUnavailable
-from drivers.controller.mailbox.mailbox import Answer, LinkBlock, Page
+from drivers.controller.mailbox.blocks import Answer, LinkBlock
+from drivers.controller.mailbox.pages import Page
 from service.link.controller_clock import MODULUS
-from service.link.link import Link, LinkUnsteady
+from service.link.link import Link
 from service.link.ownership import ForeignOwner
+from service.link.reading import LinkUnsteady, echo_fault
+from service.link.transfer_terms import (
+    Lifetime,
+    Outgoing,
+    Settlement,
+    TransferCounter,
+    TransferSettings,
+    TransferSteps,
+)
 from service.reasons import Outcome, Reason
 
 log = logging.getLogger("combtrace.transfer")
@@ -31,63 +37,6 @@ WAIT_SLICE_S = 1.0
 CAN_BE_REPEATED = (Answer.BAD_CRC, Answer.BAD_LAYOUT, Answer.OUTDATED)
 
 
-@dataclass(frozen=True)
-class TransferSettings:
-    """Bounds of one transfer; names and meaning as in the configuration's `controller`."""
-
-    handshake: bool = True
-    readback: bool = True
-    ready_timeout_s: float = 30.0
-    ack_timeout_s: float = 5.0
-    max_repeats: int = 3
-    poll_period_s: float = 0.05
-
-
-@dataclass(frozen=True)
-class Settlement:
-    """How a job ended: outcome, reason where it was not accepted or written, and a sentence of detail."""
-
-    outcome: Outcome
-    reason: Reason | None = None
-    detail: str | None = None
-
-
-@dataclass(frozen=True)
-class Lifetime:
-    """Until when a job may be sent: by the monotonic clock, and by the machine's own, which a suspended machine keeps.
-
-    ends_at_s: monotonic. taken_at_s: Unix time, None where it is not known; lasts_s: from then on.
-    """
-
-    ends_at_s: float
-    taken_at_s: float | None = None
-    lasts_s: float = 0.0
-    now: Callable[[], float] = time.monotonic
-    unix: Callable[[], float] = time.time
-
-    @property
-    def left_s(self) -> float:
-        """Seconds that are left, 0 where it is over; so it is, too, where the machine's clock went back."""
-        left_s = self.ends_at_s - self.now()
-        if self.taken_at_s is not None:
-            age_s = self.unix() - self.taken_at_s
-            left_s = min(left_s, self.lasts_s - age_s if age_s >= 0 else 0.0)
-        return max(0.0, left_s)
-
-    @property
-    def over(self) -> bool:
-        """True where the job must not be sent, or sent again."""
-        return self.left_s == 0.0
-
-
-@dataclass(frozen=True)
-class Validity:
-    """What the controller accepts the contour by: `captured_at` and `valid_for`, ms on its clock; 0 = no limit."""
-
-    captured_at: int = 0
-    valid_for: int = 0
-
-
 class _Ended(Exception):
     """The controller's block settles the job: leaves the steps from wherever it was looked at."""
 
@@ -96,56 +45,29 @@ class _Ended(Exception):
         self.settlement = settlement
 
 
-class TransferCounter:
-    """Values for the commit register: the next one at each attempt, never 0, never the one last answered."""
-
-    def __init__(self, start: int) -> None:
-        self._last = start & 0xFFFF
-
-    def next(self, ack_transfer: int) -> int:
-        """A value that is neither 0, nor `ack_transfer`, nor the one given before."""
-        value = self._last
-        while value in (0, ack_transfer, self._last):
-            value = (value + 1) & 0xFFFF
-        self._last = value
-        return value
-
-
 class Transfer:
-    """Brings one job to its end at the controller. sent: a request of it may have been sent before."""
+    """Brings one job to its end at the controller."""
 
     def __init__(
         self,
         link: Link,
         settings: TransferSettings,
         counter: TransferCounter,
-        *,
-        job_id: int,
-        session: int,
-        pages: tuple[Page, ...],
-        withdrawal: Page,
+        outgoing: Outgoing,
         lifetime: Lifetime,
-        validity: Validity,
-        before_sending: Callable[[], Awaitable[None]],
-        before_withdrawal: Callable[[Reason], Awaitable[None]],
-        on_stuck: Callable[[str], None] = lambda _why: None,
-        sent: bool = False,
-        beat: Callable[[], None] = lambda: None,
+        steps: TransferSteps,
     ) -> None:
         self._link = link
         self._settings = settings
         self._counter = counter
-        self._job_id = job_id
-        self._session = session
-        self._pages = pages
-        self._withdrawal = withdrawal
+        self._job_id = outgoing.job_id
+        self._session = outgoing.session
+        self._pages = outgoing.pages
+        self._withdrawal = outgoing.withdrawal
+        self._validity = outgoing.validity
+        self._sent = outgoing.sent
         self._lifetime = lifetime
-        self._validity = validity
-        self._before_sending = before_sending
-        self._before_withdrawal = before_withdrawal
-        self._on_stuck = on_stuck
-        self._sent = sent
-        self._beat = beat
+        self._steps = steps
         self._now = lifetime.now
         self._withdrawn_for: tuple[Reason, str] | None = None
         self._committed: int | None = None  # the last value that this transfer wrote, or may have written
@@ -168,7 +90,7 @@ class Transfer:
         """Step 8: take the job back, again and again, until the controller has decided."""
         log.warning("job %d: withdrawing: %s (%s)", self._job_id, reason.label, detail)
         self._withdrawn_for = (reason, detail)
-        await self._before_withdrawal(reason)
+        await self._steps.before_withdrawal(reason)
         in_vain = 0
         try:
             while True:
@@ -181,10 +103,12 @@ class Transfer:
                 except ControllerUnavailable:
                     await self._connected()
                 except ControllerError as error:
-                    self._told(str(error))
+                    self._note(str(error))
                 in_vain += 1
                 if in_vain == self._settings.max_repeats:
-                    self._on_stuck(f"job {self._job_id} cannot be taken back: {self._trouble or 'connection lost'}")
+                    self._steps.on_stuck(
+                        f"job {self._job_id} cannot be taken back: {self._trouble or 'connection lost'}"
+                    )
                 await asyncio.sleep(WITHDRAWAL_PAUSE_S)
         except _Ended as ended:
             return ended.settlement
@@ -200,13 +124,14 @@ class Transfer:
 
     async def _see(self) -> LinkBlock:
         """The controller's block, empty where it says nothing; raise _Ended where it ends the job."""
-        self._beat()
+        self._steps.feed_watchdog()
         view = await self._link.look()
-        if view.session == 0 or self._link.echo_fault(view) is not None:
+        if view.session == 0 or echo_fault(view) is not None:
             return LinkBlock()  # it is being filled, or misread: nothing is concluded from it
-        if view.last_job == self._job_id and view.last_result != 0 and (self._link.holds or self._acknowledged(view)):
+        holds = self._link.reading.holds
+        if view.last_job == self._job_id and view.last_result != 0 and (holds or self._acknowledged(view)):
             self._end_by(view.last_result)
-        if self._link.holds:
+        if holds:
             self._end_without(view)
         return view
 
@@ -250,7 +175,7 @@ class Transfer:
 
     async def _stand_by(self, foreign: ForeignOwner) -> None:
         """Only read until this service may write again; raise _Ended where the job's end is known before that."""
-        self._told(str(foreign))
+        self._note(str(foreign))
         ownership = self._link.ownership
         while not ownership.ours:
             if ownership.conflict and not self._sent:
@@ -264,7 +189,7 @@ class Transfer:
             except ControllerUnavailable:
                 await self._reconnected()
             except ControllerError as error:
-                self._told(str(error))
+                self._note(str(error))
             await asyncio.sleep(self._settings.poll_period_s)
 
     def _end_by(self, last_result: int) -> NoReturn:
@@ -291,14 +216,14 @@ class Transfer:
                 if await self._link.flush(self._settings.ack_timeout_s):
                     answer = await self._attempt(self._pages[page])
                 else:
-                    self._told("the controller does not confirm the service block")
+                    self._note("the controller does not confirm the service block")
                     answer = None
             except (ForeignOwner, ControllerUnavailable, LinkUnsteady) as error:  # it said nothing: no attempt in vain
                 if not await self._can_go_on(error):
                     return Reason.CONTROLLER_LOST, f"not back before the job expired: {error}"
                 continue
             except ControllerError as error:  # an exception response: a reply, so nothing was done
-                self._told(str(error))
+                self._note(str(error))
                 answer = None
                 await asyncio.sleep(self._settings.poll_period_s)
             if answer is Answer.ACCEPTED and page + 1 < len(self._pages):
@@ -309,7 +234,7 @@ class Transfer:
                 await asyncio.sleep(self._settings.poll_period_s)  # its state may say ready all the while
             else:
                 if answer is Answer.ACCEPTED:
-                    self._told(self._unconfirmed("answer 1 accepted"))
+                    self._note(self._unconfirmed("answer 1 accepted"))
                 page = 0 if answer is Answer.PAGE_MISSING else page
                 in_vain += 1
         reason = Reason.EXPIRED if self._lifetime.over else Reason.CONTROLLER_TIMEOUT
@@ -320,7 +245,7 @@ class Transfer:
         if isinstance(error, ForeignOwner):
             await self._stand_by(error)
             return True
-        self._told(str(error))
+        self._note(str(error))
         return not isinstance(error, ControllerUnavailable) or await self._reconnected()
 
     async def _ready(self) -> tuple[Reason, str] | None:
@@ -347,7 +272,7 @@ class Transfer:
             fault = self._may_have_ended(await self._look()) or self._link.fault()
             if fault is None:
                 return
-            self._told(fault)
+            self._note(fault)
             await asyncio.sleep(self._settings.poll_period_s)
 
     def _may_have_ended(self, view: LinkBlock) -> str | None:
@@ -366,7 +291,7 @@ class Transfer:
         self._check_may_go_on(clean)
         await controller.write_page(page)
         if self._settings.readback and await controller.read_page(len(page.payload)) != page:
-            self._told("read-back differs from what was written: check contour_address and payload_capacity")
+            self._note("read-back differs from what was written: check contour_address and payload_capacity")
             return None
         if self._too_old():  # making it durable, or the requests, took longer than it had
             return None
@@ -377,7 +302,7 @@ class Transfer:
         try:
             await controller.write_transfer(transfer)
         except ControllerUnavailable as error:  # it may have been done: go on with step 7
-            self._told(str(error))
+            self._note(str(error))
             if not await self._reconnected():
                 return None
         return await self._answer(transfer)
@@ -386,25 +311,25 @@ class Transfer:
         """Step 2: the connection on which `transfer` = 0 was confirmed, and since which start of ownership."""
         self._link.ownership.check()
         await self._link.controller.write_transfer(0)
-        return self._link.connections, self._link.ownership.epoch
+        return self._link.connection.opened, self._link.ownership.epoch
 
     def _check_may_go_on(self, clean: tuple[int, int]) -> None:
         """Raise ControllerError where steps 3 to 5 must not follow the step 2 confirmed as `clean`."""
         self._link.ownership.check()
-        if (self._link.connections, self._link.ownership.epoch) != clean:
+        if (self._link.connection.opened, self._link.ownership.epoch) != clean:
             raise ControllerUnavailable("the connection was opened anew: it begins again with transfer = 0")
 
     def _too_old(self) -> bool:
         """True where the contour must not be committed any more; a withdrawal never ages."""
         if self._withdrawn_for is not None or not self._lifetime.over:
             return False
-        self._told("the contour became too old on its way")
+        self._note("the contour became too old on its way")
         return True
 
     async def _about_to_send(self) -> None:
         """Make durable that the job may have been sent, before the first request of step 3."""
         if not self._sent:
-            await self._before_sending()
+            await self._steps.before_sending()
             self._sent = True
 
     async def _answer(self, transfer: int) -> Answer | None:
@@ -415,24 +340,24 @@ class Transfer:
             try:
                 view = await self._look()
             except ControllerUnavailable as error:  # the commit was confirmed: its answer is still to be had
-                self._told(str(error))
+                self._note(str(error))
                 if self._now() >= give_up_at or not await self._reconnected():
                     return None
                 continue
             except LinkUnsteady as error:
-                self._told(str(error))
+                self._note(str(error))
                 view = LinkBlock()  # it said nothing
             if view.session == self._session and view.ack_transfer == transfer:
                 answer = _as_answer(view.ack_result)
                 if answer in CAN_BE_REPEATED or answer in (Answer.PAGE_MISSING, Answer.NOT_READY):
-                    self._told(f"answer {view.ack_result} {_answer_name(view.ack_result)}")
+                    self._note(f"answer {view.ack_result} {_answer_name(view.ack_result)}")
                     return answer
                 if answer is Answer.ACCEPTED and self._withdrawn_for is None and view.last_job < self._job_id:
                     return answer  # of a page that is not the last one; the last one's is in last_job, looked at above
             if self._too_old():  # without a clock of the controller's, taking it back is all that keeps it from use
                 return None
             if self._now() >= give_up_at:
-                self._told(self._unanswered(view, transfer))
+                self._note(self._unanswered(view, transfer))
                 return None
             await asyncio.sleep(pause)
             pause = min(2 * pause, self._settings.poll_period_s)
@@ -464,7 +389,7 @@ class Transfer:
     async def _connected(self) -> None:
         """Wait for the link's connection, however long. To wait for the link, which shows its own life, is no hang."""
         while True:
-            self._beat()
+            self._steps.feed_watchdog()
             with suppress(TimeoutError):
                 async with asyncio.timeout(WAIT_SLICE_S):
                     await self._link.wait_connected()
@@ -489,23 +414,23 @@ class Transfer:
                     self._check_may_go_on(clean)
                     await controller.write_transfer(transfer)
                     return Settlement(Outcome.WRITTEN)
-                self._told("read-back differs from what was written: check contour_address and payload_capacity")
+                self._note("read-back differs from what was written: check contour_address and payload_capacity")
                 in_vain += 1
             except ForeignOwner as foreign:
                 if self._link.ownership.conflict:
                     return Settlement(Outcome.FAILED, Reason.OTHER_SERVICE, str(foreign))
                 await asyncio.sleep(self._settings.poll_period_s)
             except ControllerUnavailable as error:
-                self._told(str(error))
+                self._note(str(error))
                 if not await self._reconnected():
                     break
             except ControllerError as error:
-                self._told(str(error))
+                self._note(str(error))
                 in_vain += 1
                 await asyncio.sleep(self._settings.poll_period_s)
         return Settlement(Outcome.FAILED, Reason.CONTROLLER_LOST, self._trouble or "not written before the job expired")
 
-    def _told(self, trouble: str) -> None:
+    def _note(self, trouble: str) -> None:
         """Keep the last trouble for the settlement's detail, and log it when it is a new one."""
         if trouble != self._trouble:
             log.warning("job %d: %s", self._job_id, trouble)

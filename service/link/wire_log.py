@@ -7,16 +7,9 @@ from collections.abc import Iterator
 from dataclasses import fields
 
 from drivers.controller import Controller
-from drivers.controller.mailbox.mailbox import (
-    UNKNOWN_UNCERTAINTY,
-    Answer,
-    ControllerState,
-    LinkBlock,
-    MailboxLayout,
-    Page,
-    ServiceBlock,
-    decode_header,
-)
+from drivers.controller.mailbox.blocks import Answer, ControllerState, LinkBlock, ServiceBlock
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import UNKNOWN_UNCERTAINTY, Page, decode_header
 from service.logs import event
 from service.reasons import Reason
 from service.state import State
@@ -35,7 +28,7 @@ ENUMS = {
 }
 
 
-class ToldController:
+class LoggedController:
     """The same controller; what goes to it and what changes in its block is logged. registers: pages word by word."""
 
     def __init__(self, controller: Controller, layout: MailboxLayout, *, registers: bool = False) -> None:
@@ -53,7 +46,7 @@ class ToldController:
     async def connect(self) -> None:
         """As the controller's."""
         await self._controller.connect()
-        _tell("connected")
+        _log("connected")
 
     async def close(self) -> None:
         """As the controller's."""
@@ -78,34 +71,34 @@ class ToldController:
         before, self._written = self._written or ServiceBlock(service_state=0), block
         changed = list(_changes(before, block))
         if changed:
-            _tell(f"wrote  {', '.join(changed)}")
+            _log(f"wrote  {', '.join(changed)}")
 
     async def write_transfer(self, transfer: int) -> None:
         """As the controller's."""
         await self._controller.write_transfer(transfer)
-        _tell(f"wrote  transfer {transfer}" + (" (the commit)" if transfer else " (nothing valid from here on)"))
+        _log(f"wrote  transfer {transfer}" + (" (the commit)" if transfer else " (nothing valid from here on)"))
 
     async def write_page(self, page: Page) -> None:
         """As the controller's."""
         await self._controller.write_page(page)
-        _tell(f"wrote  {self._told(page)}")
+        _log(f"wrote  {self._page_text(page)}")
         if self._registers:
             self._dump(page)
 
     async def read_page(self, payload_length: int) -> Page:
         """As the controller's."""
         page = await self._controller.read_page(payload_length)
-        _tell(f"read   the page back, {len(page.header) + payload_length} registers")
+        _log(f"read   the page back, {len(page.header) + payload_length} registers")
         return page
 
     def _seen(self, block: LinkBlock) -> LinkBlock:
         before, self._read = self._read, block
         changed = list(_changes(before, block))
         if changed:
-            _tell(f"read   {', '.join(changed)}")
+            _log(f"read   {', '.join(changed)}")
         return block
 
-    def _told(self, page: Page) -> str:
+    def _page_text(self, page: Page) -> str:
         head = decode_header(page, self._layout.word_order)
         if head["layout"] == 0:
             return f"the withdrawal of job {head['job_id']}, crc32 {head['crc32']:08X}"
@@ -122,7 +115,7 @@ class ToldController:
         first = self._layout.contour_address + 1
         for start in range(0, len(words), WORDS_A_LINE):
             line = " ".join(f"{word:04X}" for word in words[start : start + WORDS_A_LINE])
-            _tell(f"       {first + start:5d}: {line}")
+            _log(f"       {first + start:5d}: {line}")
 
 
 def _changes(before: LinkBlock | ServiceBlock, after: LinkBlock | ServiceBlock) -> Iterator[str]:
@@ -144,5 +137,5 @@ def _meaning(name: str, value: int) -> str:
     return f" ({known(value).name.lower()})"
 
 
-def _tell(text: str) -> None:
+def _log(text: str) -> None:
     log.info(text, extra=event("wire"))  # an event: never held back, however often it comes

@@ -38,7 +38,8 @@ from service.records.evidence import (
     plain_bytes,
     table_digest,
 )
-from service.records.journal import Job, JournalError
+from service.records.job import Job
+from service.records.journal_file import JournalError
 
 log = logging.getLogger("combtrace.archive")
 
@@ -106,8 +107,8 @@ class ArchiveWriter:
     def draft(self, evidence: Evidence) -> Future[None] | None:
         """Done once the draft is durable, or cannot be; None where the disk hangs with that of an earlier job."""
         if self._drafted is not None and not self._drafted.done():
-            told = "archive: job %d goes on without its evidence: the disk still writes an earlier job's"
-            log.warning(told, evidence.job.job_id)
+            text = "archive: job %d goes on without its evidence: the disk still writes an earlier job's"
+            log.warning(text, evidence.job.job_id)
             return None
         self._drafted = self.drafting.submit(self._draft, evidence)
         return self._drafted

@@ -19,8 +19,8 @@ from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
 from contour.geometry.rings import Contour
 from drivers.camera import Frame
-from drivers.controller.mailbox.mailbox import Page
 from drivers.controller.mailbox.page_text import pages_from_text
+from drivers.controller.mailbox.pages import Page
 from service.config.mistakes import describe
 from service.config.recipes import Recipe
 from service.link.contour_message import Envelope
@@ -32,7 +32,7 @@ from service.measuring.table_file import TableFileError, TableRecord, load_table
 from service.reasons import Reason
 from service.records.archive import DRAFT, PLAIN_FRAME, TABLES, document_of, folder_of
 from service.records.evidence import FRAME, VERSION, Evidence
-from service.records.journal import Job
+from service.records.job import Job
 
 LARGEST_DOCUMENT = 200_000_000
 
@@ -229,8 +229,8 @@ def recipe_with(archived: ArchivedJob, changes: dict[str, Any]) -> Recipe:
     try:
         return Recipe.model_validate(settings)
     except ValidationError as error:
-        told = "; ".join(f"recipe.{line}" for line in describe(error, Recipe))
-        raise EvidenceError(f"job {archived.job_id}: {told}") from error
+        mistakes = "; ".join(f"recipe.{line}" for line in describe(error, Recipe))
+        raise EvidenceError(f"job {archived.job_id}: {mistakes}") from error
 
 
 def _sha256(pixels: NDArray[np.uint8]) -> str:

@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 from contour.geometry.rings import Contour
 from contour.image.overlay import draw_overlay
 from drivers.camera import Frame
-from drivers.controller.mailbox.mailbox import Page
 from drivers.controller.mailbox.page_text import pages_to_text
+from drivers.controller.mailbox.pages import Page
 from service.config.recipes import Recipe
 from service.link.contour_message import Envelope
 from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
 from service.measuring.table_file import TableRecord
-from service.records.journal import Job
+from service.records.job import Job
 from service.records.pictures import caption
 
 VERSION = 1

@@ -1,127 +1,35 @@
-"""The journal: every job, durable before its trigger is acknowledged, and how it ended. SQLite.
-
-WAL keeps readers out of the way; synchronous=FULL makes the last commit survive a power cut (NORMAL does not).
-"""
+"""The journal: every job, durable before its trigger is acknowledged, and how it ended. SQLite."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
-import secrets
 import sqlite3
-import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from drivers.controller.mailbox.mailbox import Page, ServiceBlock
+from drivers.controller.mailbox.blocks import ServiceBlock
 from drivers.controller.mailbox.page_text import pages_from_text, pages_to_text
+from drivers.controller.mailbox.pages import Page
+from service.link.job_numbers import LARGEST_JOB
 from service.reasons import Outcome, Reason
-from service.records.journal_schema import COLUMNS, SCHEMA_VERSION, TABLES, migration
+from service.records.job import Job, Progress, Terms, TriggerStamp
+from service.records.journal_file import LARGEST_OWNER, JournalDamaged, JournalError, JournalFile
+from service.records.journal_restart import GoneOn, go_on_above, last_pair, restore
+from service.records.journal_schema import COLUMNS, UNSETTLED
 
-LARGEST_JOB = 0xFFFFFFFF  # job_id is a u32
-LARGEST_OWNER = 0xFFFF
-LATER = 32768  # a trigger counter that is less ahead than this is later, one that is more is earlier
-RESTORED = (
-    "job_id, taken_at, trigger_kind, line, trigger_session, trigger_counter, recipe, thickness_um, session, pages,"
-    " target, withdraw_reason"
-)
-UNSETTLED = "outcome IS NULL"
 PRUNED_AT_ONCE = 500  # rows: some milliseconds, for a job may wait behind it
 MOST_NOTES = 10_000  # of the audit: who asked for what
-PAGE_CACHE_KIB = 512  # a job looks at the newest rows; the library's 2 MB fill over the first two thousand jobs
-LARGEST_LOG_BYTES = 8_000_000  # of the write-ahead log, once it was taken over into the file
-
-
-class JournalError(Exception):
-    """The journal cannot be read or written; without it no trigger is taken."""
-
-
-class JournalFull(JournalError):
-    """The disk that holds the journal is full."""
-
-
-class JournalDamaged(JournalError):
-    """The file is there, may be read and written, and is no sound journal."""
 
 
 class JournalConflict(Exception):
     """A job is not there, or has ended already: a defect of the caller, which trying again does not mend."""
 
 
-@dataclass(frozen=True)
-class TriggerStamp:
-    """Where a job came from. `session` and `counter` are set for triggers of the controller only.
-
-    line: the serial port over which it is acknowledged and told its end, as configured; None where nobody is told.
-    recipe 0 means the configured default, thickness_um 0 the recipe's.
-    """
-
-    kind: str
-    recipe: int = 0
-    thickness_um: int = 0
-    session: int | None = None
-    counter: int | None = None
-    line: str | None = None
-
-
-@dataclass(frozen=True)
-class Terms:
-    """With what a job was carried out: its recipe's settings in whole, and the hash of the calibration's content."""
-
-    recipe: dict[str, Any]
-    calibration: str | None = None
-
-
-@dataclass(frozen=True)
-class Job:
-    """One job as the journal holds it.
-
-    session: set once any request of a transfer may have been sent, and pages with it, until the job has ended.
-    terms: None where it came to no recipe. transfer: figures of it, empty where nothing was to be sent.
-    target: at which controller it was sent and how laid out there, by configuration key; empty where that is not known.
-    """
-
-    job_id: int
-    taken_at: str
-    trigger: TriggerStamp
-    session: int | None = None
-    pages: tuple[Page, ...] = ()
-    withdraw_reason: Reason | None = None
-    outcome: Outcome | None = None
-    reason: Reason | None = None
-    detail: str | None = None
-    settled_at: str | None = None
-    report: dict[str, Any] = field(default_factory=dict)
-    terms: Terms | None = None
-    transfer: dict[str, Any] = field(default_factory=dict)
-    target: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def taken_at_s(self) -> float:
-        """When it was taken, Unix time by the machine's own clock."""
-        return datetime.fromisoformat(self.taken_at).timestamp()
-
-    @property
-    def sent(self) -> bool:
-        """True where a request of a transfer may have been sent: such a job is never called failed by ourselves."""
-        return self.session is not None
-
-
-@dataclass(frozen=True)
-class GoneOn:
-    """What was learnt from the service block at the controller: a trigger that counts as taken, a job to take back."""
-
-    pair: tuple[int, int] | None = None
-    in_flight: int | None = None
-
-
 class Journal:
-    """Jobs in one SQLite file. Methods block for a commit (milliseconds) and may be called from any thread."""
+    """Jobs in one file. Methods block for a commit (milliseconds) and may be called from any thread."""
 
     def __init__(
         self,
@@ -132,56 +40,13 @@ class Journal:
         now: Callable[[], datetime] = lambda: datetime.now(UTC),
     ) -> None:
         """above, otherwise_from: for a new journal, the highest number that is known, or where to begin without one."""
-        self._path = path
-        self._begin = (above, otherwise_from)
+        self._file = JournalFile(path, above=above, otherwise_from=otherwise_from)
         self._now = now
-        self._lock = threading.Lock()
-        if os.path.exists(path) and not os.path.isfile(path):  # opening a pipe would wait for ever
-            raise JournalError(f"{path}: is no file, expected a journal or nothing. Name another journal.path.")
-        with self._translated():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(path, check_same_thread=False, isolation_level=None)
         try:
-            with self._translated():
-                self._prepare()
+            self._look_through()
         except JournalError:
-            self._db.close()
+            self._file.close()
             raise
-
-    def _prepare(self) -> None:
-        self._db.text_factory = readable_text
-        version = self._db.execute("PRAGMA user_version").fetchone()[0]
-        if version == 0:
-            self._refuse_tables()
-        self._db.execute("PRAGMA journal_mode = WAL")
-        self._db.execute("PRAGMA synchronous = FULL")
-        self._db.execute(f"PRAGMA journal_size_limit = {LARGEST_LOG_BYTES}")
-        self._db.execute(f"PRAGMA cache_size = -{PAGE_CACHE_KIB}")
-        if version == 0:
-            self._db.executescript(
-                f"BEGIN IMMEDIATE; {TABLES}"
-                f" INSERT INTO meta VALUES ('owner', '{1 + secrets.randbelow(LARGEST_OWNER)}');"
-                f" INSERT INTO meta VALUES ('above', '{self._begin[0]}'), ('otherwise_from', '{self._begin[1]}');"
-                f" PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;"
-            )
-        elif version != SCHEMA_VERSION:
-            self._migrate(version)
-        check = self._db.execute("PRAGMA quick_check(1)").fetchone()[0]
-        if check != "ok":
-            raise self._damaged(check)
-        self._look_through()
-
-    def _refuse_tables(self) -> None:
-        """Raise where a file without a version has tables: it is another program's, or has lost its version."""
-        tables = {str(row[0]) for row in self._db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
-        if {"meta", "jobs"} <= tables:
-            raise self._damaged("it has lost its version")
-        if tables:
-            names = ", ".join(sorted(tables)[:3])
-            raise JournalError(
-                f"{self._path}: a database of another program (tables {names}), expected a journal or nothing. "
-                "Name another journal.path."
-            )
 
     def _look_through(self) -> None:
         """Raise JournalDamaged where what the service goes on from cannot be read: SQLite looks at no content."""
@@ -189,97 +54,48 @@ class Journal:
             owner = self.owner
             self.last_controller_trigger(), self.last_settled(), self.last_taken(), self.unsettled()
         except (ValueError, TypeError) as error:
-            raise self._damaged("its notes of itself") from error
+            raise self._file.damaged("its notes of itself") from error
         except JournalDamaged as error:
-            raise self._damaged(str(error)) from error
+            raise self._file.damaged(str(error)) from error
         except JournalError as error:
             cause = error.__cause__
             if getattr(cause, "sqlite_errorcode", None) == sqlite3.SQLITE_ERROR:  # a table or column is missing
-                raise self._damaged(str(cause)) from cause
+                raise self._file.damaged(str(cause)) from cause
             raise
         if not 1 <= owner <= LARGEST_OWNER:
-            raise self._damaged(f"owner {owner}")
-
-    def _damaged(self, seen: str) -> JournalDamaged:
-        return JournalDamaged(f"{self._path}: the journal is damaged ({seen}). Move it away and start again.")
-
-    def _migrate(self, version: int) -> None:
-        """All steps from an earlier version, or none of them."""
-        script = migration(version)
-        if script is None:
-            raise JournalError(
-                f"{self._path}: journal of schema version {version}, expected 1 to {SCHEMA_VERSION}. "
-                "It was written by another version of combtrace: use that one, or name another journal.path."
-            )
-        try:
-            self._db.executescript(f"BEGIN IMMEDIATE; {script} PRAGMA user_version = {SCHEMA_VERSION}; COMMIT;")
-        except sqlite3.Error:
-            if self._db.in_transaction:
-                self._db.execute("ROLLBACK")
-            raise
-
-    @contextmanager
-    def _translated(self) -> Iterator[None]:
-        try:
-            yield
-        except sqlite3.OperationalError as error:
-            if getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL:
-                raise JournalFull(
-                    f"{self._path}: the disk is full. Free space; no trigger is taken until then."
-                ) from error
-            raise JournalError(f"{self._path}: cannot use the journal: {error}") from error
-        except (sqlite3.Error, OSError) as error:
-            code = getattr(error, "sqlite_errorcode", None)
-            kind = JournalDamaged if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB) else JournalError
-            raise kind(
-                f"{self._path}: cannot use the journal: {error}. Check the path, or move the file away."
-            ) from error
-
-    @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        """One durable step: all of it is in the file when the block has ended, or none of it is."""
-        with self._lock, self._translated():
-            self._db.execute("BEGIN IMMEDIATE")
-            try:
-                yield self._db
-                self._db.execute("COMMIT")
-            except BaseException:
-                if self._db.in_transaction:  # SQLite has ended it itself after some errors
-                    self._db.execute("ROLLBACK")
-                raise
+            raise self._file.damaged(f"owner {owner}")
 
     def refuse_writes(self) -> None:
         """From here on each write raises JournalError."""
-        with self._lock:
-            self._db.execute("PRAGMA query_only = ON")
+        self._file.refuse_writes()
 
     def close(self) -> None:
         """Close the file."""
-        with self._lock:
-            self._db.close()
+        self._file.close()
 
     @property
     def owner(self) -> int:
         """The number drawn once for this journal, 1…65535: the protocol's `owner`."""
-        return int(self._one("SELECT value FROM meta WHERE key = 'owner'")[0])
+        with self._file.reading() as db:
+            return int(db.execute("SELECT value FROM meta WHERE key = 'owner'").fetchone()[0])
 
     def probe(self) -> None:
         """Write and commit something that changes nothing; raise JournalError where that does not work."""
-        with self._transaction() as db:
+        with self._file.transaction() as db:
             db.execute("UPDATE meta SET value = value WHERE key = 'owner'")
 
     def take(self, trigger: TriggerStamp, *, above: int = 0) -> Job:
         """A new job, durable on return; its id is above all in the journal and above `above`."""
         taken_at = self._stamp()
-        with self._transaction() as db:
+        with self._file.transaction() as db:
             highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
-            found = max(self._number(key) for key in ("above", "adopted_job", "begin_above"))
+            found = max(self._file.number(key) for key in ("above", "adopted_job", "begin_above"))
             job_id = max(highest, above, found) + 1
             if job_id == 1:  # nothing is known of any job of before
-                job_id = self._number("otherwise_from") or 1
+                job_id = self._file.number("otherwise_from") or 1
             if job_id > LARGEST_JOB:
                 raise JournalError(
-                    f"{self._path}: {job_id - 1} was the last number that a register can hold. Move it away"
+                    f"{self._file.path}: {job_id - 1} was the last number that a register can hold. Move it away"
                 )
             db.execute(
                 "INSERT INTO jobs (job_id, taken_at, trigger_kind, trigger_session, trigger_counter, recipe,"
@@ -299,70 +115,19 @@ class Journal:
         return Job(job_id, taken_at, trigger)
 
     def go_on_above(self, found: ServiceBlock, trigger: tuple[int, int], room: int, running: int = 0) -> GoneOn:
-        """Begin at a controller with `found` as service block and `trigger` as (session, counter); durable on return.
-
-        New jobs are numbered from more than `room` above all that is known. The block's trigger counts as taken where
-        it is later than ours and ours is not the controller's newest one. Its job, where it had not ended there and is
-        not in the journal, becomes one of ours that is to be taken back: the block may be another service's, and the
-        journal may be an old one. `running` is a job of this life, which knows itself what was sent of it.
-        """
-        session, _ = trigger
-        with self._transaction() as db:
-            highest = db.execute("SELECT COALESCE(MAX(job_id), 0) FROM jobs").fetchone()[0]
-            adopted = max(found.job_id, found.settled_job, self._number("adopted_job"))
-            known = max(highest, adopted, self._number("above")) or self._number("otherwise_from") - 1
-            self._keep(adopted_job=adopted, begin_above=min(known + room, LARGEST_JOB - 1))
-            pair = (found.session_ack, found.trigger_ack)
-            ours = self._last_pair()
-            later = ours != trigger and _is_later(pair, ours, session)
-            if later:
-                self._keep(adopted_above=highest, adopted_session=pair[0], adopted_counter=pair[1])
-            if session:  # one that this journal calls unsent may have been sent in a life that it does not know
-                db.execute(
-                    "UPDATE jobs SET session = ?, withdraw_reason = ?"
-                    f" WHERE {UNSETTLED} AND session IS NULL AND job_id <= ? AND job_id != ?",
-                    (session, int(Reason.SERVICE_RESTARTED), found.job_id, running),
-                )
-            unknown = (
-                found.job_id > found.settled_job
-                and session
-                and not db.execute("SELECT 1 FROM jobs WHERE job_id = ?", (found.job_id,)).fetchone()
-            )
-            if unknown:
-                db.execute(
-                    "INSERT INTO jobs (job_id, taken_at, trigger_kind, recipe, thickness_um, session, withdraw_reason)"
-                    " VALUES (?, ?, 'found', 0, 0, ?, ?)",
-                    (found.job_id, self._stamp(), session, int(Reason.SERVICE_RESTARTED)),
-                )
-        return GoneOn(pair if later else None, found.job_id if unknown else None)
+        """Begin at a controller whose service block shows `found`; see `journal_restart.go_on_above`."""
+        return go_on_above(self._file, found, trigger, room, running, self._stamp())
 
     def restore(self, rows: list[tuple[Any, ...]], pair: tuple[int, int]) -> None:
-        """Take over from a damaged journal: jobs that had not ended (columns as in RESTORED), and the last trigger."""
-        marks = ", ".join("?" * len(RESTORED.split(",")))
-        with self._transaction() as db:
-            db.executemany(f"INSERT INTO jobs ({RESTORED}) VALUES ({marks})", rows)
-            db.execute(f"UPDATE jobs SET owed = 1 WHERE line IS NOT NULL AND {UNSETTLED}")
-            if pair[1]:
-                highest = max((row[0] for row in rows), default=0)
-                self._keep(adopted_above=highest, adopted_session=pair[0], adopted_counter=pair[1])
-
-    def _keep(self, **numbers: int) -> None:
-        """Numbers of `meta`, as they are from now on; within a transaction."""
-        self._db.executemany("INSERT OR REPLACE INTO meta VALUES (?, ?)", [(key, str(n)) for key, n in numbers.items()])
-
-    def _number(self, key: str) -> int:
-        """A number of `meta`, 0 where it is not there; within a transaction or the lock."""
-        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-        return int(row[0]) if row else 0
+        """Take over what a damaged journal held; see `journal_restart.restore`."""
+        restore(self._file, rows, pair)
 
     def store_pages(
         self,
         job_id: int,
         session: int,
         pages: tuple[Page, ...],
-        terms: Terms | None = None,
-        report: dict[str, Any] | None = None,
-        transfer: dict[str, Any] | None = None,
+        progress: Progress | None = None,
         *,
         target: Mapping[str, Any] | None = None,
     ) -> None:
@@ -370,25 +135,19 @@ class Journal:
 
         target: at which controller they are to be sent and how laid out there, by configuration key.
         """
-        texts = pages_to_text(pages), json.dumps(report or {}), json.dumps(transfer) if transfer else None
-        values = session, *texts, json.dumps(dict(target or {}))
-        self._update(job_id, "session = ?, pages = ?, report = ?, transfer = ?, target = ?", values, terms)
+        known = progress or Progress()
+        values = session, pages_to_text(pages), *_texts(known), json.dumps(dict(target or {}))
+        self._update(job_id, "session = ?, pages = ?, report = ?, transfer = ?, target = ?", values, known.terms)
 
     def store_withdrawal(self, job_id: int, reason: Reason) -> None:
         """Make durable that the job is being withdrawn, and why; the first reason stands."""
         self._update(job_id, "withdraw_reason = COALESCE(withdraw_reason, ?)", (int(reason),))
 
     def settle(
-        self,
-        job_id: int,
-        outcome: Outcome,
-        reason: Reason | None,
-        detail: str | None,
-        report: dict[str, Any] | None = None,
-        terms: Terms | None = None,
-        transfer: dict[str, Any] | None = None,
+        self, job_id: int, outcome: Outcome, reason: Reason | None, detail: str | None, progress: Progress | None = None
     ) -> Job:
         """The job with its final state, durable; its pages are dropped. A job settles once: raise JournalConflict."""
+        known = progress or Progress()
         return self._update(
             job_id,
             "outcome = ?, reason = ?, detail = ?, settled_at = ?, report = ?, transfer = ?, pages = NULL",
@@ -398,10 +157,9 @@ class Journal:
                 # Whatever a text holds, a job that was taken ends.
                 None if detail is None else detail.encode("utf-8", "backslashreplace").decode(),
                 self._stamp(),
-                json.dumps(report or {}),
-                json.dumps(transfer) if transfer else None,
+                *_texts(known),
             ),
-            terms,
+            known.terms,
         )
 
     def note(self, who: str | None, address: str, action: str, detail: str | None = None) -> int:
@@ -409,7 +167,7 @@ class Journal:
 
         who: None where nobody proved to be anybody. Of more than MOST_NOTES the oldest are let go.
         """
-        with self._transaction() as db:
+        with self._file.transaction() as db:
             values = self._stamp(), who, address, action, detail
             query = "INSERT INTO audit (at, who, address, action, detail) VALUES (?, ?, ?, ?, ?)"
             number = int(db.execute(query, values).lastrowid or 0)
@@ -418,7 +176,7 @@ class Journal:
 
     def note_result(self, number: int, result: str) -> None:
         """Make durable what became of it."""
-        with self._transaction() as db:
+        with self._file.transaction() as db:
             db.execute("UPDATE audit SET result = ? WHERE id = ?", (result, number))
 
     def prune(self, keep: int) -> int:
@@ -426,7 +184,7 @@ class Journal:
 
         What numbers and triggers go on from stays: the newest jobs, the controller's last, those that have not ended.
         """
-        with self._transaction() as db:
+        with self._file.transaction() as db:
             bound = db.execute("SELECT job_id FROM jobs ORDER BY job_id DESC LIMIT 1 OFFSET ?", (keep,)).fetchone()
             if bound is None:
                 return 0
@@ -440,7 +198,7 @@ class Journal:
 
     def _update(self, job_id: int, assignments: str, values: tuple[Any, ...], terms: Terms | None = None) -> Job:
         """The job as it is then; read in the same step: a failure after the commit would say that nothing was done."""
-        with self._transaction() as db:
+        with self._file.transaction() as db:
             if terms is not None:
                 settings = json.dumps(terms.recipe, sort_keys=True)
                 digest = hashlib.sha256(settings.encode()).hexdigest()
@@ -449,7 +207,7 @@ class Journal:
                 values = (*values, digest, terms.calibration)
             cursor = db.execute(f"UPDATE jobs SET {assignments} WHERE job_id = ? AND {UNSETTLED}", (*values, job_id))
             if cursor.rowcount != 1:
-                raise JournalConflict(f"{self._path}: job {job_id} is not there, or has ended already")
+                raise JournalConflict(f"{self._file.path}: job {job_id} is not there, or has ended already")
             return job_of(db.execute(f"SELECT {COLUMNS} FROM jobs WHERE job_id = ?", (job_id,)).fetchone())
 
     def find(self, job_id: int) -> Job | None:
@@ -464,9 +222,9 @@ class Journal:
         """Jobs that have ended, and whose end this line has not been told, oldest first."""
         return self._jobs("WHERE owed = 1 AND line = ? AND outcome IS NOT NULL ORDER BY job_id", (line,))
 
-    def told(self, job_ids: Iterable[int]) -> None:
+    def cross_off(self, job_ids: Iterable[int]) -> None:
         """Make durable that the ends of these jobs are owed to their line no more."""
-        with self._transaction() as db:
+        with self._file.transaction() as db:
             db.executemany("UPDATE jobs SET owed = 0 WHERE job_id = ?", [(job_id,) for job_id in job_ids])
 
     def last_settled(self) -> Job | None:
@@ -479,41 +237,21 @@ class Journal:
 
     def last_controller_trigger(self) -> tuple[int, int]:
         """(session, trigger_counter) last taken from the controller; (0, 0) where there was none."""
-        with self._lock, self._translated():
-            return self._last_pair()
-
-    def _last_pair(self) -> tuple[int, int]:
-        row = self._db.execute(
-            "SELECT trigger_session, trigger_counter FROM jobs WHERE trigger_counter IS NOT NULL AND job_id > ?"
-            " ORDER BY job_id DESC LIMIT 1",
-            (self._number("adopted_above"),),
-        ).fetchone()
-        row = row or (self._number("adopted_session"), self._number("adopted_counter"))
-        return int(row[0]), int(row[1])
-
-    def _one(self, query: str) -> Any:
-        with self._lock, self._translated():
-            return self._db.execute(query).fetchone()
+        with self._file.reading():
+            return last_pair(self._file)
 
     def _jobs(self, where: str, values: tuple[Any, ...] = ()) -> tuple[Job, ...]:
-        with self._lock, self._translated():
-            rows = self._db.execute(f"SELECT {COLUMNS} FROM jobs {where}", values).fetchall()
+        with self._file.reading() as db:
+            rows = db.execute(f"SELECT {COLUMNS} FROM jobs {where}", values).fetchall()
         return tuple(job_of(row) for row in rows)
 
     def _stamp(self) -> str:
         return self._now().isoformat(timespec="milliseconds")
 
 
-def _is_later(pair: tuple[int, int], than: tuple[int, int], session: int) -> bool:
-    """True where `pair`, as (session, trigger_counter), was taken in this session after `than` was."""
-    if pair[0] != session or 0 in pair:
-        return False
-    return than[0] != session or 0 < (pair[1] - than[1]) % 65536 < LATER
-
-
-def readable_text(stored: bytes) -> str:
-    """Text of the journal, also where its bytes were damaged: a job is more than its detail."""
-    return stored.decode("utf-8", "replace")
+def _texts(known: Progress) -> tuple[str, str | None]:
+    """Report and transfer as they stand in their columns."""
+    return json.dumps(known.report), json.dumps(known.transfer) if known.transfer else None
 
 
 def job_of(row: tuple[Any, ...]) -> Job:

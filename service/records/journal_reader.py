@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, JournalDamaged, job_of, readable_text
+from service.records.job import Job
+from service.records.journal import job_of
+from service.records.journal_file import JournalDamaged, readable_text
 from service.records.journal_schema import SCHEMA_VERSION, columns
 
 BUSY_S = 5.0

@@ -15,16 +15,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from service.link.job_numbers import LARGEST_JOB
 from service.reasons import Reason
-from service.records.journal import (
-    LARGEST_JOB,
-    RESTORED,
-    UNSETTLED,
-    Journal,
-    JournalDamaged,
-    JournalError,
-    readable_text,
-)
+from service.records.journal import Journal
+from service.records.journal_file import JournalDamaged, JournalError, readable_text
+from service.records.journal_restart import RESTORED
+from service.records.journal_schema import UNSETTLED
 
 log = logging.getLogger("combtrace.journal")
 

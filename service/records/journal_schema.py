@@ -75,6 +75,7 @@ COLUMNS_OF_2 = (
     f"{COLUMNS_OF_1}, (SELECT settings FROM recipe_settings WHERE digest = recipe_digest), calibration, transfer"
 )
 COLUMNS = f"{COLUMNS_OF_2}, line, target"
+UNSETTLED = "outcome IS NULL"
 
 
 def columns(version: int) -> str:

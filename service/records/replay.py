@@ -13,7 +13,8 @@ import numpy as np
 
 from contour.errors import ContourError
 from contour.geometry.rings import Contour, hausdorff
-from drivers.controller.mailbox.mailbox import HEADER_FIELDS, ContourTooLarge, MailboxError, Page
+from drivers.controller.errors import ContourTooLarge, MailboxError
+from drivers.controller.mailbox.pages import HEADER_FIELDS, Page
 from drivers.controller.mailbox.words import Unpacking, WordOrder
 from service.link.contour_message import Envelope, contour_pages
 from service.measuring.measurement import Measurement
@@ -103,7 +104,7 @@ def replay(archived: ArchivedJob, settings: Settings) -> Replayed:
     registers = sum(len(page.header) + len(page.payload) for page in archived.pages)
     taken_at = archived.document["job"]["taken_at"]
     return Replayed(
-        archived.job_id, taken_at, were, reasons, seen.texts, tuple(changes), registers, _told(known), _told(now)
+        archived.job_id, taken_at, were, reasons, seen.texts, tuple(changes), registers, _shown(known), _shown(now)
     )
 
 
@@ -144,7 +145,7 @@ def _fields(known: dict[str, Any], now: dict[str, Any]) -> Iterator[Change]:
             yield Change(name, known[name], now[name])
 
 
-def _told(fields: dict[str, Any]) -> dict[str, Any]:
+def _shown(fields: dict[str, Any]) -> dict[str, Any]:
     return {name: fields[name] for name in COMPARED}
 
 

@@ -16,10 +16,11 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
+from service.link.job_numbers import LARGEST_JOB
 from service.reasons import Language, Reason
 from service.records.archived_job import EvidenceError, load_archived
 from service.records.evidence import FRAME, Evidence, job_fields
-from service.records.journal import Job
+from service.records.job import Job
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 from service.web import models
 from service.web.commands import Commands, RequestRefused
@@ -30,7 +31,7 @@ from service.web.guard import BodyTooLarge
 from service.web.live import MOST_VIEWERS, PERIOD_S, EventStream, Live
 from service.web.openapi import PREFIX, document
 from service.web.operations_table import MOST_JOBS, MOST_NOTES, OPERATIONS
-from service.web.requests import LARGEST_JOB, address_of, body, job_number, truth, whole_number
+from service.web.requests import address_of, body, job_number, truth, whole_number
 
 Endpoint = Callable[[Request], Awaitable[Response]]
 
@@ -234,10 +235,10 @@ def problem(status: int, text: str, reason: Reason | None = None, again_s: float
     headers = {"www-authenticate": "Bearer"} if status == 401 else {}
     if again_s is not None:
         headers["retry-after"] = str(math.ceil(again_s))
-    told = models.Problem(
+    said = models.Problem(
         error=text, code=None if reason is None else int(reason), name=None if reason is None else reason.label
     )
-    return _answer(told, status, headers)
+    return _answer(said, status, headers)
 
 
 def _answer(model: BaseModel, status: int = 200, headers: dict[str, str] | None = None) -> Response:

@@ -10,7 +10,8 @@ from typing import TypeVar
 from service.daemon.control import CommandRefused
 from service.jobs.trigger_queue import TriggerRefused
 from service.reasons import Reason
-from service.records.journal import Journal, JournalError
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 from service.web.daemon_access import DaemonAccess, DaemonSilent
 from service.web.tokens import (
     COMMANDS,
@@ -116,7 +117,7 @@ class Commands:
     async def _done(self, number: int | None, do: Callable[[], Awaitable[tuple[T, str]]]) -> T:
         """What `do` gives; what became of it is noted, however it ends."""
         try:
-            given, told = await do()
+            given, result = await do()
         except TriggerRefused as refused:
             await self._note_result(number, f"refused: {refused.reason.label}: {refused}")
             raise RequestRefused(409, str(refused), refused.reason) from refused
@@ -126,7 +127,7 @@ class Commands:
         except DaemonSilent as silent:
             await self._note_result(number, f"not known: {silent}")
             raise RequestRefused(503, str(silent)) from silent
-        await self._note_result(number, told)
+        await self._note_result(number, result)
         return given
 
     async def _note_result(self, number: int | None, result: str) -> None:

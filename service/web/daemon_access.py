@@ -21,7 +21,8 @@ from service.jobs.trigger_queue import Queued
 from service.link.link import Link
 from service.measuring.calibration_guard import CalibrationGuard
 from service.records.archive_writer import ArchiveWriter
-from service.records.journal import Job, Journal, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
 from service.state import State
 
 T = TypeVar("T")
@@ -35,7 +36,7 @@ class DaemonSilent(Exception):
 
 
 @dataclass(frozen=True)
-class Sources:
+class PageSources:
     """The daemon's parts; None where it has no such part."""
 
     health: Health
@@ -56,7 +57,7 @@ class Sources:
 class DaemonAccess:
     """The daemon as the page sees it; `open` is called in the daemon's loop, before anything else."""
 
-    def __init__(self, sources: Sources) -> None:
+    def __init__(self, sources: PageSources) -> None:
         self.sources = sources
         self._loop: asyncio.AbstractEventLoop | None = None
         self._operations: Operations | None = None
@@ -87,15 +88,15 @@ class DaemonAccess:
     async def _state(self) -> dict[str, Any]:
         """In the daemon's loop, so that all of it is of one moment."""
         assert self._operations is not None
-        told = await self._operations.status({}, "page")
+        status = await self._operations.status({}, "page")
         outcomes = sorted(self._outcomes.items())
         return {
-            **told,
+            **status,
             "outcomes": [
                 {"outcome": outcome, "reason": reason or None, "count": count} for (outcome, reason), count in outcomes
             ],
             "recipes": [{"number": number, "name": name} for number, name in self.sources.recipes()],
-            "camera": {"what": self.sources.camera, "up": "camera" not in told["faults"]},
+            "camera": {"what": self.sources.camera, "up": "camera" not in status["faults"]},
             "link": self._link(),
             "calibration": self._calibration(),
             "disk": self._disk(),
@@ -105,12 +106,13 @@ class DaemonAccess:
         link = self.sources.link
         if link is None:
             return None
+        round_trip_s = link.reading.round_trip_s
         return {
             "what": self.sources.controller,
             "up": link.fault() is None,
             "not_ready": link.controller_not_ready(),
-            "round_trip_ms": None if link.round_trip_s is None else round(link.round_trip_s * 1000, 1),
-            "connections": link.connections,
+            "round_trip_ms": None if round_trip_s is None else round(round_trip_s * 1000, 1),
+            "connections": link.connection.opened,
         }
 
     def _calibration(self) -> dict[str, Any] | None:

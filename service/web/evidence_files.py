@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from service.export.forms import ENDINGS
 from service.records.archive import folder_of
 from service.records.evidence import FRAME, OVERLAY
-from service.records.journal import Job
+from service.records.job import Job
 
 DOCUMENT = "document.json"
 FILES = {

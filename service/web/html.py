@@ -104,9 +104,9 @@ class Pages:
 
 
 def _why(code: int, text: str, language: str) -> str:
-    told = Reason(code).explained(Language(language))
+    words = Reason(code).explained(Language(language))
     return (
-        f"<li><strong>{html.escape(told.sentence)}</strong> {html.escape(told.next_action)}"
+        f"<li><strong>{html.escape(words.sentence)}</strong> {html.escape(words.next_action)}"
         f"<small>{html.escape(text)}</small></li>"
     )
 

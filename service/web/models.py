@@ -266,24 +266,24 @@ class StateAfter(Answer):
     state: str
 
 
-class Request(Answer):
+class RequestBody(Answer):
     """Exactly these fields, each of its own JSON type: `true` is no recipe."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-class TriggerRequest(Request):
+class TriggerRequest(RequestBody):
     """recipe 0 = the configured default, thickness_mm 0 = the recipe's."""
 
     recipe: Annotated[int, Field(ge=0, le=65_535)] = 0
     thickness_mm: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)] = 0.0
 
 
-class HaltRequest(Request):
+class HaltRequest(RequestBody):
     """Why, for those who find it halted."""
 
     reason: Annotated[str, Field(max_length=200)] = ""
 
 
-class Nothing(Request):
+class Nothing(RequestBody):
     """An empty object."""

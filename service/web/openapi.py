@@ -56,7 +56,7 @@ def document(operations: Sequence[Operation], version: str) -> dict[str, Any]:
     schemas = {model: reference for (model, _), reference in names.items()}
     paths: dict[str, dict[str, Any]] = {}
     for operation in operations:
-        paths.setdefault(PREFIX + operation.path, {})[operation.method.lower()] = _told(operation, schemas)
+        paths.setdefault(PREFIX + operation.path, {})[operation.method.lower()] = _operation(operation, schemas)
     return {
         "openapi": "3.1.0",
         "info": {"title": "combtrace", "version": version, "description": "The service's state, its jobs, and orders."},
@@ -68,7 +68,7 @@ def document(operations: Sequence[Operation], version: str) -> dict[str, Any]:
     }
 
 
-def _told(operation: Operation, schemas: dict[Any, Any]) -> dict[str, Any]:
+def _operation(operation: Operation, schemas: dict[Any, Any]) -> dict[str, Any]:
     answer = operation.answer
     content = {answer: {}} if isinstance(answer, str) else {"application/json": {"schema": schemas[answer]}}
     responses: dict[str, Any] = {str(operation.status): {"description": operation.text, "content": content}}
@@ -76,14 +76,14 @@ def _told(operation: Operation, schemas: dict[Any, Any]) -> dict[str, Any]:
     problems = {**EVERYWHERE, **({} if operation.request is None else WITH_BODY), **operation.problems}
     for status, text in sorted(problems.items()):
         responses[str(status)] = {"description": text, "content": problem}
-    told: dict[str, Any] = {"summary": operation.text, "responses": responses}
+    described: dict[str, Any] = {"summary": operation.text, "responses": responses}
     if operation.parameters:
-        told["parameters"] = [_parameter(one) for one in operation.parameters]
+        described["parameters"] = [_parameter(one) for one in operation.parameters]
     if operation.request is not None:
-        told["requestBody"] = {"content": {"application/json": {"schema": schemas[operation.request]}}}
+        described["requestBody"] = {"content": {"application/json": {"schema": schemas[operation.request]}}}
     if operation.token:
-        told["security"] = [{"token": []}]
-    return told
+        described["security"] = [{"token": []}]
+    return described
 
 
 def _parameter(one: Parameter) -> dict[str, Any]:

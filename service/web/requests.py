@@ -7,12 +7,11 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 from starlette.requests import Request
 
+from service.link.job_numbers import LARGEST_JOB
 from service.web.commands import RequestRefused
 from service.web.guard import plain_address
 
 M = TypeVar("M", bound=BaseModel)
-
-LARGEST_JOB = 0xFFFFFFFF
 
 
 def address_of(request: Request) -> str:

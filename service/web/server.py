@@ -22,7 +22,7 @@ from service.daemon.listening_socket import bound
 from service.daemon.operations import Operations
 from service.web.api import Api, problem
 from service.web.commands import Commands
-from service.web.daemon_access import DaemonAccess, Sources
+from service.web.daemon_access import DaemonAccess, PageSources
 from service.web.guard import Guard
 from service.web.html import Pages
 from service.web.tokens import TokenFile, TokenFileError
@@ -68,7 +68,7 @@ class _BoundedHttp(H11Protocol):
 class PageServer:
     """Serves page and REST interface; listens from the start, answers while `run` runs."""
 
-    def __init__(self, settings: PageSettings, sources: Sources, version: str) -> None:
+    def __init__(self, settings: PageSettings, sources: PageSources, version: str) -> None:
         """Raise PageError where the token file, the certificate or the address cannot be used."""
         self._settings = settings
         tokens = None if settings.token_file is None else TokenFile(settings.token_file)
@@ -78,15 +78,15 @@ class PageServer:
         except TokenFileError as error:
             raise PageError(f"page: {error}") from error
         check_certificate(settings)
-        self._daemon = DaemonAccess(sources)
-        self._pages = Pages(self._daemon, settings.language)
-        commands = Commands(self._daemon, sources.journal, tokens)
-        self._make_api: Callable[[], Api] = lambda: Api(self._daemon, commands, version)
+        self.daemon = DaemonAccess(sources)
+        self._pages = Pages(self.daemon, settings.language)
+        commands = Commands(self.daemon, sources.journal, tokens)
+        self._make_api: Callable[[], Api] = lambda: Api(self.daemon, commands, version)
         self._socket: socket.socket | None = _bound(settings.host, settings.port)
 
     async def run(self, operations: Operations) -> None:
         """Serve for ever; in the daemon's loop."""
-        self._daemon.open(operations)
+        self.daemon.open(operations)
         if self._socket is None:
             self._socket = _bound(self._settings.host, self._settings.port)
         listener, self._socket = self._socket, None
@@ -179,6 +179,6 @@ def check_certificate(settings: PageSettings) -> None:
         ) from error
 
 
-def make_page(settings: PageSettings, sources: Sources) -> PageServer:
+def make_page(settings: PageSettings, sources: PageSources) -> PageServer:
     """The page as the configuration has it; raise PageError."""
     return PageServer(settings, sources, importlib.metadata.version("combtrace"))

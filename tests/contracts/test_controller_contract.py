@@ -19,7 +19,8 @@ from drivers.controller import (
     Page,
     ServiceBlock,
 )
-from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, encode_pages, micrometres
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import ContourMessage, encode_pages, micrometres
 from drivers.controller.modbus.client import ModbusTcpController
 from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.controller_cells import PATIENT_S, SERVERS, WAYS, Cell, cell

@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 
 from drivers.controller import ControllerRefused
-from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, Page, encode_pages, micrometres
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages, micrometres
 from drivers.controller.modbus.client import (
     ModbusController,
     ModbusRtuController,
     ModbusRtuOverTcpController,
     ModbusTcpController,
-    RequestLimits,
-    SerialLine,
 )
-from drivers.controller.simulated.controller import ServerLimits, SimulatedController
+from drivers.controller.modbus.requests import RequestLimits
+from drivers.controller.modbus.serial_line import SerialLine
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.window import ServerLimits
 from tests.support.controller.controller_cells import PATIENT_S, WAYS
 from tests.support.controller.pty_line import PtyLine
 from tests.support.controller.serial_server import SerialServer

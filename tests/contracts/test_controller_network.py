@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from drivers.controller import ControllerError, ControllerUnavailable, LinkBlock, Page
-from drivers.controller.mailbox.mailbox import ContourMessage, encode_pages
+from drivers.controller.mailbox.pages import ContourMessage, encode_pages
 from drivers.controller.modbus.client import ModbusTcpController
-from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
+from drivers.controller.simulated.contour import AcceptedContour
+from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.fault_proxy import Fate, FaultProxy
 
 TIMEOUT_S = 0.03

@@ -7,7 +7,8 @@ from collections.abc import AsyncIterator
 import pytest
 
 from drivers.controller import ControllerNonsense, MailboxError, Page
-from drivers.controller.modbus.client import ModbusTcpController, RequestLimits
+from drivers.controller.modbus.client import ModbusTcpController
+from drivers.controller.modbus.requests import RequestLimits
 from tests.support.controller.controller_cells import PATIENT_S
 from tests.support.controller.misbehaving_server import MisbehavingServer, right_reply
 

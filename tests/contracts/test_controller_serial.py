@@ -21,11 +21,13 @@ from drivers.controller import (
     Page,
     ServiceBlock,
 )
-from drivers.controller.mailbox.mailbox import BLOCK_REGISTERS, HEADER_REGISTERS
+from drivers.controller.mailbox.blocks import BLOCK_REGISTERS
 from drivers.controller.mailbox.page_spans import PAYLOAD_OFFSET, page_starts, spans
-from drivers.controller.modbus.client import ModbusRtuController, ModbusRtuOverTcpController, Rs485, SerialLine
+from drivers.controller.mailbox.pages import HEADER_REGISTERS
+from drivers.controller.modbus.client import ModbusRtuController, ModbusRtuOverTcpController
 from drivers.controller.modbus.late_replies import BARRIER_COUNTS, SILENCE_S
 from drivers.controller.modbus.requests import LONGEST_READ
+from drivers.controller.modbus.serial_line import Rs485, SerialLine
 from tests.support.controller.controller_cells import PATIENT_S
 from tests.support.controller.line_server import LineServer
 from tests.support.controller.pty_line import PtyLine

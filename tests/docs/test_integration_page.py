@@ -6,7 +6,9 @@ import json
 import re
 from pathlib import Path
 
-from drivers.controller.mailbox.mailbox import HEADER_FIELDS, LINK_FIELDS, SERVICE_FIELDS, MailboxLayout, crc32_of
+from drivers.controller.mailbox.blocks import LINK_FIELDS, SERVICE_FIELDS
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import HEADER_FIELDS, crc32_of
 from service.commissioning.given_shapes import SHAPES
 from service.link.register_map import MEANINGS, register_map
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import Page, withdrawal
+from drivers.controller.mailbox.pages import Page, withdrawal
 from service.commissioning.hil import Bench
 
 ACCEPTED, BAD_CRC, BAD_LAYOUT, EXPIRED, ACCEPTED_BEFORE, OUTDATED = 1, 2, 3, 5, 6, 8

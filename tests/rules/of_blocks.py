@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from tests.rules.rule import IN_DOUBT, IN_LINK, IN_TRANSFER, LINK, TRANSFER, Rule
+from tests.rules.rule import CONNECTION, IN_DOUBT, IN_LINK, IN_TRANSFER, READING, TRANSFER, WRITING, Rule
 
 RULES = (
     # --- conventions ---
     Rule(
         "Conventions: a block is acted on only when two reads in a row show the same",
-        f"{LINK}::Link._shows_the_same",
+        f"{READING}::LinkReading._shows_the_same",
         f"{IN_LINK}::test_a_block_counts_only_when_two_reads_in_a_row_show_it",
         "if previous is None or previous != shown:",
         "if previous is None:",
     ),
     Rule(
         "Conventions: what an earlier connection said is not combined with what comes next",
-        f"{LINK}::Link._forget",
+        f"{READING}::LinkReading.forget",
         f"{IN_LINK}::test_what_an_earlier_connection_said_does_not_count_as_one_of_the_two",
         "self._previous: tuple[int, ...] | None = None",
         "self._previous = getattr(self, '_previous', None)",
@@ -31,26 +31,26 @@ RULES = (
         "Conventions: on a new connection step 2 again, though none of the transfer's own writes was lost",
         f"{TRANSFER}::Transfer._check_may_go_on",
         f"{IN_TRANSFER}::test_a_connection_that_was_opened_anew_begins_again_with_transfer_0",
-        "if (self._link.connections, self._link.ownership.epoch) != clean:",
+        "if (self._link.connection.opened, self._link.ownership.epoch) != clean:",
         "if False:",
     ),
     Rule(
         "Conventions: what rests on last_job alone needs reads alike over two changes of the heartbeat",
         f"{TRANSFER}::Transfer._see",
         f"{IN_DOUBT}::test_without_our_acknowledgement_last_job_settles_only_once_it_holds",
-        "(self._link.holds or self._acknowledged(view))",
+        "(holds or self._acknowledged(view))",
         "True",
     ),
     Rule(
         "Conventions: so does a last_job above job_id, and another session",
         f"{TRANSFER}::Transfer._see",
         f"{IN_DOUBT}::test_a_last_job_that_stands_half_written_for_a_scan_fails_no_job",
-        "if self._link.holds:",
+        "if holds:",
         "if True:",
     ),
     Rule(
         "Conventions: two changes of the heartbeat, all reads between them alike",
-        f"{LINK}::Link._shows_the_same",
+        f"{READING}::LinkReading._shows_the_same",
         f"{IN_LINK}::test_last_job_is_known_once_it_held_over_two_changes_of_the_heartbeat",
         "if self.holds and",
         "if",
@@ -74,34 +74,34 @@ RULES = (
         "Link block: session 0 is disregarded",
         f"{TRANSFER}::Transfer._see",
         f"{IN_TRANSFER}::test_a_session_of_0_is_disregarded",
-        "if view.session == 0 or self._link.echo_fault",
-        "if self._link.echo_fault",
+        "if view.session == 0 or echo_fault",
+        "if echo_fault",
     ),
     Rule(
         "Link block: the controller's heartbeat changes while its program runs",
-        f"{LINK}::Link._beat_fault",
+        f"{READING}::LinkReading.beat_fault",
         f"{IN_LINK}::test_a_heartbeat_that_stands_still_is_a_fault_though_the_server_answers",
-        "if self._silent_s() > self.settings.heartbeat_timeout_s:",
-        "if self._silent_s() > 1e9:",
+        "if self.silent_s > timeout_s:",
+        "if self.silent_s > 1e9:",
     ),
     # --- service block ---
     Rule(
         "Service block: written at every change",
-        f"{LINK}::Link.publish",
+        f"{WRITING}::ServiceBlockWriting.publish",
         f"{IN_LINK}::test_a_change_is_written_at_once_and_flush_waits_for_it",
-        "self._wake.set()",
+        "self._on_publish()",
         "pass",
     ),
     Rule(
         "Service block: service_heartbeat changes at least once a second",
-        f"{LINK}::Link._service_due",
+        f"{WRITING}::ServiceBlockWriting.due",
         f"{IN_LINK}::test_our_heartbeat_changes_at_least_once_a_second_and_the_block_is_written_whole",
         "return self._dirty or due or not self.ownership.decided",
         "return self._dirty or not self.ownership.decided",
     ),
     Rule(
         "Service block: what its reply did not confirm is written again",
-        f"{LINK}::Link.run",
+        f"{CONNECTION}::Connection.keep",
         f"{IN_LINK}::test_a_service_block_whose_reply_was_lost_is_written_again",
         "except ControllerError as error:\n                    # A",
         "except ZeroDivisionError as error:\n                    # A",

@@ -17,10 +17,13 @@ from tests.rules.rule import (
     IN_RESUMING,
     IN_TRANSFER,
     JOURNAL,
-    LINK,
+    NUMBERS,
     OWNERSHIP,
     PAGE_TEXT,
+    READING,
+    RESTART,
     TRANSFER,
+    WRITING,
     Rule,
 )
 
@@ -56,21 +59,21 @@ RULES = (
     ),
     Rule(
         "Own start: what the service block says counts also where owner is its own",
-        f"{JOURNAL}::_is_later",
+        f"{RESTART}::_is_later",
         f"{IN_RESTART}::test_a_restored_journal_repeats_no_trigger_and_no_number",
         "return than[0] != session or 0 < (pair[1] - than[1]) % 65536 < LATER",
         "return False",
     ),
     Rule(
         "Own start: but an earlier trigger_ack does not",
-        f"{JOURNAL}::_is_later",
+        f"{RESTART}::_is_later",
         f"{IN_RESTART}::test_an_earlier_trigger_in_the_service_block_takes_nothing_back",
         "return than[0] != session or 0 < (pair[1] - than[1]) % 65536 < LATER",
         "return True",
     ),
     Rule(
         "Own start: a job_id there that the journal does not know is withdrawn (154)",
-        f"{JOURNAL}::Journal.go_on_above",
+        f"{RESTART}::go_on_above",
         f"{IN_RESTART}::test_a_job_that_only_the_service_block_knows_is_taken_back",
         "found.job_id > found.settled_job\n",
         "found.job_id < 0\n",
@@ -91,7 +94,7 @@ RULES = (
     ),
     Rule(
         "Own start: numbers from at least 1,000 above all it finds",
-        f"{JOURNAL}::Journal.go_on_above",
+        f"{RESTART}::go_on_above",
         f"{IN_RESTART}::test_each_start_numbers_from_a_thousand_above_all_in_the_journal",
         "min(known + room, LARGEST_JOB - 1)",
         "known",
@@ -105,9 +108,9 @@ RULES = (
     ),
     Rule(
         "Own start: a last_job more than 1,000,000 above all known is a fault until a person confirms it",
-        f"{LINK}::Link._number_fault",
+        f"{NUMBERS}::JobNumbers.fault",
         f"{IN_LINK}::test_a_last_job_that_leaps_is_a_fault_until_it_is_corrected",
-        "if self.last_job > known + LARGEST_STEP and",
+        "if last_job > known + LARGEST_STEP and",
         "if False and",
     ),
     Rule(
@@ -133,10 +136,10 @@ RULES = (
     ),
     Rule(
         "Contours are sent only while test_echo = test_value + 1",
-        f"{LINK}::Link.echo_fault",
+        f"{READING}::echo_fault",
         f"{IN_TRANSFER}::test_contours_are_sent_only_while_the_test_echo_is_right",
-        "if view.test_echo == expected:",
-        "if expected:",
+        "if block.test_echo == TEST_ECHO:",
+        "if TEST_ECHO:",
     ),
     Rule(
         "A clock reading counts only if it fits the last one that counted within 1 s",
@@ -171,22 +174,22 @@ RULES = (
         f"{CYCLE}::Cycle._carry_out",
         f"{IN_CYCLE}::test_captured_at_was_read_before_the_exposure",
         "stamp = await self._stamp(job)\n        stamped_at = self._now()\n"
-        "        frame = course.frame = await self._frame(course.report)",
-        "frame = course.frame = await self._frame(course.report)\n        await asyncio.sleep(0.05)\n"
+        "        frame = ongoing.frame = await self._frame(ongoing.report)",
+        "frame = ongoing.frame = await self._frame(ongoing.report)\n        await asyncio.sleep(0.05)\n"
         "        stamp = await self._stamp(job)\n"
         "        stamped_at = self._now()",
     ),
     # --- one service ---
     Rule(
         "One service: owner is read before each write of the service block",
-        f"{LINK}::Link._keep_service",
+        f"{WRITING}::ServiceBlockWriting.keep",
         f"{IN_OWNERSHIP}::test_owner_is_read_before_each_write_of_the_service_block",
-        "found = await self.controller.read_service()",
-        "found = self._block",
+        "found = await self._controller.read_service()",
+        "found = self.published",
     ),
     Rule(
         "One service: and the block is written only where what was read allows it",
-        f"{LINK}::Link._keep_service",
+        f"{WRITING}::ServiceBlockWriting.keep",
         f"{IN_OWNERSHIP}::test_what_stands_still_is_not_overwritten_before_it_was_watched",
         "if not self.ownership.saw(found):",
         "if self.ownership.saw(found) is None:",

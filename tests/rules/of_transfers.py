@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.rules.rule import CYCLE, IN_DOUBT, IN_PAGES, IN_RESUMING, IN_TRANSFER, LINK, TRANSFER, Rule
+from tests.rules.rule import CYCLE, IN_DOUBT, IN_PAGES, IN_RESUMING, IN_TRANSFER, LINK, TRANSFER, TRANSFER_TERMS, Rule
 
 RULES = (
     # --- a transfer ---
@@ -31,7 +31,7 @@ RULES = (
         "Transfer 3: the pages are durable before the first request of them",
         f"{TRANSFER}::Transfer._about_to_send",
         f"{IN_TRANSFER}::test_a_page_is_cleared_written_read_back_and_committed_in_this_order",
-        "await self._before_sending()",
+        "await self._steps.before_sending()",
         "pass",
     ),
     Rule(
@@ -43,7 +43,7 @@ RULES = (
     ),
     Rule(
         "Transfer 5: the next transfer value is never 0 nor ack_transfer, and new at every attempt",
-        f"{TRANSFER}::TransferCounter.next",
+        f"{TRANSFER_TERMS}::TransferCounter.next",
         f"{IN_TRANSFER}::test_the_counter_never_gives_0_nor_what_was_last_answered",
         "while value in (0, ack_transfer, self._last):",
         "while value == self._last:",
@@ -132,7 +132,7 @@ RULES = (
         "Transfer 8: why it is withdrawn is durable before the first request that takes it back",
         f"{TRANSFER}::Transfer.withdraw",
         f"{IN_TRANSFER}::test_after_three_attempts_in_vain_the_job_is_withdrawn_and_failed_with_150",
-        "await self._before_withdrawal(reason)",
+        "await self._steps.before_withdrawal(reason)",
         "pass",
     ),
     Rule(
@@ -151,14 +151,14 @@ RULES = (
     ),
     Rule(
         "Transfer 2: what was taken longer ago than valid_for by the machine's clock is withdrawn, not sent again",
-        f"{TRANSFER}::Lifetime.left_s",
+        f"{TRANSFER_TERMS}::Lifetime.left_s",
         f"{IN_DOUBT}::test_what_was_taken_longer_ago_than_it_may_live_is_withdrawn_never_sent_again",
         "if self.taken_at_s is not None:",
         "if False:",
     ),
     Rule(
         "Transfer 2: so is what was taken before that clock went back",
-        f"{TRANSFER}::Lifetime.left_s",
+        f"{TRANSFER_TERMS}::Lifetime.left_s",
         f"{IN_DOUBT}::test_what_was_taken_longer_ago_than_it_may_live_is_withdrawn_never_sent_again",
         "if age_s >= 0 else 0.0",
         "",
@@ -174,7 +174,7 @@ RULES = (
         "Transfer 7: nothing is concluded while test_echo is wrong",
         f"{TRANSFER}::Transfer._see",
         f"{IN_DOUBT}::test_nothing_is_concluded_from_a_block_that_is_misread",
-        "or self._link.echo_fault(view) is not None",
+        "or echo_fault(view) is not None",
         "",
     ),
     Rule(

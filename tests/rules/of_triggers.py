@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tests.rules.rule import (
+    CONNECTION,
     CYCLE,
     EXECUTOR,
     IN_ANSWERS,
@@ -14,7 +15,7 @@ from tests.rules.rule import (
     IN_RESUMING,
     IN_TRANSFER,
     JOURNAL,
-    LINK,
+    RESTART,
     TRANSFER,
     TRIGGERS,
     Rule,
@@ -97,8 +98,8 @@ RULES = (
         "Trigger 3: journalled durably before it is acknowledged",
         f"{JOURNAL}::Journal.take",
         f"{IN_EXECUTOR}::test_a_trigger_becomes_a_durable_job_before_the_ticket_is_handed_out",
-        "with self._transaction() as db:\n            highest",
-        "self._db.execute('BEGIN')\n        for db in (self._db,):\n            highest",
+        "with self._file.transaction() as db:\n            highest",
+        "self._file.db.execute('BEGIN')\n        for db in (self._file.db,):\n            highest",
     ),
     Rule(
         "Trigger 3: then job_id, trigger_ack and session_ack are written",
@@ -137,7 +138,7 @@ RULES = (
     ),
     Rule(
         "Always: a lost journal repeats no trigger: the service block says which was taken",
-        f"{JOURNAL}::Journal.go_on_above",
+        f"{RESTART}::go_on_above",
         f"{IN_RESTART}::test_a_trigger_that_a_lost_journal_held_is_not_taken_again",
         "if later:",
         "if False:",
@@ -165,7 +166,7 @@ RULES = (
     ),
     Rule(
         "Always: losing the controller never ends the service",
-        f"{LINK}::Link.run",
+        f"{CONNECTION}::Connection.keep",
         f"{IN_LINK}::test_a_lost_controller_is_found_and_taken_up_again_alone",
         "self._lost(error)",
         "raise",

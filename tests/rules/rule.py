@@ -13,12 +13,16 @@ TRANSFER, LINK, EXECUTOR, CYCLE = (
     "service/jobs/executor.py",
     "service/jobs/cycle.py",
 )
-JOURNAL, OWNERSHIP, CLOCK = (
+JOURNAL, RESTART, OWNERSHIP, CLOCK = (
     "service/records/journal.py",
+    "service/records/journal_restart.py",
     "service/link/ownership.py",
     "service/link/controller_clock.py",
 )
 PAGE_TEXT = "drivers/controller/mailbox/page_text.py"
+CONNECTION, READING, WRITING, NUMBERS, TRANSFER_TERMS = (
+    f"service/link/{name}.py" for name in ("connection", "reading", "writing", "job_numbers", "transfer_terms")
+)
 IN_CLOCK, IN_DOUBT = "tests/service/link/test_controller_clock.py", "tests/service/link/test_transfer_in_doubt.py"
 TRIGGERS, IN_ANSWERS = "service/jobs/triggers.py", "tests/service/jobs/test_serial_answers.py"
 IN_RESTART = "tests/service/jobs/test_executor_after_restart.py"

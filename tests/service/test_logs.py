@@ -13,7 +13,7 @@ import pytest
 from service.jobs.job_log import log_end
 from service.logs import BURST, WINDOW_S, Format, LineFormatter, LogHandler, event, journald_reads
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Terms, TriggerStamp
+from service.records.job import Job, Terms, TriggerStamp
 from service.state import State, StateMachine
 
 

@@ -14,17 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.controller.mailbox.mailbox import (
-    ContourMessage,
-    LinkBlock,
-    Page,
-    ServiceBlock,
-    WordOrder,
-    encode_link,
-    encode_pages,
-    encode_service,
-    withdrawal,
-)
+from drivers.controller.mailbox.blocks import LinkBlock, ServiceBlock, encode_link, encode_service
+from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages, withdrawal
+from drivers.controller.mailbox.words import WordOrder
 
 FORMAT = (
     "Each page's header holds offsets 1 to 31 of the contour block, its payload what follows. The commit register, "

@@ -8,18 +8,17 @@ import struct
 from collections.abc import Sequence
 
 from drivers.controller.errors import ControllerNonsense, ControllerUnavailable, MailboxError
-from drivers.controller.mailbox.mailbox import (
+from drivers.controller.mailbox.blocks import (
     BLOCK_REGISTERS,
-    HEADER_REGISTERS,
     LinkBlock,
-    MailboxLayout,
-    Page,
     ServiceBlock,
     decode_link,
     decode_service,
     encode_service,
 )
+from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.mailbox.page_spans import PAYLOAD_OFFSET, header_spans, page_starts, spans
+from drivers.controller.mailbox.pages import HEADER_REGISTERS, Page
 from drivers.controller.modbus.late_replies import outlast_late_replies
 from drivers.controller.modbus.request_queue import Connection
 from drivers.controller.modbus.requests import (

@@ -10,15 +10,10 @@ from itertools import cycle
 from typing import Any, Literal, get_args
 
 from drivers.controller.simulated.contour import AcceptedContour
-from drivers.controller.simulated.controller import (
-    FaultPlan,
-    Pace,
-    ServerLimits,
-    SimulatedController,
-    TriggerNotPossible,
-)
-from drivers.controller.simulated.faults import Fault
-from drivers.controller.simulated.program import Judge, Reply
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.faults import Fault, FaultPlan
+from drivers.controller.simulated.program import Judge, Pace, Reply, TriggerNotPossible
+from drivers.controller.simulated.window import ServerLimits
 
 EventKind = Literal[
     "trigger",

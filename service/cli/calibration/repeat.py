@@ -40,7 +40,8 @@ def run(args: argparse.Namespace) -> int:
     from contour.errors import ParameterError
     from contour.geometry.comparison import scatter_mm
     from service.measuring.trend_file import TrendLine
-    from service.wiring import WiringError, make_camera
+    from service.wiring.devices import make_camera
+    from service.wiring.errors import WiringError
 
     if args.config is None:
         raise UserError("--config FILE is needed: it names the camera")

@@ -64,7 +64,7 @@ async def _probe(config: Config, args: argparse.Namespace) -> int:
     from service.commissioning.probing.probe import Probe
     from service.config.controllers import NoController
     from service.daemon.lock import LockError, Locks, NameLock
-    from service.wiring import controller_names, make_controller
+    from service.wiring.devices import controller_names, make_controller
 
     controller = make_controller(config)
     assert controller is not None

@@ -22,7 +22,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the map."""
     from service.config.config_file import ConfigError, load_config
     from service.link.register_map import register_map
-    from service.wiring import mailbox_layout
+    from service.wiring.devices import mailbox_layout
 
     try:
         config = load_config(args.config)

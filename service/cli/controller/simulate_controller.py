@@ -15,7 +15,8 @@ from service.atomic_file import write_whole
 from service.cli.errors import EXIT_OK, UserError
 
 if TYPE_CHECKING:
-    from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
+    from drivers.controller.simulated.contour import AcceptedContour
+    from drivers.controller.simulated.controller import SimulatedController
     from drivers.controller.simulated.scenario import Scenario
 
 HELP = "play the cutting machine's controller"
@@ -118,7 +119,7 @@ def _scenario(args: argparse.Namespace) -> Scenario:
 
 
 def _build(args: argparse.Namespace, scenario: Scenario, log: TextIO | None) -> SimulatedController:
-    from drivers.controller.mailbox.mailbox import MailboxLayout
+    from drivers.controller.mailbox.layout import MailboxLayout
     from drivers.controller.simulated.controller import SimulatedController
     from drivers.controller.simulated.scenario import machine_options
 

@@ -14,7 +14,7 @@ from service.cli.errors import UserError
 if TYPE_CHECKING:
     from service.commissioning.given_contours import GivenContour
     from service.config.config import Config
-    from service.wiring import Instead
+    from service.wiring.daemon import StandIns
 
 log = logging.getLogger("combtrace.daemon")
 
@@ -84,10 +84,11 @@ def run(args: argparse.Namespace) -> int:
 
 async def _run(args: argparse.Namespace, config: Config, contours: tuple[GivenContour, ...]) -> int:
     from service.cli.daemon.run import serve, summary, version
-    from service.wiring import WiringError, build
+    from service.wiring.daemon import build
+    from service.wiring.errors import WiringError
 
     try:
-        parts = build(config, instead=_instead(args, config, contours))
+        parts = build(config, stand_ins=_stand_ins(args, config, contours))
     except WiringError as error:
         raise UserError(str(error)) from error
     told = summary(config).partition(", ")[2]
@@ -95,17 +96,19 @@ async def _run(args: argparse.Namespace, config: Config, contours: tuple[GivenCo
     return await serve(parts, config.controller.ready_timeout_s, once=args.once)
 
 
-def _instead(args: argparse.Namespace, config: Config, contours: tuple[GivenContour, ...]) -> Instead:
+def _stand_ins(args: argparse.Namespace, config: Config, contours: tuple[GivenContour, ...]) -> StandIns:
     from service.commissioning.given_contours import GivenContours, NoCamera
-    from service.link.wire_log import ToldController
-    from service.wiring import Instead, mailbox_layout, work_area
+    from service.link.wire_log import LoggedController
+    from service.wiring.daemon import StandIns
+    from service.wiring.devices import mailbox_layout
+    from service.wiring.plan import work_area
 
     layout = mailbox_layout(config)
     assert layout is not None
-    return Instead(
+    return StandIns(
         NoCamera(),
         GivenContours(contours, aligned=args.aligned, work_area_mm=work_area(config)),
-        lambda controller: ToldController(controller, layout, registers=args.registers),
+        lambda controller: LoggedController(controller, layout, registers=args.registers),
     )
 
 

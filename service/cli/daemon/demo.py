@@ -13,10 +13,10 @@ from service.cli.errors import EXIT_FAILED, EXIT_OK, UserError
 from service.cli.file_names import make_folder
 
 if TYPE_CHECKING:
-    from drivers.controller.simulated.controller import AcceptedContour
+    from drivers.controller.simulated.contour import AcceptedContour
     from service.config.config import Config
-    from service.jobs.cycle import Observation
-    from service.records.journal import Job
+    from service.jobs.cycle_terms import Observation
+    from service.records.job import Job
 
 HELP = "run the whole way once, with a simulated controller"
 DESCRIPTION = """\
@@ -44,7 +44,8 @@ async def _demo(output: Path) -> int:
     from drivers.controller.simulated.controller import SimulatedController
     from service.daemon.daemon import Daemon
     from service.jobs.trigger_queue import TriggerRefused
-    from service.wiring import WiringError, build
+    from service.wiring.daemon import build
+    from service.wiring.errors import WiringError
 
     taken: list[AcceptedContour] = []
     seen: list[Observation] = []

@@ -18,7 +18,7 @@ from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_REFUSED, UserError
 if TYPE_CHECKING:
     from service.config.config import Config
     from service.daemon.daemon import Daemon, Parts
-    from service.records.journal import Job
+    from service.records.job import Job
 
 log = logging.getLogger("combtrace.daemon")
 
@@ -72,7 +72,8 @@ def summary(config: Config) -> str:
 
 
 async def _run(config: Config, config_path: Path, *, once: bool) -> int:
-    from service.wiring import WiringError, build, opening_of
+    from service.wiring.daemon import build, opening_of
+    from service.wiring.errors import WiringError
 
     opening = None if once else opening_of(config)
     while True:

@@ -41,7 +41,8 @@ def opened_camera(args: argparse.Namespace) -> Iterator[Camera]:
 
 def _camera(args: argparse.Namespace) -> Camera:
     from service.config.config_file import ConfigError, load_config
-    from service.wiring import WiringError, make_camera
+    from service.wiring.devices import make_camera
+    from service.wiring.errors import WiringError
 
     if args.device is not None:
         return _named(args)

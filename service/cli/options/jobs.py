@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from service.cli.errors import UserError
+from service.link.job_numbers import LARGEST_JOB
 
 if TYPE_CHECKING:
     from service.config.config import Config
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 AGO = re.compile(r"(\d{1,6}(?:\.\d+)?)([smhdw])")
 UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days", "w": "weeks"}
-LARGEST_JOB = 0xFFFFFFFF
 
 
 def add_filter_arguments(parser: argparse.ArgumentParser) -> None:

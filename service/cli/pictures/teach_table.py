@@ -95,7 +95,8 @@ def _read(paths: list[Path]) -> tuple[list[NDArray[np.uint8]], str]:
 def _taken(config: Config, count: int) -> tuple[list[NDArray[np.uint8]], str]:
     """Pictures of the configured camera, and the camera's name."""
     from drivers.camera import CameraError
-    from service.wiring import WiringError, make_camera
+    from service.wiring.devices import make_camera
+    from service.wiring.errors import WiringError
 
     try:
         camera = make_camera(config)

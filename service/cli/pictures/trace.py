@@ -217,7 +217,8 @@ def _write_overlay(path: Path, picture: Any, measurement: Measurement) -> None:
 
 
 def _table(config: Config) -> TableRecord | None:
-    from service.wiring import WiringError, find_table
+    from service.wiring.errors import WiringError
+    from service.wiring.plan import find_table
 
     try:
         return find_table(config)

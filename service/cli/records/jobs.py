@@ -14,7 +14,7 @@ from service.cli.options.jobs import add_config_argument, add_filter_arguments, 
 
 if TYPE_CHECKING:
     from service.config.config import Config
-    from service.records.journal import Job
+    from service.records.job import Job
 
 HELP = "list jobs and their ends, or show one"
 DESCRIPTION = """\

@@ -22,7 +22,9 @@ from service.config.config import Config
 from service.config.controllers import ModbusRtu
 from service.config.triggers import SerialTrigger
 from service.link.link import Link, LinkSettings
-from service.wiring import WiringError, find_guard, make_camera, make_controller, make_serial_port
+from service.wiring.devices import make_camera, make_controller, make_serial_port
+from service.wiring.errors import WiringError
+from service.wiring.plan import find_guard
 
 CONTROLLER_BOUND_S = 5.0
 CAMERA_BOUND_S = 5.0

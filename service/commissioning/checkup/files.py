@@ -15,7 +15,8 @@ from service.config.recipes import Gcode
 from service.export.recipe_exports import trial
 from service.measuring.calibration_guard import CalibrationGuard
 from service.measuring.measure import step_doubt
-from service.wiring import WiringError, find_guard, find_table
+from service.wiring.errors import WiringError
+from service.wiring.plan import find_guard, find_table
 
 _SOON = 0.9
 """Share of a calibration's allowed age from which on it is a warning."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from service.config.config import Config
 from service.daemon.lock import name_is_held
-from service.wiring import controller_names
+from service.wiring.devices import controller_names
 
 LOCKS = Path("/proc/locks")
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.config.config import Config
 from service.records.archive import free_bytes
-from service.records.journal import Job
+from service.records.job import Job
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 
 _MEGABYTE = 1_000_000

@@ -19,22 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.controller import Controller, ControllerError, LinkBlock, Page
-from drivers.controller.mailbox.mailbox import (
-    ContourMessage,
-    MailboxError,
-    MailboxLayout,
-    crc32_of,
-    encode_pages,
-    encode_service,
-    withdrawal,
-)
+from drivers.controller.errors import MailboxError
+from drivers.controller.mailbox.blocks import encode_service
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import ContourMessage, crc32_of, encode_pages, withdrawal
 from drivers.controller.simulated.controller import SimulatedController
 from service.commissioning.hil.presence import LOOK_S, HilError, Presence
 from service.commissioning.hil.which_controller import config_of, loaded, over_tcp
 from service.config.controllers import NoController
 from service.jobs.executor import ROOM
 from service.link.controller_clock import BEATS_TO_HOLD
-from service.wiring import mailbox_layout, make_controller
+from service.wiring.devices import mailbox_layout, make_controller
 
 HOLDS_S = 3.0  # two changes of a heartbeat that changes once a second, and more
 ANSWER_S = 5.0

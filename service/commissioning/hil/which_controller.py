@@ -9,12 +9,12 @@ from urllib.parse import parse_qsl, urlsplit
 from pydantic import ValidationError
 
 from drivers.controller import Controller
-from drivers.controller.mailbox.mailbox import MailboxLayout
+from drivers.controller.mailbox.layout import MailboxLayout
 from service.commissioning.hil.presence import HilError
 from service.config.config import Config
 from service.config.config_file import ConfigError, load_config
 from service.config.mistakes import describe
-from service.wiring import make_controller
+from service.wiring.devices import make_controller
 
 KINDS = {"tcp": "modbus-tcp", "rtu-over-tcp": "modbus-rtu-over-tcp", "rtu": "modbus-rtu"}
 

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from drivers.controller.mailbox.mailbox import MailboxLayout, WordOrder
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.words import WordOrder
 
 SHIFTS = (0, 1, -1)
 ORDERS: tuple[WordOrder, ...] = ("big", "little")

@@ -13,7 +13,7 @@ import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 
 from drivers.controller import ControllerUnavailable
-from drivers.controller.mailbox.mailbox import BLOCK_REGISTERS
+from drivers.controller.mailbox.blocks import BLOCK_REGISTERS
 from drivers.controller.modbus.client import ModbusController
 from drivers.controller.modbus.requests import LONGEST_READ
 from service.commissioning.check_result import CheckResult, fault, ok

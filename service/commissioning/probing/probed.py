@@ -6,7 +6,8 @@ from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 
 from drivers.controller import ControllerError, ControllerRefused
-from drivers.controller.mailbox.mailbox import HEADER_REGISTERS, MailboxLayout
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import HEADER_REGISTERS
 from drivers.controller.modbus.client import ModbusController
 from drivers.controller.modbus.requests import SHORTEST_LIMIT, Request, people, read_registers, registers_of
 from service.commissioning.check_result import CheckResult, fault, ok

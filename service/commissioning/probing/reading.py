@@ -7,7 +7,7 @@ from functools import partial
 from statistics import median
 
 from drivers.controller import ControllerNonsense, ControllerTimeout
-from drivers.controller.mailbox.mailbox import BLOCK_REGISTERS
+from drivers.controller.mailbox.blocks import BLOCK_REGISTERS
 from drivers.controller.modbus.requests import LONGEST_READ, people, read_registers
 from service.commissioning.check_result import CheckResult, fault, ok
 from service.commissioning.probing.link_signature import Registers, Signature, from_mailbox, from_movement

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from drivers.controller import ControllerRefused, ControllerUnavailable
-from drivers.controller.mailbox.mailbox import BLOCK_REGISTERS, TEST_VALUE
+from drivers.controller.mailbox.blocks import BLOCK_REGISTERS, TEST_VALUE
 from drivers.controller.modbus.requests import LONGEST_WRITE, read_registers, registers_of, stream_of, write_registers
 from service.commissioning.check_result import CheckResult, fault, ok
 from service.commissioning.probing.link_signature import Signature, from_echo

@@ -4,7 +4,8 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from contour.geometry.rings import Ring, densified, hausdorff, is_simple, signed_area, simplify_indices
+from contour.geometry.rings import Ring, densified, hausdorff, is_simple, signed_area
+from contour.geometry.simplification import simplify_indices
 from tests.support.pictures.rings import SQUARE, blobs, random_blob, simple_rings, star
 
 tolerances = st.floats(0.01, 60.0)

@@ -26,7 +26,8 @@ from service.commissioning.checkup.storage import check_storage
 from service.config.config import Config
 from service.config.config_file import SAMPLES, load_config
 from service.daemon.lock import Lock, NameLock, name_is_held
-from service.records.journal import Journal, TriggerStamp
+from service.records.job import TriggerStamp
+from service.records.journal import Journal
 from tests.support.nobody import NOBODY, needs_root, open_folder, python_as_nobody
 
 

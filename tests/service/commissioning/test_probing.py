@@ -10,11 +10,14 @@ from typing import Any
 import pytest
 
 from drivers.controller import ControllerUnavailable, ServiceBlock
-from drivers.controller.mailbox.mailbox import MailboxLayout
-from drivers.controller.modbus.client import ModbusController, ModbusRtuController, ModbusTcpController, SerialLine
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.modbus.client import ModbusController, ModbusRtuController, ModbusTcpController
 from drivers.controller.modbus.requests import read_registers, registers_of, stream_of, write_register, write_registers
-from drivers.controller.simulated.controller import FaultPlan, Pace, ServerLimits, SimulatedController
-from drivers.controller.simulated.faults import Fault, Target
+from drivers.controller.modbus.serial_line import SerialLine
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.faults import Fault, FaultPlan, Target
+from drivers.controller.simulated.program import Pace
+from drivers.controller.simulated.window import ServerLimits
 from service.commissioning.check_result import CheckResult
 from service.commissioning.probing.probe import Probe
 from service.commissioning.probing.probed import LOOK_PERIOD_S

@@ -18,21 +18,23 @@ import pytest
 
 from drivers.camera import CameraUnavailable
 from drivers.camera.simulated import SimulatedCamera
-from drivers.controller.mailbox.mailbox import Answer, ServiceBlock
+from drivers.controller.mailbox.blocks import Answer, ServiceBlock
 from service.config.recipes import Recipe
 from service.daemon.daemon import Daemon, Parts
 from service.daemon.lock import Lock, LockError
 from service.daemon.systemd import Notifier, Watchdog
-from service.jobs.cycle import Cycle, CycleSettings
-from service.jobs.executor import Executor
+from service.jobs.cycle import Cycle
+from service.jobs.cycle_terms import CycleSettings, Devices, Plan, Records
+from service.jobs.executor import Executor, Intake
 from service.jobs.health import Health
 from service.jobs.trigger_queue import TriggerRefused
 from service.link.link import Link, LinkSettings
-from service.link.transfer import TransferCounter, TransferSettings
+from service.link.transfer_terms import TransferCounter, TransferSettings
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Journal, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
 from service.state import State, StateMachine
-from tests.support.service.cycle_rig import Plan
+from tests.support.service.cycle_rig import FixedMeasurer
 from tests.support.service.scripted_controller import ScriptedController
 
 QUICK = TransferSettings(ready_timeout_s=0.3, ack_timeout_s=0.2, max_repeats=2, poll_period_s=0.01)
@@ -53,19 +55,12 @@ class Built:
         pool = ThreadPoolExecutor(1)
         settings = CycleSettings(transfer=QUICK, camera_timeout_s=0.3)
         cycle = Cycle(
-            self.camera,
-            Plan(),  # type: ignore[arg-type]
-            {1: Recipe(number=1, name="one")},
-            journal,
-            health,
-            link,
-            TransferCounter(50),
+            Devices(self.camera, pool, link, TransferCounter(50)),
+            Records(journal, health),
+            Plan(FixedMeasurer(), {1: Recipe(number=1, name="one")}),  # type: ignore[arg-type]
             settings,
-            pool,
         )
-        executor = Executor(journal, cycle, health, link, controller_triggers=True)
-        if link is not None:
-            link.on_look = executor.wake
+        executor = Executor(journal, cycle, health, link, Intake(controller=True))
         self.parts = Parts(self.camera, journal, health, executor, link, pool, Lock(folder / "lock"))
         self.daemon = Daemon(self.parts)
 
@@ -110,7 +105,9 @@ class Systemd:
         parts = built.parts
         parts.notifier = Notifier({"NOTIFY_SOCKET": self._address, "WATCHDOG_USEC": "300000"})
         parts.watchdog = Watchdog(parts.notifier)
-        parts.executor._beat = lambda: parts.watchdog.beat("jobs")
+        parts.executor._feed_watchdog = lambda: parts.watchdog.feed("jobs")
+        if parts.link is not None:
+            parts.link.feed_watchdog = lambda: parts.watchdog.feed("link")
         return parts
 
     def heard(self) -> list[str]:

@@ -12,7 +12,7 @@ import pytest
 
 from service.config.config import Config
 from service.daemon.lock import Lock, LockError, Locks, NameLock, journal_lock, name_is_held, network_names, serial_name
-from service.wiring import controller_names
+from service.wiring.devices import controller_names
 
 
 def config(**controller: object) -> Config:

@@ -18,10 +18,11 @@ from contour.acceptance.error_budget import ErrorBudget
 from contour.errors import ParameterError, PictureError
 from contour.geometry.rings import Contour, area
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame, FrameUnusable, SceneMoved
-from drivers.controller.mailbox.mailbox import Answer, Page
-from service.jobs.cycle import MailboxFormat
+from drivers.controller.mailbox.blocks import Answer
+from drivers.controller.mailbox.pages import Page
+from service.jobs.cycle_terms import MailboxFormat
 from service.reasons import Outcome, Reason
-from service.records.journal import TriggerStamp
+from service.records.job import TriggerStamp
 from service.state import State
 from tests.support.controller.protocol_decoder import decode_contour
 from tests.support.service.cycle_rig import QUICK, RECTANGLE, SETTINGS, decoded, measured, rig
@@ -42,14 +43,14 @@ async def test_a_good_job_is_accepted_and_its_page_says_what_the_protocol_says(t
         assert contour.header.area == 5000
         assert contour.header.uncertainty == 0xFFFFFFFF
         assert [list(point) for point in contour.rings[0]] == (RECTANGLE * 1000).astype(int).tolist()
-        assert built.plan.calls == [(2, 25.0)], "the controller's thickness goes before the recipe's"
+        assert built.measurer.calls == [(2, 25.0)], "the controller's thickness goes before the recipe's"
         assert job.report["vertices"] == 4
         assert job.report["transfer_ms"] > 0
 
 
 async def test_how_sure_a_contour_is_goes_to_the_register_and_to_the_journal(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
-        built.plan.result = measured(uncertainty=ErrorBudget(picture_mm=0.3, thickness_mm=0.4, calibration_mm=1.2))
+        built.measurer.result = measured(uncertainty=ErrorBudget(picture_mm=0.3, thickness_mm=0.4, calibration_mm=1.2))
         job = await built.job()
         (page,) = built.controller.accepted
         assert decoded(page).header.uncertainty == 1300
@@ -86,13 +87,14 @@ async def test_without_a_clock_captured_at_and_valid_for_are_0(tmp_path: Path) -
 async def test_the_recipes_thickness_applies_where_the_trigger_names_none(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
         await built.job(TriggerStamp("serial", recipe=2))
-        assert built.plan.calls == [(2, 35.0)]
+        assert built.measurer.calls == [(2, 35.0)]
 
 
 async def test_a_trigger_without_a_recipe_gets_the_default(tmp_path: Path) -> None:
-    async with rig(tmp_path, replace(SETTINGS, default_recipe=2)) as built:
+    async with rig(tmp_path) as built:
+        built.cycle.use(replace(built.cycle._plan, default_recipe=2))
         await built.job()
-        assert built.plan.calls == [(2, 35.0)]
+        assert built.measurer.calls == [(2, 35.0)]
 
 
 async def test_an_unknown_recipe_is_refused_with_122_and_no_frame_is_grabbed(tmp_path: Path) -> None:
@@ -151,7 +153,7 @@ async def test_a_scene_that_moves_while_frames_are_averaged_is_refused_with_103(
 
 async def test_findings_refuse_the_job_with_the_lowest_code_and_all_texts(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
-        built.plan.result = measured(
+        built.measurer.result = measured(
             findings=((Reason.AREA_OUT_OF_LIMITS, "area 3"), (Reason.TOO_MANY_POINTS, "points 9"))
         )
         job = await built.job()
@@ -171,7 +173,7 @@ def large_contour(vertices: int) -> Contour:
 async def test_a_contour_of_several_pages_is_sent_page_by_page(tmp_path: Path) -> None:
     contour = large_contour(1300)
     async with rig(tmp_path) as built:
-        built.plan.result = measured(millimetres=contour, pixels=contour, area_mm2=area(contour))
+        built.measurer.result = measured(millimetres=contour, pixels=contour, area_mm2=area(contour))
         job = await built.job()
         assert job.outcome is Outcome.ACCEPTED
         pages = [page for name, page in built.controller.requests if name == "write_page"]
@@ -184,7 +186,7 @@ async def test_without_answers_a_contour_of_several_pages_is_refused_with_130(tm
     """Nobody would know when a page was read, so the next one would overwrite it unseen."""
     contour = large_contour(600)
     async with rig(tmp_path, replace(SETTINGS, transfer=replace(QUICK, handshake=False))) as built:
-        built.plan.result = measured(millimetres=contour, pixels=contour)
+        built.measurer.result = measured(millimetres=contour, pixels=contour)
         job = await built.job()
         assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.TOO_MANY_POINTS)
         assert "600 vertices need 2 pages" in (job.detail or "")
@@ -195,7 +197,7 @@ async def test_more_rings_than_the_first_pages_table_holds_are_refused_with_130(
     holes = tuple(np.array([[x, 1.0], [x, 2.0], [x + 1, 1.0]]) for x in range(1, 90, 2))
     contour = Contour(RECTANGLE, holes)
     async with rig(tmp_path, replace(SETTINGS, mailbox=MailboxFormat(payload_capacity=88))) as built:
-        built.plan.result = measured(millimetres=contour, pixels=contour)
+        built.measurer.result = measured(millimetres=contour, pixels=contour)
         job = await built.job()
         assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.TOO_MANY_POINTS)
         assert "46 rings" in (job.detail or "")
@@ -203,18 +205,18 @@ async def test_more_rings_than_the_first_pages_table_holds_are_refused_with_130(
 
 async def test_a_contour_without_millimetres_is_never_sent(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
-        built.plan.result = measured(millimetres=None, area_mm2=None)
+        built.measurer.result = measured(millimetres=None, area_mm2=None)
         job = await built.job()
         assert (job.outcome, job.reason) == (Outcome.REFUSED, Reason.CALIBRATION_MISSING)
 
 
 async def test_a_defect_ends_the_job_with_190_and_not_the_service(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
-        built.plan.result = ZeroDivisionError("a defect")
+        built.measurer.result = ZeroDivisionError("a defect")
         job = await built.job()
         assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.INTERNAL_ERROR)
         assert job.detail == "ZeroDivisionError: a defect"
-        built.plan.result = measured()
+        built.measurer.result = measured()
         assert (await built.job()).outcome is Outcome.ACCEPTED
 
 
@@ -298,7 +300,7 @@ async def test_an_unusable_picture_or_recipe_is_told_as_such_and_is_no_defect(
     tmp_path: Path, error: Exception, reason: Reason, caplog: pytest.LogCaptureFixture
 ) -> None:
     async with rig(tmp_path) as built:
-        built.plan.result = error
+        built.measurer.result = error
         job = await built.job()
     assert (job.outcome, job.reason) == (Outcome.FAILED, reason)
     assert str(error) in (job.detail or "")
@@ -320,15 +322,15 @@ async def test_a_defect_without_handshake_ends_the_job_at_once(tmp_path: Path) -
 async def test_a_journal_that_fails_during_a_job_holds_it_up_is_told_once_and_loses_nothing(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.jobs.cycle.JOURNAL_PAUSE_S", 0.01)
+    monkeypatch.setattr("service.records.durable_journal.PAUSE_S", 0.01)
     async with rig(tmp_path) as built:
         taken = built.journal.take(TriggerStamp("serial"))
-        built.journal._db.execute("PRAGMA query_only = ON")
+        built.journal._file.db.execute("PRAGMA query_only = ON")
         task = asyncio.ensure_future(built.cycle.run(taken))
         await asyncio.sleep(0.3)
         assert built.controller.count("write_page") == 0, "nothing is sent that is not durable"
         assert built.health.first().reason is Reason.INTERNAL_ERROR
-        built.journal._db.execute("PRAGMA query_only = OFF")
+        built.journal._file.db.execute("PRAGMA query_only = OFF")
         assert (await asyncio.wait_for(task, 60)).outcome is Outcome.ACCEPTED
     assert sum("journal" in record.message for record in caplog.records if record.name == "combtrace.cycle") == 1
 
@@ -341,7 +343,7 @@ async def test_nothing_is_sent_before_measurement_and_evidence_are_durable(tmp_p
         await asyncio.sleep(0.2)
         assert built.controller.count("write_page") == 0
         (draft,) = built.keeper.drafted
-        assert (draft.job.outcome, draft.measurement, draft.frame) == (None, built.plan.result, built.seen[0].frame)
+        assert (draft.job.outcome, draft.measurement, draft.frame) == (None, built.measurer.result, built.seen[0].frame)
         assert not built.journal.unsettled()[0].sent, "a restart would send it, with its evidence lost"
         seen, write_page = [], built.controller.write_page
 
@@ -374,7 +376,7 @@ async def test_a_disk_that_hangs_holds_no_contour_up_for_long(
 async def test_a_job_that_is_stopped_before_it_was_sent_leaves_what_it_came_to(tmp_path: Path) -> None:
     async with rig(tmp_path) as built:
         measuring = threading.Event()
-        built.plan.measure = lambda *_: measuring.set() or time.sleep(0.3)  # type: ignore[assignment,method-assign]
+        built.measurer.measure = lambda *_: measuring.set() or time.sleep(0.3)  # type: ignore[assignment,method-assign]
         task = asyncio.ensure_future(built.job())
         await until(measuring.is_set)
         task.cancel()

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import Answer, Page, ServiceBlock
+from drivers.controller.mailbox.blocks import Answer, ServiceBlock
+from drivers.controller.mailbox.pages import Page
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Terms, TriggerStamp
+from service.records.job import Job, Progress, Terms, TriggerStamp
 from tests.support.service.cycle_rig import QUICK, SETTINGS, Rig, rig
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.transferring import page
@@ -44,7 +45,7 @@ async def test_what_was_known_of_a_job_before_the_restart_stays_its_own(tmp_path
     report, figures, terms = {"vertices": 4, "area_mm2": 5000.0}, {"pages": 1}, Terms({"number": 1}, "sha256:aa")
     async with rig(tmp_path) as built:
         prepare = built.journal.store_pages
-        job = await resumed(built, lambda job_id: prepare(job_id, 9, (page(job_id),), terms, report, figures))
+        job = await resumed(built, lambda job_id: prepare(job_id, 9, (page(job_id),), Progress(terms, report, figures)))
         assert job.outcome is Outcome.ACCEPTED
         assert (job.report, job.transfer, job.terms) == (report, figures, terms)
         assert [(kept.job, kept.frame) for kept in built.keeper.kept] == [(job, None)], "the archive has the rest"
@@ -125,7 +126,7 @@ async def test_a_sent_job_whose_pages_cannot_be_read_any_more_is_withdrawn_with_
     async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
         taken = built.journal.take(TriggerStamp("serial"))
         built.journal.store_pages(taken.job_id, 9, (Page((0,) * 31, ()),))
-        built.journal._db.execute("UPDATE jobs SET pages = 'rotten' || substr(pages, 7)")
+        built.journal._file.db.execute("UPDATE jobs SET pages = 'rotten' || substr(pages, 7)")
         (job,) = built.journal.unsettled()
         settled = await asyncio.wait_for(built.cycle.resume(job), 15)
         assert (settled.outcome, settled.reason) == (Outcome.FAILED, Reason.SERVICE_RESTARTED)
@@ -141,7 +142,7 @@ async def test_a_job_taken_longer_ago_than_it_is_valid_is_taken_back_after_a_res
         def prepare(job_id: int) -> None:
             built.journal.store_pages(job_id, 9, (page(job_id),))
             six_hours_ago = (datetime.now(UTC) - timedelta(hours=6)).isoformat(timespec="milliseconds")
-            built.journal._db.execute("UPDATE jobs SET taken_at = ?", (six_hours_ago,))
+            built.journal._file.db.execute("UPDATE jobs SET taken_at = ?", (six_hours_ago,))
 
         job = await resumed(built, prepare)
         assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.EXPIRED)

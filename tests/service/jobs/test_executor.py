@@ -18,7 +18,9 @@ from service.jobs.executor import ROOM, missed_between
 from service.jobs.health import Fault
 from service.jobs.trigger_queue import TriggerRefused
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Journal, JournalError, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
+from service.records.journal_file import JournalError
 from service.state import State
 from tests.support.service.executor_rig import Bench, by_hand, running
 from tests.support.service.waiting import until
@@ -204,7 +206,7 @@ async def test_a_job_id_is_above_the_controllers_last_job(tmp_path: Path) -> Non
 
 async def test_a_journal_that_cannot_be_written_acknowledges_nothing(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
-        bench.journal._db.execute("PRAGMA query_only = ON")
+        bench.journal._file.db.execute("PRAGMA query_only = ON")
         with pytest.raises(TriggerRefused):
             await bench.executor.submit(TriggerStamp("serial"))
         assert bench.health.state is State.ERROR
@@ -213,7 +215,7 @@ async def test_a_journal_that_cannot_be_written_acknowledges_nothing(tmp_path: P
         assert bench.link.published.trigger_ack == 0
         with pytest.raises(JournalError):
             bench.journal.probe()
-        bench.journal._db.execute("PRAGMA query_only = OFF")
+        bench.journal._file.db.execute("PRAGMA query_only = OFF")
         assert bench.journal.last_taken() is None
         bench.journal.probe()
         bench.health.report("journal", None)
@@ -264,7 +266,7 @@ async def test_an_open_trigger_of_the_controller_goes_before_a_trigger_of_ours(t
 async def test_no_trigger_is_taken_before_the_journal_has_told_what_is_in_flight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.jobs.executor.JOURNAL_PAUSE_S", 0.02)
+    monkeypatch.setattr("service.records.durable_journal.PAUSE_S", 0.02)
     bench = Bench(tmp_path)
     unsettled, failures = bench.journal.unsettled, [JournalError("disk I/O error")] * 2
 
@@ -294,7 +296,7 @@ async def test_a_last_job_that_has_not_held_numbers_nothing(tmp_path: Path) -> N
         bench.controller_says(trigger_counter=1)
         await until(lambda: bench.settled)
         assert bench.link.view is not None
-        bench.link.view = replace(bench.link.view, last_job=0x0001_FFFF, trigger_counter=2)  # half written
+        bench.link.reading.view = replace(bench.link.view, last_job=0x0001_FFFF, trigger_counter=2)  # half written
         bench.executor.wake()
         await asyncio.sleep(0.05)
         assert len(bench.settled) == 1, "the trigger stays pending"

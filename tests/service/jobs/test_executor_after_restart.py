@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import ServiceBlock
+from drivers.controller.mailbox.blocks import ServiceBlock
 from service.jobs.executor import ROOM
 from service.jobs.trigger_queue import TriggerRefused
 from service.reasons import Reason
-from service.records.journal import TriggerStamp
+from service.records.job import TriggerStamp
 from service.state import State
 from tests.support.service.executor_rig import HeldRunner, by_hand, left_behind, running
 from tests.support.service.waiting import until
@@ -19,7 +19,7 @@ from tests.support.service.waiting import until
 
 async def test_a_trigger_that_a_lost_journal_held_is_not_taken_again(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
-        await bench.link.on_found(left_behind())
+        await bench.executor.service_block_found(left_behind())
         bench.controller_says(trigger_counter=6)
         published = bench.link.published
         assert (published.trigger_ack, published.session_ack) == (6, 9)
@@ -33,7 +33,7 @@ async def test_a_trigger_that_a_lost_journal_held_is_not_taken_again(tmp_path: P
 async def test_a_job_that_a_lost_journal_held_in_flight_is_settled_before_any_trigger(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
         bench.runner.go.clear()
-        await bench.link.on_found(left_behind(settled_job=69))
+        await bench.executor.service_block_found(left_behind(settled_job=69))
         assert bench.health.state is State.ERROR
         bench.controller_says(trigger_counter=7)
         await until(lambda: bench.runner.resumed == [70])
@@ -49,7 +49,7 @@ async def test_a_job_that_a_lost_journal_held_in_flight_is_settled_before_any_tr
 
 async def test_what_was_found_is_known_after_the_next_restart_too(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
-        await bench.link.on_found(left_behind())
+        await bench.executor.service_block_found(left_behind())
     async with running(tmp_path) as bench:
         assert bench.journal.last_controller_trigger() == (9, 6)
         bench.controller_says(trigger_counter=6)
@@ -62,7 +62,7 @@ async def test_what_was_found_is_known_after_the_next_restart_too(tmp_path: Path
 
 async def test_registers_that_hold_no_service_block_are_not_believed(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
-        await bench.link.on_found(left_behind(test_value=99, job_id=4_000_000_000))
+        await bench.executor.service_block_found(left_behind(test_value=99, job_id=4_000_000_000))
         ticket = await bench.executor.submit(TriggerStamp("serial"))
         assert ROOM <= ticket.job.job_id < 3 * ROOM
         await ticket.settled
@@ -72,7 +72,7 @@ async def test_a_job_of_a_service_whose_numbers_were_lower_is_taken_back_and_our
     async with running(tmp_path) as bench:
         bench.controller_says(last_job=200)
         ours = (await (await bench.executor.submit(TriggerStamp("serial"))).settled).job_id
-        await bench.link.on_found(left_behind(settled_job=69))
+        await bench.executor.service_block_found(left_behind(settled_job=69))
         await until(lambda: bench.runner.resumed == [70])
         await until(lambda: bench.journal.unsettled() == ())
         assert (bench.link.published.job_id, bench.link.published.settled_job) == (ours, ours)
@@ -94,7 +94,7 @@ async def test_a_restored_journal_repeats_no_trigger_and_no_number(
     async with running(tmp_path) as bench:
         owner = bench.journal.owner
         gone_on = before + 3  # three more jobs, which the restored journal does not hold
-        await bench.link.on_found(left_behind(owner=owner, job_id=gone_on, settled_job=gone_on))
+        await bench.executor.service_block_found(left_behind(owner=owner, job_id=gone_on, settled_job=gone_on))
         bench.controller_says(trigger_counter=6)
         await asyncio.sleep(0.05)
         assert bench.settled == [], "trigger 6 was done"
@@ -109,7 +109,7 @@ async def test_a_job_that_only_the_service_block_knows_is_taken_back(tmp_path: P
     before = await after_a_restore(tmp_path)
     async with running(tmp_path) as bench:
         found = left_behind(owner=bench.journal.owner, job_id=before + 1, settled_job=before, trigger_ack=4)
-        await bench.link.on_found(found)
+        await bench.executor.service_block_found(found)
         await until(lambda: bench.runner.resumed == [before + 1])
         assert bench.link.published.settled_job == before + 1, "so that its trigger ends"
 
@@ -126,7 +126,9 @@ async def test_a_job_that_the_journal_calls_unsent_is_settled_by_the_controller_
         assert bench.runner.resumed == [], "what the controller knows is asked first"
         assert bench.health.state is State.ERROR
         owner = bench.journal.owner
-        await bench.link.on_found(left_behind(owner=owner, job_id=job.job_id, settled_job=0, trigger_ack=0))
+        await bench.executor.service_block_found(
+            left_behind(owner=owner, job_id=job.job_id, settled_job=0, trigger_ack=0)
+        )
         await until(lambda: bench.runner.resumed == [job.job_id])
         assert bench.runner.sent == [job.job_id], "as one that may have been sent"
     assert caplog.text.count("was in flight when the service ended") == 1
@@ -145,7 +147,9 @@ async def test_an_earlier_trigger_in_the_service_block_takes_nothing_back(tmp_pa
     before = await after_a_restore(tmp_path)
     async with running(tmp_path, counter=3) as bench:
         owner = bench.journal.owner
-        await bench.link.on_found(left_behind(owner=owner, job_id=before, settled_job=before, trigger_ack=2))
+        await bench.executor.service_block_found(
+            left_behind(owner=owner, job_id=before, settled_job=before, trigger_ack=2)
+        )
         await asyncio.sleep(0.05)
         assert bench.settled == [], "trigger 3 stays taken"
         assert (bench.link.published.session_ack, bench.link.published.trigger_ack) == (9, 3)
@@ -156,7 +160,9 @@ async def test_the_controllers_newest_trigger_stays_taken_whatever_else_the_serv
     before = await after_a_restore(tmp_path)
     async with running(tmp_path, counter=3) as bench:
         owner = bench.journal.owner
-        await bench.link.on_found(left_behind(owner=owner, job_id=before, settled_job=before, trigger_ack=230))
+        await bench.executor.service_block_found(
+            left_behind(owner=owner, job_id=before, settled_job=before, trigger_ack=230)
+        )
         await asyncio.sleep(0.05)
         assert bench.settled == []
         assert (bench.link.published.session_ack, bench.link.published.trigger_ack) == (9, 3)
@@ -166,7 +172,7 @@ async def test_each_start_numbers_from_a_thousand_above_all_in_the_journal(tmp_p
     numbers = []
     for _ in range(4):
         async with running(tmp_path) as bench:
-            await bench.link.on_found(ServiceBlock())
+            await bench.executor.service_block_found(ServiceBlock())
             numbers.append((await by_hand(bench)).job_id)
             numbers.append((await by_hand(bench)).job_id)
     starts, seconds = numbers[::2], numbers[1::2]
@@ -177,15 +183,15 @@ async def test_each_start_numbers_from_a_thousand_above_all_in_the_journal(tmp_p
 async def test_a_start_without_a_job_uses_up_no_numbers(tmp_path: Path) -> None:
     for _ in range(5):
         async with running(tmp_path) as bench:
-            await bench.link.on_found(ServiceBlock())
+            await bench.executor.service_block_found(ServiceBlock())
     async with running(tmp_path) as bench:
-        await bench.link.on_found(ServiceBlock())
+        await bench.executor.service_block_found(ServiceBlock())
         assert (await by_hand(bench)).job_id < 3 * ROOM
 
 
 async def test_the_first_number_after_a_start_is_a_thousand_above_last_job(tmp_path: Path) -> None:
     async with running(tmp_path) as bench:
-        await bench.link.on_found(ServiceBlock())
+        await bench.executor.service_block_found(ServiceBlock())
         bench.controller_says(last_job=500_000)
         assert (await by_hand(bench)).job_id >= 500_000 + ROOM
 
@@ -214,7 +220,7 @@ async def test_a_reason_that_the_service_block_shows_of_an_older_job_is_not_told
     async with running(tmp_path) as bench:
         owner = bench.journal.owner
         found = left_behind(owner=owner, job_id=job.job_id, settled_job=job.job_id - 1, reject_reason=112)
-        await bench.link.on_found(found)
+        await bench.executor.service_block_found(found)
         assert (bench.link.published.settled_job, bench.link.published.reject_reason) == (job.job_id, 0)
 
 
@@ -223,7 +229,7 @@ async def test_a_persons_word_leaves_the_job_that_runs_what_it_is(tmp_path: Path
         bench.runner.go.clear()
         job = (await bench.executor.submit(TriggerStamp("serial"))).job
         await until(lambda: bench.health.job == job.job_id)
-        await bench.link.on_found(left_behind(job_id=job.job_id + 5, settled_job=job.job_id + 5))
+        await bench.executor.service_block_found(left_behind(job_id=job.job_id + 5, settled_job=job.job_id + 5))
         running_still = bench.journal.find(job.job_id)
         assert running_still is not None
         assert not running_still.sent

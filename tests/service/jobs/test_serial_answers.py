@@ -13,12 +13,14 @@ from pathlib import Path
 import pytest
 
 from drivers.trigger import TriggerUnavailable
-from service.jobs.executor import Executor
+from service.jobs.executor import Executor, Intake
 from service.jobs.health import Health
+from service.jobs.kept_port import KeptPort
 from service.jobs.trigger_queue import TriggerQueue
 from service.jobs.triggers import MOST_OWED, SerialTrigger
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Journal, TriggerStamp
+from service.records.job import Job, Progress, TriggerStamp
+from service.records.journal import Journal
 from service.records.journal_recovery import open_journal
 from service.state import StateMachine
 from tests.support.service.journal_files import changed
@@ -86,7 +88,8 @@ class Runner:
 
     async def run(self, job: Job) -> Job:
         await self.go.wait()
-        return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"vertices": 4, "area_mm2": 5000.0})
+        measured = Progress(report={"vertices": 4, "area_mm2": 5000.0})
+        return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, measured)
 
     def hindrance(self, _job: Job) -> str | None:
         return None
@@ -107,7 +110,7 @@ class Served:
         self.health = Health(StateMachine())
         self.runner = Runner(self.journal)
         queue = TriggerQueue(depth, 60.0)
-        self.executor = Executor(self.journal, self.runner, self.health, None, controller_triggers=False, queue=queue)
+        self.executor = Executor(self.journal, self.runner, self.health, None, Intake(queue=queue))
 
 
 @asynccontextmanager
@@ -116,7 +119,8 @@ async def served(folder: Path, panel: Panel, *, depth: int = 0, ready: bool = Tr
     built = Served(folder, panel, depth=depth)
     built.health.start()
     with ThreadPoolExecutor(1) as pool:
-        built.line = SerialTrigger(panel, LINE, built.executor, built.health, built.journal, lambda: "STAT", pool)
+        port = KeptPort(panel, LINE, built.health, pool)
+        built.line = SerialTrigger(panel, port, built.executor, built.journal, lambda: "STAT")
         built.executor.on_settled.append(built.line.job_ended)
         tasks = [asyncio.ensure_future(built.line.run())]
         if ready:

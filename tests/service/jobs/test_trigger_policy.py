@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from service.jobs.executor import Executor
+from service.jobs.executor import Executor, Intake
 from service.jobs.health import Fault, Health
 from service.jobs.trigger_queue import Queued, Ticket, TriggerQueue, TriggerRefused
 from service.jobs.triggers import interval_trigger
 from service.reasons import Outcome, Reason
-from service.records.journal import Journal, TriggerStamp
+from service.records.job import TriggerStamp
+from service.records.journal import Journal
 from service.state import StateMachine
 from tests.support.service.executor_rig import HeldRunner
 from tests.support.service.waiting import until
@@ -29,7 +30,7 @@ class Queueing:
         self.journal = Journal(folder / "journal.sqlite")
         self.runner = HeldRunner(self.journal)
         queue = TriggerQueue(depth, 30.0, now=lambda: self.now_s)
-        self.executor = Executor(self.journal, self.runner, self.health, None, controller_triggers=False, queue=queue)
+        self.executor = Executor(self.journal, self.runner, self.health, None, Intake(queue=queue))
 
     async def hold(self) -> Ticket:
         """A job that goes on until the runner may go."""

@@ -11,6 +11,7 @@ import pytest
 
 from drivers.trigger import TriggerUnavailable
 from service.jobs.health import Health
+from service.jobs.kept_port import KeptPort
 from service.jobs.triggers import SerialTrigger
 from service.records.journal import Journal
 from service.state import StateMachine
@@ -42,7 +43,7 @@ async def test_a_port_that_opens_and_cannot_be_read_is_not_back_and_is_told_once
     port, health = HalfDeadPort(), Health(StateMachine())
     journal = Journal(tmp_path / "journal.sqlite")
     with ThreadPoolExecutor(1) as pool:
-        trigger = SerialTrigger(port, "ttyX", None, health, journal, str, pool)  # type: ignore[arg-type]
+        trigger = SerialTrigger(port, KeptPort(port, "ttyX", health, pool), None, journal, str)  # type: ignore[arg-type]
         task = asyncio.ensure_future(trigger.run())
         while port.opened < 3:
             await asyncio.sleep(0.01)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox.mailbox import LinkBlock
+from drivers.controller.mailbox.blocks import LinkBlock
 from service.link.controller_clock import MODULUS, ControllerClock, Stamp
 
 SESSION = 9

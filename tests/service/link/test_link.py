@@ -10,8 +10,9 @@ from typing import Any
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import LinkBlock
-from service.link.link import Link, LinkSettings, LinkUnsteady, steady
+from drivers.controller.mailbox.blocks import LinkBlock
+from service.link.link import Link, LinkListener, LinkSettings
+from service.link.reading import LinkUnsteady, steady
 from tests.support.service.linked import QUICK, linked
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.waiting import until
@@ -71,7 +72,7 @@ async def test_what_an_earlier_connection_said_does_not_count_as_one_of_the_two(
         await until(lambda: link.view is not None)
         controller.reachable = False
         await until(lambda: link.view is None)
-        assert link._previous is None
+        assert link.reading._previous is None
 
 
 async def test_our_heartbeat_changes_at_least_once_a_second_and_the_block_is_written_whole() -> None:
@@ -182,7 +183,7 @@ async def test_swapped_words_are_named_as_such() -> None:
     controller = ScriptedController()
     controller.link = replace(controller.link, test_echo=0x01030304)
     async with linked(controller) as link:
-        await until(lambda: link.view is not None and link._beat_at is not None)
+        await until(lambda: link.view is not None and link.reading._beat_at_s is not None)
         assert "change controller.word_order" in (link.fault() or "")
 
 
@@ -292,7 +293,12 @@ async def test_what_one_look_in_place_shows_counts_only_when_a_second_read_shows
     controller = Glanced()
     async with linked(controller) as link:
         views: list[int] = []
-        link.on_look = lambda: views.append(link.view.last_job if link.view else 0)
+
+        class Views(LinkListener):
+            def link_changed(self) -> None:
+                views.append(link.view.last_job if link.view else 0)
+
+        link.listen(Views())
         await at_rest(controller, link)
         controller.torn = replace(controller.link, last_job=77)
         seen = controller.glances
@@ -328,19 +334,19 @@ async def test_last_job_is_known_once_it_held_over_two_changes_of_the_heartbeat(
     async with linked(controller, replace(QUICK, heartbeat_timeout_s=5.0)) as link:
         await until(lambda: link.view is not None)
         await asyncio.sleep(0.1)
-        assert link.last_job is None
+        assert link.reading.last_job is None
         assert link.fault() is not None
         controller.beating = True
         await until(lambda: link.fault() is None)
-        assert link.last_job == 70
+        assert link.reading.last_job == 70
 
 
 async def test_a_misread_last_job_is_not_kept() -> None:
     controller = ScriptedController()
     controller.link = replace(controller.link, last_job=70 << 16, test_echo=0x01030304)
     async with linked(controller) as link:
-        await until(lambda: link.holds)
-        assert link.last_job is None
+        await until(lambda: link.reading.holds)
+        assert link.reading.last_job is None
 
 
 async def test_a_last_job_that_leaps_is_a_fault_until_it_is_corrected() -> None:
@@ -395,7 +401,7 @@ async def test_a_link_that_only_looks_shows_that_it_lives(observe: bool) -> None
     controller = Glanced()
     async with linked(controller, replace(QUICK, observe=observe)) as link:
         rounds: list[int] = []
-        link.on_round = lambda: rounds.append(1)
+        link.feed_watchdog = lambda: rounds.append(1)
         if not observe:
             link.publish(owner=100)
             await until(lambda: link.fault() is None)

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox.mailbox import Answer, LinkBlock, ServiceBlock
-from service.link.link import Link
+from drivers.controller.mailbox.blocks import Answer, LinkBlock, ServiceBlock
+from service.link.link import Link, LinkListener
 from service.link.ownership import ForeignOwner, Ownership
-from service.link.transfer import Settlement, TransferSettings, Validity
+from service.link.transfer_terms import Settlement, TransferSettings, Validity
 from service.reasons import Outcome, Reason
 from tests.support.service.linked import QUICK, linked
 from tests.support.service.scripted_controller import ScriptedController
@@ -375,11 +375,12 @@ async def test_after_a_service_that_ended_ours_takes_over_and_says_what_it_found
     async with linked(controller) as link:
         found: list[ServiceBlock] = []
 
-        async def on_found(block: ServiceBlock) -> None:
-            assert controller.count("write_service") == 0, "told before it is overwritten"
-            found.append(block)
+        class Found(LinkListener):
+            async def service_block_found(self, block: ServiceBlock) -> None:
+                assert controller.count("write_service") == 0, "told before it is overwritten"
+                found.append(block)
 
-        link.on_found = on_found
+        link.listen(Found())
         link.publish(owner=OURS)
         await until(lambda: link.fault() is None)
         assert [block.job_id for block in found] == [41]
@@ -535,10 +536,11 @@ async def test_another_that_writes_while_what_it_left_is_made_durable_is_not_ove
     Another(controller, alive=False)
     async with linked(controller) as link:
 
-        async def slow_disk(block: ServiceBlock) -> None:
-            controller.service = replace(block, service_heartbeat=block.service_heartbeat + 1)
+        class SlowDisk(LinkListener):
+            async def service_block_found(self, found: ServiceBlock) -> None:
+                controller.service = replace(found, service_heartbeat=found.service_heartbeat + 1)
 
-        link.on_found = slow_disk
+        link.listen(SlowDisk())
         link.publish(owner=OURS)
         await asyncio.sleep(0.6)
     assert written(controller) == set()
@@ -551,10 +553,11 @@ async def test_what_another_left_is_not_taken_over_before_the_controllers_block_
     sessions: list[int | None] = []
     async with linked(controller) as link:
 
-        async def on_found(_block: ServiceBlock) -> None:
-            sessions.append(link.view.session if link.view else None)
+        class Found(LinkListener):
+            async def service_block_found(self, _found: ServiceBlock) -> None:
+                sessions.append(link.view.session if link.view else None)
 
-        link.on_found = on_found
+        link.listen(Found())
         read_link, numbers, unsteady = controller.read_link, itertools.count(), True
 
         async def changing() -> LinkBlock:

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import HEADER_FIELDS, LINK_FIELDS, SERVICE_FIELDS, MailboxLayout
+from drivers.controller.mailbox.blocks import LINK_FIELDS, SERVICE_FIELDS
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import HEADER_FIELDS
 from service.cli.main import main
 from service.link.register_map import MEANINGS, register_map
 

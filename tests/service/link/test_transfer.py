@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import Answer, LinkBlock, Page, ServiceBlock, withdrawal
-from service.link.link import READS_FOR_TWO_ALIKE
-from service.link.transfer import Settlement, TransferCounter, TransferSettings
+from drivers.controller.mailbox.blocks import Answer, LinkBlock, ServiceBlock
+from drivers.controller.mailbox.pages import Page, withdrawal
+from service.link.reading import READS_FOR_TWO_ALIKE
+from service.link.transfer_terms import Settlement, TransferCounter, TransferSettings
 from service.reasons import Outcome, Reason
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.transferring import JOB, QUICK, SESSION, page, transferring
@@ -366,7 +367,7 @@ async def test_a_contour_that_became_too_old_while_it_was_made_durable_is_not_co
         async def slow_disk() -> None:
             await asyncio.sleep(0.2)
 
-        run.transfer._before_sending = slow_disk
+        run.transfer._steps = replace(run.transfer._steps, before_sending=slow_disk)
         settlement = await run.end()
     assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.EXPIRED)
     assert controller.page == withdrawal(JOB, SESSION, "big")
@@ -411,7 +412,7 @@ async def test_a_withdrawal_that_nobody_decides_is_told() -> None:
     controller = ScriptedController([None])
     stuck: list[str] = []
     async with transferring(controller, replace(QUICK, max_repeats=1)) as run:
-        run.transfer._on_stuck = stuck.append
+        run.transfer._steps = replace(run.transfer._steps, on_stuck=stuck.append)
         task = asyncio.ensure_future(run.end())
         while not stuck:
             await asyncio.sleep(0.02)
@@ -450,7 +451,7 @@ async def test_without_handshake_a_contour_that_became_too_old_on_its_way_is_not
         async def slow_disk() -> None:
             await asyncio.sleep(0.2)
 
-        run.transfer._before_sending = slow_disk
+        run.transfer._steps = replace(run.transfer._steps, before_sending=slow_disk)
         settlement = await run.end()
     assert (settlement.outcome, settlement.reason) == (Outcome.FAILED, Reason.EXPIRED)
     assert controller.count("commit") == 0
@@ -466,7 +467,7 @@ async def test_a_connection_that_was_opened_anew_begins_again_with_transfer_0(ha
             await controller.close()  # a heartbeat finds it out, while the transfer waits for the disk
             await until(lambda: controller.connects == 2 and run.link.fault() is None)
 
-        run.transfer._before_sending = slow_disk
+        run.transfer._steps = replace(run.transfer._steps, before_sending=slow_disk)
         settlement = await run.end()
     assert settlement.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
     steps = [name for name, _ in controller.requests if name in ("clear", "write_page", "commit")]
@@ -484,7 +485,8 @@ async def test_a_block_that_does_not_hold_still_between_page_and_commit_is_no_at
             nonlocal moving
             await write_page(page)
             if controller.count("write_page") <= 2 * QUICK.max_repeats:
-                run.link.view, moving = None, 3 * READS_FOR_TWO_ALIKE  # as after a look of the link's own that failed
+                # As after a look of the link's own that failed.
+                run.link.reading.view, moving = None, 3 * READS_FOR_TWO_ALIKE
 
         async def moved() -> LinkBlock:
             nonlocal moving

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import Answer
-from service.link.transfer import Lifetime
+from drivers.controller.mailbox.blocks import Answer
+from service.link.transfer_terms import Lifetime
 from service.reasons import Outcome, Reason
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.transferring import JOB, QUICK, transferring

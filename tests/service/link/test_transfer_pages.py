@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.controller.mailbox.mailbox import Answer, ContourMessage, Page, encode_pages, withdrawal
-from service.link.transfer import Settlement
+from drivers.controller.mailbox.blocks import Answer
+from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages, withdrawal
+from service.link.transfer_terms import Settlement
 from service.reasons import Outcome, Reason
 from tests.support.service.scripted_controller import ScriptedController
 from tests.support.service.transferring import JOB, QUICK, SESSION, transferring

@@ -24,7 +24,7 @@ from service.records.archive import Archive, ArchiveLimits, files_of
 from service.records.archive_writer import ArchiveWriter
 from service.records.archived_job import load_archived
 from service.records.evidence import Evidence
-from service.records.journal import Job, Terms, TriggerStamp
+from service.records.job import Job, Terms, TriggerStamp
 from tests.support.service.cycle_rig import measured
 
 RECIPE = Recipe(number=1, name="one", exports=["dxf", "geojson"])

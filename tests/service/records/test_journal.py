@@ -10,9 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import Page
+from drivers.controller.mailbox.pages import Page
 from service.reasons import Outcome, Reason
-from service.records.journal import Journal, JournalConflict, JournalError, JournalFull, Terms, TriggerStamp
+from service.records.job import Progress, Terms, TriggerStamp
+from service.records.journal import Journal, JournalConflict
+from service.records.journal_file import JournalError, JournalFull
 from service.records.journal_reader import reading
 from tests.support.service.journal_files import changed
 
@@ -40,7 +42,9 @@ def test_a_job_ends_whatever_characters_its_detail_holds(journal: Journal) -> No
 def test_a_taken_job_is_unsettled_until_it_is_settled(journal: Journal) -> None:
     job = journal.take(TriggerStamp("serial", recipe=3))
     assert [found.job_id for found in journal.unsettled()] == [job.job_id]
-    settled = journal.settle(job.job_id, Outcome.REFUSED, Reason.NO_BLOCK_FOUND, "empty", {"total_ms": 1.5})
+    settled = journal.settle(
+        job.job_id, Outcome.REFUSED, Reason.NO_BLOCK_FOUND, "empty", Progress(report={"total_ms": 1.5})
+    )
     assert (settled.outcome, settled.reason, settled.detail) == (Outcome.REFUSED, Reason.NO_BLOCK_FOUND, "empty")
     assert settled.report == {"total_ms": 1.5}
     assert journal.unsettled() == ()
@@ -98,7 +102,8 @@ def test_a_killed_process_leaves_its_taken_job_behind(tmp_path: Path) -> None:
     code = f"""
         import os
         from pathlib import Path
-        from service.records.journal import Journal, TriggerStamp
+        from service.records.job import TriggerStamp
+        from service.records.journal import Journal
         job = Journal(Path({str(path)!r})).take(TriggerStamp("serial", recipe=4))
         print(job.job_id, flush=True)
         os.kill(os.getpid(), 9)
@@ -114,8 +119,8 @@ def test_a_killed_process_leaves_its_taken_job_behind(tmp_path: Path) -> None:
 
 def test_every_commit_reaches_the_disk(journal: Journal) -> None:
     """WAL without synchronous=FULL (2) would lose the last commits at a power cut."""
-    assert journal._one("PRAGMA journal_mode")[0] == "wal"
-    assert journal._one("PRAGMA synchronous")[0] == 2
+    assert journal._file.db.execute("PRAGMA journal_mode").fetchone()[0] == "wal"
+    assert journal._file.db.execute("PRAGMA synchronous").fetchone()[0] == 2
 
 
 def test_a_file_that_is_no_journal_is_an_error_and_stays_as_it_is(tmp_path: Path) -> None:
@@ -143,14 +148,14 @@ def test_a_path_below_a_file_is_an_error(tmp_path: Path) -> None:
 
 def test_a_commit_that_fails_leaves_nothing_begun_and_invents_no_job(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "journal.sqlite")
-    journal._db.executescript(
+    journal._file.db.executescript(
         "PRAGMA foreign_keys = ON;"
         "CREATE TABLE late (job INTEGER REFERENCES jobs (job_id) DEFERRABLE INITIALLY DEFERRED);"
         "CREATE TEMP TRIGGER fail AFTER INSERT ON jobs BEGIN INSERT INTO late VALUES (999); END;"
     )
     with pytest.raises(JournalError, match="FOREIGN KEY"):
         journal.take(TriggerStamp("serial"))
-    journal._db.execute("DROP TRIGGER fail")
+    journal._file.db.execute("DROP TRIGGER fail")
     assert journal.last_taken() is None
     assert journal.take(TriggerStamp("serial")).job_id == 1
     assert [job.job_id for job in journal.unsettled()] == [1]
@@ -159,17 +164,17 @@ def test_a_commit_that_fails_leaves_nothing_begun_and_invents_no_job(tmp_path: P
 
 def test_a_full_disk_is_called_so_and_the_journal_works_again_once_there_is_room(tmp_path: Path) -> None:
     journal = Journal(tmp_path / "journal.sqlite")
-    pages = journal._db.execute("PRAGMA page_count").fetchone()[0]
-    journal._db.execute(f"PRAGMA max_page_count = {pages}")
+    pages = journal._file.db.execute("PRAGMA page_count").fetchone()[0]
+    journal._file.db.execute(f"PRAGMA max_page_count = {pages}")
 
     def fill() -> None:
         while True:
             job = journal.take(TriggerStamp("serial"))
-            journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"x": "y" * 500})
+            journal.settle(job.job_id, Outcome.ACCEPTED, None, None, Progress(report={"x": "y" * 500}))
 
     with pytest.raises(JournalFull, match="disk is full"):
         fill()
-    journal._db.execute("PRAGMA max_page_count = 1000000")
+    journal._file.db.execute("PRAGMA max_page_count = 1000000")
     before = journal.last_taken()
     assert journal.take(TriggerStamp("serial")).job_id == (before.job_id if before else 0) + 1
     journal.close()
@@ -191,7 +196,7 @@ def test_pages_that_cannot_be_read_any_more_are_none(journal: Journal, stored: s
     """A damaged disk may change a text that SQLite does not check; the job must be found all the same."""
     job = journal.take(TriggerStamp("serial"))
     journal.store_pages(job.job_id, 9, (PAGE,))
-    journal._db.execute("UPDATE jobs SET pages = ?", (stored,))
+    journal._file.db.execute("UPDATE jobs SET pages = ?", (stored,))
     (found,) = journal.unsettled()
     assert (found.pages, found.sent) == ((), True)
 
@@ -252,7 +257,7 @@ def test_a_journal_of_version_1_opens_with_all_it_held_and_goes_on(tmp_path: Pat
     assert (journal.owner, journal.last_controller_trigger()) == (4711, (9, 7))
     assert journal.take(TriggerStamp("serial")).job_id == 7
     terms = Terms({"number": 1}, "sha256:00")
-    assert journal.settle(7, Outcome.ACCEPTED, None, None, {}, terms).terms == terms
+    assert journal.settle(7, Outcome.ACCEPTED, None, None, Progress(terms)).terms == terms
     journal.close()
     again = Journal(tmp_path / "journal.sqlite")
     assert again.last_taken() is not None
@@ -296,15 +301,15 @@ def test_a_job_keeps_the_whole_settings_it_was_carried_out_with_once_for_all_job
     terms = [Terms({"number": 1, "tolerance_mm": value}, "sha256:aa") for value in (0.1, 0.1, 0.2)]
     for one in terms:
         job = journal.take(TriggerStamp("serial"))
-        journal.store_pages(job.job_id, 9, (PAGE,), one)
-        settled = journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {}, one, {"pages": 1})
+        journal.store_pages(job.job_id, 9, (PAGE,), Progress(one))
+        settled = journal.settle(job.job_id, Outcome.ACCEPTED, None, None, Progress(one, transfer={"pages": 1}))
         assert (settled.terms, settled.transfer) == (one, {"pages": 1})
-    assert journal._one("SELECT COUNT(*) FROM recipe_settings")[0] == 2
+    assert journal._file.db.execute("SELECT COUNT(*) FROM recipe_settings").fetchone()[0] == 2
 
 
 def test_a_job_that_a_restart_found_in_flight_knows_its_settings(journal: Journal) -> None:
     job = journal.take(TriggerStamp("serial"))
-    journal.store_pages(job.job_id, 9, (PAGE,), Terms({"number": 3}))
+    journal.store_pages(job.job_id, 9, (PAGE,), Progress(Terms({"number": 3})))
     assert journal.unsettled()[0].terms == Terms({"number": 3})
     assert journal.settle(job.job_id, Outcome.FAILED, Reason.SERVICE_RESTARTED, "").terms == Terms({"number": 3})
 

@@ -12,9 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.controller.mailbox.mailbox import Page
+from drivers.controller.mailbox.pages import Page
 from service.reasons import Outcome
-from service.records.journal import Journal, JournalDamaged, JournalError, TriggerStamp
+from service.records.job import Progress, TriggerStamp
+from service.records.journal import Journal
+from service.records.journal_file import JournalDamaged, JournalError
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 from service.records.journal_recovery import _move_aside, highest_archived, highest_job, open_journal, set_aside
 from tests.support.service.journal_files import changed
@@ -32,8 +34,9 @@ def path(tmp_path: Path) -> Path:
 def filled(path: Path, jobs: int) -> None:
     """A journal of `jobs` settled jobs, then one of the controller's in flight, closed as after a clean stop."""
     journal = Journal(path)
+    long = Progress(report={"text": "x" * 300})
     for _ in range(jobs):
-        journal.settle(journal.take(TriggerStamp("serial")).job_id, Outcome.ACCEPTED, None, None, {"text": "x" * 300})
+        journal.settle(journal.take(TriggerStamp("serial")).job_id, Outcome.ACCEPTED, None, None, long)
     job = journal.take(TriggerStamp("controller", session=9, counter=5))
     journal.store_pages(job.job_id, 9, (PAGE,))
     journal.close()

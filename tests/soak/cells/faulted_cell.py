@@ -17,22 +17,18 @@ import numpy as np
 from drivers.camera import CameraUnavailable
 from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.mailbox.layout import MailboxLayout
-from drivers.controller.simulated.controller import (
-    AcceptedContour,
-    FaultPlan,
-    Pace,
-    SimulatedController,
-    TriggerNotPossible,
-)
-from drivers.controller.simulated.faults import Fault
+from drivers.controller.simulated.contour import AcceptedContour
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.faults import Fault, FaultPlan
+from drivers.controller.simulated.program import Pace, TriggerNotPossible
 from drivers.controller.simulated.received import FramingName
-from service import wiring
 from service.config.config import Config
 from service.daemon.daemon import Daemon, Parts
-from service.jobs.cycle import Observation
+from service.jobs.cycle_terms import Observation
 from service.jobs.trigger_queue import TriggerRefused
-from service.records.journal import TriggerStamp
+from service.records.job import TriggerStamp
 from service.state import State
+from service.wiring.daemon import build
 from tests.soak.cells.crossed_line import crossed_line
 from tests.soak.promises import Evidence, Findings, Taken, judge, micrometres
 from tests.soak.random_contours import RandomContours
@@ -242,7 +238,7 @@ class FaultedCell:
 
     def wired(self, config: Config, observe: Callable[[Observation], None]) -> Parts:
         """A daemon as wired for the shop floor, but for its camera and its measurer."""
-        parts = wiring.build(config, observe=observe)
+        parts = build(config, observe=observe)
         cycle: Any = parts.executor._runner
         measurer = RandomContours(self.chance, 12 if self.terms.payload_capacity < 64 else 40)
         cycle._plan = replace(cycle._plan, measurer=measurer)

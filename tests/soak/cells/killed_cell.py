@@ -21,8 +21,10 @@ import cv2
 import numpy as np
 
 from drivers.controller.mailbox.layout import MailboxLayout
-from drivers.controller.simulated.controller import AcceptedContour, FaultPlan, SimulatedController, TriggerNotPossible
-from drivers.controller.simulated.faults import Fault, targets_of
+from drivers.controller.simulated.contour import AcceptedContour
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.faults import Fault, FaultPlan, targets_of
+from drivers.controller.simulated.program import TriggerNotPossible
 from drivers.controller.simulated.received import ReceivedRequest
 from tests.soak.cells.crossed_line import crossed_line
 from tests.soak.cells.faulted_cell import Transport

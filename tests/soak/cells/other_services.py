@@ -12,11 +12,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from drivers.controller.simulated.controller import TriggerNotPossible
+from drivers.controller.simulated.program import TriggerNotPossible
 from service.daemon.daemon import Daemon, Parts
-from service.jobs.cycle import Observation
+from service.jobs.cycle_terms import Observation
 from service.jobs.trigger_queue import TriggerRefused
-from service.records.journal import TriggerStamp
+from service.records.job import TriggerStamp
 from tests.soak.cells.faulted_cell import CALIBRATION, RECOVERY_S, FaultedCell, Incident, Outcome, Terms
 from tests.soak.cells.restored_cell import copy_journal, put_back
 from tests.soak.promises import Evidence, Findings, Rings, Side, judge_twins, micrometres

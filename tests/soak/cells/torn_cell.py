@@ -15,7 +15,8 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
-from drivers.controller.simulated.controller import SimulatedController, TriggerNotPossible
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.program import TriggerNotPossible
 from service.config.config import Config
 from service.records.journal import Journal
 from tests.soak.cells.faulted_cell import FaultedCell, Incident, Terms

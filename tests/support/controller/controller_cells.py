@@ -6,14 +6,14 @@ import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 
-from drivers.controller.mailbox.mailbox import MailboxLayout
+from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.modbus.client import (
     ModbusController,
     ModbusRtuController,
     ModbusRtuOverTcpController,
     ModbusTcpController,
-    SerialLine,
 )
+from drivers.controller.modbus.serial_line import SerialLine
 from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.pty_line import PtyLine
 from tests.support.controller.serial_server import SerialServer

@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 
-from drivers.controller.mailbox.mailbox import ContourMessage, Page, encode_pages
+from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages
 from drivers.controller.simulated.controller import SimulatedController
 
 SQUARE = np.array([[0, 0], [100_000, 0], [100_000, 100_000], [0, 100_000]])

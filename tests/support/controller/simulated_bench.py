@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, Page, crc32_of, encode_pages
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import ContourMessage, Page, crc32_of, encode_pages
 from drivers.controller.simulated.contour import AcceptedContour
 from drivers.controller.simulated.memory import RetainedMemory
 from drivers.controller.simulated.program import ControllerProgram, ProgramStart, judge_by_geometry

@@ -12,7 +12,7 @@ from hypothesis import Phase, given, seed, settings
 from hypothesis import strategies as st
 
 from drivers.controller import ControllerNonsense, MailboxError
-from drivers.controller.mailbox.mailbox import decode_link, decode_service, encode_link, encode_service
+from drivers.controller.mailbox.blocks import decode_link, decode_service, encode_link, encode_service
 from drivers.controller.mailbox.page_spans import page_starts, spans
 from drivers.controller.modbus.framing import Framing, RtuFraming, TcpFraming
 from drivers.controller.modbus.requests import (

@@ -12,12 +12,12 @@ import numpy as np
 
 from contour.geometry.rings import Contour
 from drivers.camera.simulated import SimulatedCamera
-from service import wiring
 from service.config.config import Config
 from service.daemon.daemon import Daemon, Parts
 from service.measuring.measurement import Measurement
-from service.records.journal import Job, TriggerStamp
+from service.records.job import Job, TriggerStamp
 from service.state import State
+from service.wiring.daemon import build
 from tests.support.service.waiting import until
 
 RECTANGLE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0], [0.0, 50.0]])
@@ -52,7 +52,7 @@ class WiredDaemon:
                 **sections,
             }
         )
-        self.parts: Parts = wiring.build(self.config)
+        self.parts: Parts = build(self.config)
         cycle: Any = self.parts.executor._runner
         cycle._plan.measurer.measure = measure
         cycle._camera = self.parts.camera = SimulatedCamera(lambda _number: np.zeros((6, 8), np.uint8))

@@ -13,15 +13,17 @@ import numpy as np
 
 from contour.geometry.rings import Contour
 from drivers.camera.simulated import SimulatedCamera
-from drivers.controller.mailbox.mailbox import Page
+from drivers.controller.mailbox.pages import Page
 from service.config.recipes import Recipe
-from service.jobs.cycle import Cycle, CycleSettings, Observation
+from service.jobs.cycle import Cycle
+from service.jobs.cycle_terms import CycleSettings, Devices, Observation, Plan, Records
 from service.jobs.health import Health
 from service.link.link import Link, LinkSettings
-from service.link.transfer import TransferCounter, TransferSettings
+from service.link.transfer_terms import TransferCounter, TransferSettings
 from service.measuring.measurement import Measurement
 from service.records.evidence import Evidence
-from service.records.journal import Job, Journal, TriggerStamp
+from service.records.job import Job, TriggerStamp
+from service.records.journal import Journal
 from service.state import StateMachine
 from tests.support.controller.protocol_decoder import Contour as Decoded
 from tests.support.controller.protocol_decoder import decode_contour
@@ -52,7 +54,7 @@ def measured(**changes: object) -> Measurement:
     return replace(good, **changes)  # type: ignore[arg-type]
 
 
-class Plan:
+class FixedMeasurer:
     """Stands in for the measurer: the tracing has its own tests."""
 
     def __init__(self) -> None:
@@ -90,7 +92,7 @@ class Rig:
         self.journal = Journal(folder / "journal.sqlite")
         self.controller = controller
         self.camera = SimulatedCamera(lambda _n: np.zeros((60, 80), np.uint8))
-        self.plan = Plan()
+        self.measurer = FixedMeasurer()
         self.machine = StateMachine()
         self.health = Health(self.machine)
         self.link = None
@@ -103,17 +105,10 @@ class Rig:
         self.keeper.durable.set_result(None)
         recipes = {1: Recipe(number=1, name="one"), 2: Recipe(number=2, name="two", thickness_mm=35)}
         self.cycle = Cycle(
-            self.camera,
-            self.plan,  # type: ignore[arg-type]
-            recipes,
-            self.journal,
-            self.health,
-            self.link,
-            TransferCounter(50),
+            Devices(self.camera, self.pool, self.link, TransferCounter(50)),
+            Records(self.journal, self.health, self.keeper, self.seen.append),
+            Plan(self.measurer, recipes),  # type: ignore[arg-type]
             settings,
-            self.pool,
-            observe=self.seen.append,
-            keeper=self.keeper,
         )
 
     async def job(self, trigger: TriggerStamp | None = None) -> Job:

@@ -7,12 +7,13 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
-from drivers.controller.mailbox.mailbox import LinkBlock, ServiceBlock
-from service.jobs.executor import Executor
+from drivers.controller.mailbox.blocks import LinkBlock, ServiceBlock
+from service.jobs.executor import Executor, Intake
 from service.jobs.health import Health
 from service.link.link import Link, LinkSettings
 from service.reasons import Outcome, Reason
-from service.records.journal import Job, Journal, TriggerStamp
+from service.records.job import Job, Progress, TriggerStamp
+from service.records.journal import Journal
 from service.state import StateMachine
 
 
@@ -32,7 +33,7 @@ class HeldRunner:
     async def run(self, job: Job) -> Job:
         self.begun.append(job.job_id)
         await self.go.wait()
-        return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, {"vertices": 4})
+        return self.journal.settle(job.job_id, Outcome.ACCEPTED, None, None, Progress(report={"vertices": 4}))
 
     def hindrance(self, job: Job) -> str | None:
         return self.hindered
@@ -59,20 +60,19 @@ class Bench:
         self.runner = HeldRunner(self.journal)
         self.link = Link(DeafController(), LinkSettings(observe=observe), now=lambda: 0.0)  # type: ignore[arg-type]
         self.settled: list[Job] = []
-        self.executor = Executor(
-            self.journal, self.runner, self.health, self.link, controller_triggers=True, on_settled=self._note
-        )
+        self.executor = Executor(self.journal, self.runner, self.health, self.link, Intake(controller=True))
+        self.executor.on_settled.append(self._note)
 
     def _note(self, job: Job) -> None:
         self.settled.append(job)
 
     def controller_says(self, **fields: int) -> None:
         values = {"controller_state": 1, "session": 9, "test_echo": 0x01020305, **fields}
-        self.link.view = LinkBlock(**values)
-        self.link._beat_at = 0.0
-        self.link._up.set()
-        self.link._trouble = None
-        self.link.last_job = self.link.view.last_job
+        self.link.reading.view = LinkBlock(**values)
+        self.link.reading._beat_at_s = 0.0
+        self.link.connection._up.set()
+        self.link.connection.trouble = None
+        self.link.reading.last_job = self.link.reading.view.last_job
         self.link.ownership.saw(ServiceBlock())
         self.link.ownership.wrote()
         self.executor.wake()

@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from drivers.controller import ControllerRefused, ControllerUnavailable
-from drivers.controller.mailbox.mailbox import Answer, LinkBlock, Page, ServiceBlock
+from drivers.controller.mailbox.blocks import Answer, LinkBlock, ServiceBlock
+from drivers.controller.mailbox.pages import Page
 
 FINAL = {Answer.ACCEPTED, Answer.GEOMETRY_REFUSED, Answer.EXPIRED, Answer.OPERATOR_REFUSED, Answer.WITHDRAWN}
 

@@ -9,9 +9,18 @@ from contextlib import asynccontextmanager, suppress
 
 import numpy as np
 
-from drivers.controller.mailbox.mailbox import ContourMessage, Page, encode_pages, withdrawal
+from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages, withdrawal
 from service.link.link import Link, LinkSettings
-from service.link.transfer import Lifetime, Settlement, Transfer, TransferCounter, TransferSettings, Validity
+from service.link.transfer import Transfer
+from service.link.transfer_terms import (
+    Lifetime,
+    Outgoing,
+    Settlement,
+    TransferCounter,
+    TransferSettings,
+    TransferSteps,
+    Validity,
+)
 from service.reasons import Reason
 from tests.support.service.scripted_controller import ScriptedController
 
@@ -45,14 +54,9 @@ class Run:
             link,
             settings,
             TransferCounter(100),
-            job_id=JOB,
-            session=SESSION,
-            pages=pages,
-            withdrawal=withdrawal(JOB, SESSION, "big"),
-            lifetime=Lifetime(time.monotonic() + lifetime_s),
-            validity=validity,
-            before_sending=self._sending,
-            before_withdrawal=self._withdrawing,
+            Outgoing(JOB, SESSION, pages, withdrawal(JOB, SESSION, "big"), validity),
+            Lifetime(time.monotonic() + lifetime_s),
+            TransferSteps(self._sending, self._withdrawing),
         )
 
     async def _sending(self) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from service.config.config_file import load_config
 from service.daemon.lock import NameLock
-from service.wiring import controller_names
+from service.wiring.devices import controller_names
 from tests.support.interop.programs import TCP_SERVERS
 from tests.support.interop.shifted_program import program
 from tests.support.processes.processes import combtrace

@@ -12,12 +12,12 @@ import pytest
 from drivers.controller.modbus.requests import READ_REGISTERS
 from drivers.controller.simulated.controller import SimulatedController
 from drivers.controller.simulated.program import Pace
-from service import wiring
 from service.jobs.executor import ROOM
 from service.reasons import Outcome
-from service.records.journal import TriggerStamp
+from service.records.job import TriggerStamp
 from service.state import State
-from service.wiring import WiringError
+from service.wiring.bounds import target
+from service.wiring.errors import WiringError
 from tests.support.controller.fault_proxy import Fate, FaultProxy
 from tests.support.processes.wired_daemon import WiredDaemon, wired
 from tests.support.service.waiting import until
@@ -119,15 +119,15 @@ async def test_a_service_that_another_one_drives_out_stops_writing_and_stays_in_
     ):
         await one.ready()
         assert one.parts.link is not None
-        keep = one.parts.link._keep_service
+        keep = one.parts.link.writing.keep
 
         async def frozen() -> None:
             return
 
-        one.parts.link._keep_service = frozen  # type: ignore[method-assign]  # its heartbeat stands still
+        one.parts.link.writing.keep = frozen  # type: ignore[method-assign]  # its heartbeat stands still
         async with wired(tmp_path / "two", tcp(door.port)) as two:
             await two.ready()
-            one.parts.link._keep_service = keep  # type: ignore[method-assign]
+            one.parts.link.writing.keep = keep  # type: ignore[method-assign]
             await until(lambda: "Stop one of the two" in one.reason)
             assert (await two.job()).outcome is Outcome.ACCEPTED
             assert one.parts.health.state is State.ERROR
@@ -201,7 +201,7 @@ async def test_an_observer_settles_no_job_in_flight_and_says_what_to_put_back(tm
         async with wired(tmp_path, tcp(controller.port)) as one:
             await one.ready()
             job = one.parts.journal.take(TriggerStamp("serial"))
-            one.parts.journal.store_pages(job.job_id, 9, (), target=wiring._target(one.config))
+            one.parts.journal.store_pages(job.job_id, 9, (), target=target(one.config))
         async with wired(tmp_path, tcp(controller.port, mode="observe")) as observer:
             await until(lambda: "Put back controller.mode: send" in observer.reason)
             assert observer.parts.health.state is State.ERROR

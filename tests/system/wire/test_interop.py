@@ -14,14 +14,15 @@ from pymodbus.client import AsyncModbusSerialClient, AsyncModbusTcpClient
 from pymodbus.framer import FramerType
 
 from drivers.controller import Page, ServiceBlock
-from drivers.controller.mailbox.mailbox import MailboxLayout, decode_link, encode_service
+from drivers.controller.mailbox.blocks import decode_link, encode_service
+from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.modbus.client import (
     ModbusController,
     ModbusRtuController,
     ModbusRtuOverTcpController,
     ModbusTcpController,
-    SerialLine,
 )
+from drivers.controller.modbus.serial_line import SerialLine
 from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.protocol_decoder import decode_contour, decode_service
 from tests.support.controller.pty_line import PtyLine

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from drivers.controller import ServiceBlock
-from drivers.controller.mailbox.mailbox import ContourMessage, MailboxLayout, WordOrder, encode_pages, micrometres
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import ContourMessage, encode_pages, micrometres
+from drivers.controller.mailbox.words import WordOrder
 from drivers.controller.modbus.client import ModbusController, ModbusRtuOverTcpController, ModbusTcpController
 from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.protocol_decoder import decode_contour

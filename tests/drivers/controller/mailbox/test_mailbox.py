@@ -12,22 +12,24 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from drivers.controller import ContourTooLarge, ControllerError, MailboxError
-from drivers.controller.mailbox.mailbox import (
-    HEADER_FIELDS,
+from drivers.controller.mailbox.blocks import (
     LINK_FIELDS,
     SERVICE_FIELDS,
     Answer,
-    ContourMessage,
     LinkBlock,
-    MailboxLayout,
-    Page,
     ServiceBlock,
-    crc32_of,
     decode_link,
     decode_service,
     encode_link,
-    encode_pages,
     encode_service,
+)
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import (
+    HEADER_FIELDS,
+    ContourMessage,
+    Page,
+    crc32_of,
+    encode_pages,
     micrometres,
     withdrawal,
 )

@@ -7,9 +7,13 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import MailboxLayout, Page, ServiceBlock
-from drivers.controller.modbus.client import LONGEST_EXCHANGE_S, ModbusRtuController, RequestLimits, SerialLine
+from drivers.controller.mailbox.blocks import ServiceBlock
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import Page
+from drivers.controller.modbus.client import LONGEST_EXCHANGE_S, ModbusRtuController
 from drivers.controller.modbus.request_queue import MOST_SINGLE_IN_A_ROW
+from drivers.controller.modbus.requests import RequestLimits
+from drivers.controller.modbus.serial_line import SerialLine
 from tests.support.controller.line_server import LineServer
 from tests.support.controller.pty_line import PtyLine
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from drivers.controller import ControllerError, ControllerUnavailable
-from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
-from drivers.controller.simulated.controller import AcceptedContour, SimulatedController
+from drivers.controller.mailbox.blocks import ServiceBlock, encode_service
+from drivers.controller.simulated.contour import AcceptedContour
+from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.raw_client import SESSION, Client, page, simulated
 
 # --- its life ---------------------------------------------------------------------------------------------------------

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controller.mailbox.layout import MailboxLayout
-from drivers.controller.simulated.controller import FaultPlan, SimulatedController
-from drivers.controller.simulated.faults import FAULT_KINDS, Fault, targets_of
+from drivers.controller.simulated.controller import SimulatedController
+from drivers.controller.simulated.faults import FAULT_KINDS, Fault, FaultPlan, targets_of
 from drivers.controller.simulated.received import FramingName, ReceivedRequest
 from drivers.controller.simulated.server import QUIET_S, RegisterServer
 from tests.support.controller.raw_client import Client, page, simulated

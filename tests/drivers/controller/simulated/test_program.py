@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import MailboxLayout, Page, withdrawal
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import Page, withdrawal
 from drivers.controller.simulated.contour import AcceptedContour
 from drivers.controller.simulated.memory import RetainedMemory
 from drivers.controller.simulated.program import Pace, TriggerNotPossible

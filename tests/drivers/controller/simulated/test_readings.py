@@ -8,7 +8,8 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from drivers.controller.mailbox.mailbox import MailboxLayout, Page, withdrawal
+from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.pages import Page, withdrawal
 from tests.support.controller.played_controller import PlayedController
 from tests.support.controller.protocol_decoder import Layout
 from tests.support.controller.simulated_bench import EXTERIOR, SESSION, Bench, pages, sealed

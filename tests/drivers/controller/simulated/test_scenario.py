@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager, suppress
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
+from drivers.controller.mailbox.blocks import ServiceBlock, encode_service
 from drivers.controller.simulated.controller import SimulatedController
 from drivers.controller.simulated.scenario import Event, MachineSettings, Play, Scenario, machine_options
 from tests.support.controller.raw_client import SESSION, Client, page

@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from drivers.controller import ControllerUnavailable
-from drivers.controller.mailbox.mailbox import ServiceBlock, encode_service
+from drivers.controller.mailbox.blocks import ServiceBlock, encode_service
 from drivers.controller.simulated.controller import SimulatedController
 from tests.support.controller.rtu_frames import crc16
 

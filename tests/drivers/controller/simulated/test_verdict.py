@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.controller.mailbox.mailbox import Page, ServiceBlock, encode_service
+from drivers.controller.mailbox.blocks import ServiceBlock, encode_service
+from drivers.controller.mailbox.pages import Page
 from drivers.controller.simulated.verdict import KINDS, Verdict
 from tests.support.controller.raw_client import SESSION, Client, page, simulated
 from tests.support.controller.simulated_bench import sealed

@@ -1,0 +1,69 @@
+"""What is served beside the jobs: metrics and the operator's page, which have to be installed only then."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from contextlib import ExitStack
+
+from service.config.config import Config
+from service.daemon.daemon import Parts
+from service.jobs.cycle import Cycle
+from service.wiring.devices import controller_words
+from service.wiring.errors import WiringError
+
+
+def add_metrics(config: Config, parts: Parts, cycle: Cycle, opened: ExitStack) -> None:
+    """Serve metrics where the configuration asks for them; raise WiringError."""
+    if config.metrics is None:
+        return
+    try:
+        from service.daemon.metrics import MetricsError, MetricsSources, serve
+    except ImportError as error:
+        raise WiringError(
+            f"metrics: {error.name} is not installed. Install combtrace[metrics], or remove metrics"
+        ) from error
+    sources = MetricsSources(
+        importlib.metadata.version("combtrace"),
+        parts.health,
+        parts.executor,
+        parts.link,
+        parts.archive,
+        parts.storage,
+        lambda: cycle.measurer.guard,
+    )
+    try:
+        metrics, parts.metrics = serve(config.metrics, sources)
+    except MetricsError as error:
+        raise WiringError(str(error)) from error
+    opened.callback(parts.metrics.close)
+    parts.executor.on_settled.append(metrics.job_ended)
+
+
+def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
+    """Serve the operator's page where the configuration asks for it; raise WiringError."""
+    if config.page is None:
+        return
+    try:
+        from service.web.daemon_access import PageSources
+        from service.web.server import PageError, make_page
+    except ModuleNotFoundError as error:
+        raise WiringError(f"page: {error.name} is not installed. Install combtrace[page], or remove page") from error
+    sources = PageSources(
+        parts.health,
+        parts.executor,
+        parts.journal,
+        config.journal.path,
+        config.archive.path,
+        config.archive.max_bytes,
+        lambda: tuple((number, recipe.name) for number, recipe in sorted(cycle.recipes.items())),
+        lambda: cycle.measurer.guard,
+        camera=config.camera.kind,
+        controller=controller_words(config),
+        link=parts.link,
+        archive=parts.archive,
+        storage=parts.storage,
+    )
+    try:
+        parts.page = make_page(config.page, sources)
+    except PageError as error:
+        raise WiringError(str(error)) from error

@@ -21,12 +21,14 @@ async def played(*events: Event, **machine: object) -> AsyncIterator[SimulatedCo
     scenario = Scenario(events=events, machine=MachineSettings(**values))  # type: ignore[arg-type]
     async with SimulatedController(**machine_options(scenario)) as controller:
         playing = asyncio.ensure_future(Play(controller, scenario).play_for_ever())
-        yield controller
-        if playing.done():
-            playing.result()
-        playing.cancel()
-        with suppress(asyncio.CancelledError):
-            await playing
+        try:
+            yield controller
+            if playing.done():
+                playing.result()
+        finally:
+            playing.cancel()
+            with suppress(asyncio.CancelledError):
+                await playing
 
 
 async def until(condition: Callable[[], bool]) -> None:
@@ -53,6 +55,7 @@ async def test_a_burst_of_triggers_comes_one_after_the_other_as_the_protocol_let
             await asyncio.sleep(0.01)
             assert controller.registers(2, 1) == (counter,)
             await ready(client, **taken, settled_job=counter)
+            await until(lambda: not controller.trigger_open)
         assert controller.verdict.clean, controller.verdict
 
 

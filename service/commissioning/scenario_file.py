@@ -7,8 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from drivers.controller.simulated.faults import FAULT_KINDS, TARGETS, FaultKind, Target
-from drivers.controller.simulated.faults import Fault as FaultRule
+from drivers.controller.simulated.faults import FAULT_KINDS, TARGETS, FaultKind, LineFault, Target
 from drivers.controller.simulated.scenario import EVENT_KINDS, KINDS_OF, EventKind, MachineSettings, Scenario
 from drivers.controller.simulated.scenario import Event as MachineEvent
 from service.config.config_file import SCHEMA_DIALECT, ConfigError, line_of, read_yaml, seen_instead_of_keys
@@ -121,9 +120,9 @@ def load_scenario(path: Path) -> Scenario:
     )
 
 
-def _rule(fault: Fault) -> FaultRule:
+def _rule(fault: Fault) -> LineFault:
     values = fault.model_dump()
-    return FaultRule(kind=values.pop("fault"), **values)
+    return LineFault(kind=values.pop("fault"), **values)
 
 
 def scenario_schema() -> dict[str, Any]:

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from contour.geometry.arrays import Float64s
 
 LARGEST_FILE = 1_000_000
 
@@ -19,7 +18,7 @@ class PointsFileError(Exception):
     """A file of points cannot be used: file, line, what was seen, what is expected."""
 
 
-def read_points(path: Path, layouts: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], Floats]:
+def read_points(path: Path, layouts: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], Float64s]:
     """The layout whose column names the header has, and the numbers, shape (N, columns of it).
 
     A file without a header has the first layout's columns in its order. Separators are commas, semicolons (then a comma

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from contour.calibration.calibration import CameraCalibration
 from contour.camera_calibration.coverage_zones import COLUMNS, ROWS, Zones
+from contour.geometry.arrays import Float64s
 
-Floats = NDArray[np.float64]
 WIDTH = 640
 """Width of a picture in the report's own units; its height follows the camera's."""
 
@@ -21,7 +21,7 @@ ARROW_SHARE = 0.05
 """The longest typical residual (99 %) is drawn as this share of the picture's width."""
 
 
-def residual_arrows(pixels: Sequence[Floats], misses: Sequence[Floats], size: tuple[int, int]) -> str:
+def residual_arrows(pixels: Sequence[Float64s], misses: Sequence[Float64s], size: tuple[int, int]) -> str:
     """Every corner's residual as an arrow, enlarged; the scale is written below."""
     places, rest = np.concatenate(pixels), np.concatenate(misses)
     usual = float(np.percentile(np.hypot(*rest.T), 99))
@@ -57,7 +57,7 @@ def coverage(zones: Zones, size: tuple[int, int]) -> str:
     return _svg(size, body, f"Corners seen in each zone; hatched: none ({never} of {zones.counts.size} zones)")
 
 
-def millimetre_map(values: Floats, zones: Zones, size: tuple[int, int], title: str) -> str:
+def millimetre_map(values: Float64s, zones: Zones, size: tuple[int, int], title: str) -> str:
     """A map over the picture, shape (rows, columns), mm, every second value written; the covered part is outlined."""
     height = WIDTH * size[1] / size[0]
     rows, columns = values.shape
@@ -77,7 +77,9 @@ def millimetre_map(values: Floats, zones: Zones, size: tuple[int, int], title: s
     return _svg(size, f'{"".join(cells)}<polygon points="{ring}" class="hull"/>', title)
 
 
-def work_frame(picture: NDArray[np.uint8], calibration: CameraCalibration, reach_mm: float, corners_px: Floats) -> str:
+def work_frame(
+    picture: NDArray[np.uint8], calibration: CameraCalibration, reach_mm: float, corners_px: Float64s
+) -> str:
     """The plane view with the work frame's axes drawn into it, and the corners that were found."""
     height, width = picture.shape[:2]
     factor = min(1.0, 1280 / width)
@@ -99,7 +101,7 @@ def work_frame(picture: NDArray[np.uint8], calibration: CameraCalibration, reach
     return _svg((width, height), body, "The plane view: origin, x and y axis of the work frame, and the corners found")
 
 
-def _drawn(calibration: CameraCalibration, work_mm: Floats) -> Floats:
+def _drawn(calibration: CameraCalibration, work_mm: Float64s) -> Float64s:
     return calibration.to_pixels(calibration.to_machine(work_mm), 0.0)
 
 

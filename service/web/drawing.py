@@ -12,16 +12,14 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour, area
 from service.measuring.calibration_file import CalibrationFileError, CalibrationRecord, record_of
 from service.records.archived_job import ArchivedJob, EvidenceError
 from service.web.models import Axis, Drawing, Grid, SentinelMark
-
-Floats = NDArray[np.float64]
 
 GRID_COLUMNS, GRID_ROWS = 33, 25  # a browser interpolates between them: docs/how-to/operators-guide.md says how well
 LINES_WANTED = 10
@@ -78,7 +76,7 @@ def _backdrop(calibration: str, width: int, height: int, thickness_mm: float) ->
     return Backdrop(tuple(_marks(record)), grid, tuple(axes))
 
 
-def _pairs(points: Floats) -> list[tuple[float, float]]:
+def _pairs(points: Float64s) -> list[tuple[float, float]]:
     return [(round(float(x), 2), round(float(y), 2)) for x, y in points]
 
 

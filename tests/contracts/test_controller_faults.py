@@ -21,7 +21,7 @@ from drivers.controller import (
     ServiceBlock,
 )
 from drivers.controller.modbus.client import ModbusTcpController
-from drivers.controller.modbus.request_queue import Connection
+from drivers.controller.modbus.request_queue import RequestQueue
 from tests.support.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 
 PATIENT_S = 60.0  # longer than any test: what fails then did not fail by its time-out
@@ -411,16 +411,16 @@ async def test_a_request_cancelled_in_the_queue_leaves_the_one_before_it_alone(
 async def test_a_cancellation_in_the_very_moment_of_the_reply_is_not_swallowed(
     connect: Callable, server: MisbehavingServer, monkeypatch: pytest.MonkeyPatch, first: str
 ) -> None:
-    take = Connection._take
+    take = RequestQueue._take
 
-    def cancel_and_take(connection: Connection, data: bytes) -> None:
+    def cancel_and_take(connection: RequestQueue, data: bytes) -> None:
         if first == "the cancellation":
             reading.cancel()
         take(connection, data)
         reading.cancel()
 
     controller = await connect()
-    monkeypatch.setattr(Connection, "_take", cancel_and_take)
+    monkeypatch.setattr(RequestQueue, "_take", cancel_and_take)
     reading = asyncio.create_task(controller.read_link())
     with pytest.raises(asyncio.CancelledError):
         await reading

@@ -72,6 +72,7 @@ HEADER_FIELDS = fields(
     (30, "session", "u16"),
     (31, "trigger", "u16"),
 )
+HEADER_OFFSETS = {field.name: field.offset for field in HEADER_FIELDS}
 HEADER_NAMES = tuple(field.name for field in HEADER_FIELDS)
 _UNPACK_HEADER = Unpacking(HEADER_FIELDS)
 _PLACES = {field.name: slice(field.offset - 1, field.offset - 1 + field.width) for field in HEADER_FIELDS}
@@ -139,6 +140,15 @@ def crc32_of(header: Sequence[int], payload: Sequence[int]) -> int:
 def decode_header(page: Page, word_order: WordOrder) -> dict[str, int]:
     """The values of a page's header by name."""
     return _UNPACK_HEADER((0, *page.header), word_order)
+
+
+def with_registers(page: Page, changes: Mapping[int, int], word_order: WordOrder) -> Page:
+    """The page with header registers changed, by offset (1…31), and its CRC made right."""
+    header = list(page.header)
+    for offset, value in changes.items():
+        header[offset - 1] = value
+    header[_PLACES["crc32"]] = words32([crc32_of(header, page.payload)], word_order)
+    return Page(tuple(header), page.payload)
 
 
 def header_value(header: Sequence[int], name: str) -> int:

@@ -20,7 +20,7 @@ from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.mailbox.page_spans import PAYLOAD_OFFSET, header_spans, page_starts, spans
 from drivers.controller.mailbox.pages import HEADER_REGISTERS, Page
 from drivers.controller.modbus.late_replies import outlast_late_replies
-from drivers.controller.modbus.request_queue import Connection
+from drivers.controller.modbus.request_queue import RequestQueue
 from drivers.controller.modbus.requests import (
     Request,
     RequestLimits,
@@ -78,8 +78,8 @@ class ModbusController:
         if transport.timing.byte_s:
             self._limits = self._limits.within(LONGEST_EXCHANGE_S / transport.timing.byte_s)
         self._connecting = asyncio.Lock()
-        self._connection: Connection | None = None
-        self._opening: Connection | None = None
+        self._connection: RequestQueue | None = None
+        self._opening: RequestQueue | None = None
         self._closings = 0
         self._barriers = secrets.randbelow(1000)  # another place in their row than that of a process just killed
 
@@ -182,11 +182,11 @@ class ModbusController:
 
     # --- connection ---------------------------------------------------------------------------------------------
 
-    async def _checked(self, closings: int) -> Connection:
+    async def _checked(self, closings: int) -> RequestQueue:
         """A new connection on which no late reply can come."""
         for left in reversed(range(LATE_REPLIES)):
             descriptor = await self._transport.open(self._timeout_s)
-            connection = Connection(self._transport, descriptor, self.device_id, self._timeout_s)
+            connection = RequestQueue(self._transport, descriptor, self.device_id, self._timeout_s)
             self._opening = connection
             try:
                 self._check_still_wanted(closings)
@@ -209,7 +209,7 @@ class ModbusController:
         if closings != self._closings:
             raise ControllerUnavailable(f"{self._transport.name}: closed while connecting")
 
-    def _held(self) -> Connection:
+    def _held(self) -> RequestQueue:
         if self._connection is None:
             # A job meets this while the connection is opened anew: it is read by people, in log and journal.
             raise ControllerUnavailable(

@@ -9,7 +9,7 @@ has come, all that was under way before it has come too, or never will.
 from __future__ import annotations
 
 from drivers.controller.errors import ControllerRefused
-from drivers.controller.modbus.request_queue import Connection
+from drivers.controller.modbus.request_queue import RequestQueue
 from drivers.controller.modbus.requests import SHORTEST_LIMIT, read_registers
 
 # USB adapters hand on bytes in packets up to 16 ms apart; a serial server may collect them for longer.
@@ -18,7 +18,7 @@ SILENCE_S = 0.05
 BARRIER_COUNTS = tuple(range(1, SHORTEST_LIMIT, 2))
 
 
-async def outlast_late_replies(connection: Connection, contour_address: int, turn: int, timeout_s: float) -> None:
+async def outlast_late_replies(connection: RequestQueue, contour_address: int, turn: int, timeout_s: float) -> None:
     """Return when no reply to an earlier request can come any more.
 
     turn: another one at each call, so that the reply to an earlier barrier is none to this one.

@@ -61,7 +61,7 @@ class _Exchange:
         return self.requests[len(self.replies)]
 
 
-class Connection:
+class RequestQueue:
     """An open transport, from here to its first fault.
 
     Callers take turns, one request each, and who has a single one goes before who has a row of them: a heartbeat waits

@@ -24,7 +24,7 @@ from typing import Any
 from drivers.controller.errors import ControllerError
 from drivers.controller.mailbox.layout import REGISTERS, MailboxLayout
 from drivers.controller.simulated.contour import AcceptedContour
-from drivers.controller.simulated.faults import Fault, FaultPlan, targets_of
+from drivers.controller.simulated.faults import FaultPlan, LineFault, targets_of
 from drivers.controller.simulated.memory import RetainedMemory
 from drivers.controller.simulated.program import (
     ControllerProgram,
@@ -313,7 +313,7 @@ class SimulatedController:
         """Do a write that the line or the server kept back: none of the client's doing, so nobody judges it."""
         self._window.store_late(request.pdu)
 
-    def strike(self, request: ReceivedRequest) -> Fault | None:
+    def strike(self, request: ReceivedRequest) -> LineFault | None:
         """The fault that befalls the request."""
         if request.unit != self._device_id:
             return None

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from pymodbus.framer import FramerBase, FramerRTU
 
-from drivers.controller.simulated.faults import Fault, FaultPlan, foreign
+from drivers.controller.simulated.faults import FaultPlan, LineFault, foreign
 from drivers.controller.simulated.received import READ, ReceivedRequest
 
 
@@ -24,7 +24,7 @@ class Device(Protocol):
     def answer_late(self, request: ReceivedRequest) -> None:
         """Do a write long after its client gave it up."""
 
-    def strike(self, request: ReceivedRequest) -> Fault | None:
+    def strike(self, request: ReceivedRequest) -> LineFault | None:
         """The fault that befalls the request."""
 
     def unanswered(self, request: ReceivedRequest) -> None:
@@ -131,7 +131,7 @@ class Exchange:
 
     # --- faults -------------------------------------------------------------------------------------------------
 
-    def _befall(self, fault: Fault, request: ReceivedRequest) -> None:
+    def _befall(self, fault: LineFault, request: ReceivedRequest) -> None:
         kind = fault.kind
         if kind in ("garbled-request", "garbled-reply") and not self._serial_frames:
             kind = "lost-request" if kind == "garbled-request" else "lost-reply"
@@ -152,7 +152,7 @@ class Exchange:
         if kind in ("reset-before", "reset-after") and self._reset is not None:
             self._reset()
 
-    def _spoil_reply(self, kind: str, fault: Fault, request: ReceivedRequest, pdu: bytes | None) -> None:
+    def _spoil_reply(self, kind: str, fault: LineFault, request: ReceivedRequest, pdu: bytes | None) -> None:
         if pdu is None:
             return
         frame = self._frame(request, pdu)
@@ -175,7 +175,7 @@ class Exchange:
     def _sent_late(self) -> None:
         self._waiting -= 1
 
-    def _refuse(self, fault: Fault, request: ReceivedRequest) -> None:
+    def _refuse(self, fault: LineFault, request: ReceivedRequest) -> None:
         self._send(self._frame(request, bytes([request.pdu[0] | 0x80, fault.code])))
         if fault.code == 5 and request.pdu[0] != READ:
             self._device.unanswered(request)

@@ -58,7 +58,7 @@ assert set(TARGETS) == set(get_args(Target))
 
 
 @dataclass(frozen=True)
-class Fault:
+class LineFault:
     """One rule: what befalls which of the requests that `request` names.
 
     chance: of each such request, 0 to 1. every: each n-th of them. at: the n-th ones, counted from 1.
@@ -88,7 +88,7 @@ class FaultPlan:
     struck: how often each kind struck, exceptions by their code.
     """
 
-    def __init__(self, faults: Iterable[Fault] = (), seed: int = 0) -> None:
+    def __init__(self, faults: Iterable[LineFault] = (), seed: int = 0) -> None:
         self.struck: Counter[str] = Counter()
         self.enabled = True
         self._faults = tuple(faults)
@@ -96,7 +96,7 @@ class FaultPlan:
         self._seen = [0] * len(self._faults)
         self._done = [0] * len(self._faults)
 
-    def strike(self, targets: frozenset[str], since_start_s: float) -> Fault | None:
+    def strike(self, targets: frozenset[str], since_start_s: float) -> LineFault | None:
         """The fault that befalls a request that is of `targets`, if one does."""
         if not self.enabled:
             return None

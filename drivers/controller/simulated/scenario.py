@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 
 from drivers.controller.simulated.contour import AcceptedContour
 from drivers.controller.simulated.controller import SimulatedController
-from drivers.controller.simulated.faults import Fault, FaultPlan
+from drivers.controller.simulated.faults import FaultPlan, LineFault
 from drivers.controller.simulated.program import Judge, Pace, Reply, TriggerNotPossible
 from drivers.controller.simulated.window import ServerLimits
 
@@ -106,7 +106,7 @@ class Scenario:
     seed: int = 0
     machine: MachineSettings = field(default_factory=MachineSettings)
     events: tuple[Event, ...] = ()
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[LineFault, ...] = ()
 
 
 def machine_options(scenario: Scenario) -> dict[str, Any]:

@@ -13,7 +13,7 @@ LONGEST_READ = 125
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
 
 
-class Refusal(Exception):
+class ExceptionReply(Exception):
     """The request is answered with exception `code`."""
 
     def __init__(self, code: int) -> None:
@@ -57,7 +57,7 @@ class RegisterWindow:
             if pdu[0] == READ:
                 return self._read(pdu)
             address, values = self._writing(pdu)
-        except Refusal as refusal:
+        except ExceptionReply as refusal:
             return bytes([pdu[0] | 0x80, refusal.code])
         if not self._watch.write(pdu[0], address, values, self._registers, now):
             return bytes([pdu[0] | 0x80, ILLEGAL_ADDRESS])
@@ -68,7 +68,7 @@ class RegisterWindow:
         """Write without being seen by the watch; what could not be written at all is dropped."""
         try:
             address, values = self._writing(pdu)
-        except Refusal:
+        except ExceptionReply:
             return
         writable = [block for name, block in self._layout.blocks.items() if name != "link_address"]
         if any(start <= address and address + len(values) <= end for start, end in writable):
@@ -76,26 +76,26 @@ class RegisterWindow:
 
     def _read(self, pdu: bytes) -> bytes:
         if len(pdu) != 5:
-            raise Refusal(ILLEGAL_VALUE)
+            raise ExceptionReply(ILLEGAL_VALUE)
         address, count = struct.unpack(">HH", pdu[1:])
         if not 1 <= count <= self._limits.registers:
-            raise Refusal(ILLEGAL_VALUE)
+            raise ExceptionReply(ILLEGAL_VALUE)
         if not any(start <= address and address + count <= end for start, end in self._readable):
-            raise Refusal(ILLEGAL_ADDRESS)
+            raise ExceptionReply(ILLEGAL_ADDRESS)
         return struct.pack(f">BB{count}H", READ, 2 * count, *self._registers[address : address + count])
 
     def _writing(self, pdu: bytes) -> tuple[int, list[int]]:
         """Address and values of a write."""
         if pdu[0] == WRITE_ONE and not self._limits.write_single:
-            raise Refusal(ILLEGAL_FUNCTION)
+            raise ExceptionReply(ILLEGAL_FUNCTION)
         if pdu[0] == WRITE_ONE and len(pdu) == 5:
             address, value = struct.unpack(">HH", pdu[1:])
             return address, [value]
         if pdu[0] not in (WRITE_ONE, WRITE_MANY):
             self._watch.foreign_function(pdu[0])
-            raise Refusal(ILLEGAL_FUNCTION)
+            raise ExceptionReply(ILLEGAL_FUNCTION)
         if pdu[0] == WRITE_ONE or len(pdu) < 6:
-            raise Refusal(ILLEGAL_VALUE)
+            raise ExceptionReply(ILLEGAL_VALUE)
         address, count, length = struct.unpack(">HHB", pdu[1:6])
         if count > LONGEST_WRITE:
             self._watch.too_long(address, count)
@@ -104,7 +104,7 @@ class RegisterWindow:
             or length != 2 * count
             or len(pdu) != 6 + length
         ):
-            raise Refusal(ILLEGAL_VALUE)
+            raise ExceptionReply(ILLEGAL_VALUE)
         return address, list(struct.unpack(f">{count}H", pdu[6:]))
 
 

@@ -22,7 +22,7 @@ from drivers.controller import Controller, ControllerError, LinkBlock, Page
 from drivers.controller.errors import MailboxError
 from drivers.controller.mailbox.blocks import encode_service
 from drivers.controller.mailbox.layout import MailboxLayout
-from drivers.controller.mailbox.pages import ContourMessage, crc32_of, encode_pages, withdrawal
+from drivers.controller.mailbox.pages import HEADER_OFFSETS, ContourMessage, encode_pages, with_registers, withdrawal
 from drivers.controller.simulated.controller import SimulatedController
 from service.commissioning.hil.presence import LOOK_S, HilError, Presence
 from service.commissioning.hil.which_controller import config_of, loaded, over_tcp
@@ -151,17 +151,15 @@ class Bench:
         """Page 1 of 2 of a contour: however it is answered, no whole contour is there, so nothing can move."""
         (page,) = self.pages(job_id, **changes)
         table, pair = 2, 4
-        return self.sealed(Page(page.header, page.payload[: table + 2 * pair]), {5: 2, 7: table + 2 * pair, 27: 1})
+        length = table + 2 * pair
+        changes = {"page_count": 2, "payload_length": length, "flags": 1}
+        return self.sealed(
+            Page(page.header, page.payload[:length]), {HEADER_OFFSETS[name]: value for name, value in changes.items()}
+        )
 
     def sealed(self, page: Page, changes: dict[int, int]) -> Page:
         """The page with header registers changed, by offset, and its CRC made right."""
-        header = list(page.header)
-        for offset, value in changes.items():
-            header[offset - 1] = value
-        crc = crc32_of(header, page.payload)
-        words = (crc >> 16, crc & 0xFFFF)
-        header[7:9] = words if self.layout.word_order == "big" else words[::-1]
-        return Page(tuple(header), page.payload)
+        return with_registers(page, changes, self.layout.word_order)
 
     def send(self, page: Page) -> Answered:
         """Steps 2, 3, 5 and 6 of a transfer: the answer to the page; raise HilError where none comes."""

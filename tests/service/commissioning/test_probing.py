@@ -15,7 +15,7 @@ from drivers.controller.modbus.client import ModbusController, ModbusRtuControll
 from drivers.controller.modbus.requests import read_registers, registers_of, stream_of, write_register, write_registers
 from drivers.controller.modbus.serial_line import SerialLine
 from drivers.controller.simulated.controller import SimulatedController
-from drivers.controller.simulated.faults import Fault, FaultPlan, Target
+from drivers.controller.simulated.faults import FaultPlan, LineFault, Target
 from drivers.controller.simulated.program import Pace
 from drivers.controller.simulated.window import ServerLimits
 from service.commissioning.check_result import CheckResult
@@ -254,7 +254,7 @@ async def test_one_that_answers_nothing_rightly_is_told_what_it_answers_and_no_a
     ("block", "said"), [("service", "the service block cannot"), ("clear", "the contour block cannot")]
 )
 async def test_a_block_that_cannot_be_written_is_told_with_the_controllers_word(block: Target, said: str) -> None:
-    faults = FaultPlan([Fault("exception", block, every=1)])
+    faults = FaultPlan([LineFault("exception", block, every=1)])
     async with SimulatedController(scan_s=0.001, faults=faults) as simulated:
         findings, probe = await probed(simulated.port)
     assert findings["writing"].text.startswith(f"{said} be written: ")

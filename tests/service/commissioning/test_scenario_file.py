@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.controller.simulated.faults import Fault
+from drivers.controller.simulated.faults import LineFault
 from drivers.controller.simulated.scenario import EVENT_KINDS, Event, MachineSettings
 from service.commissioning.scenario_file import load_scenario
 from service.commissioning.scenario_reference import with_tables
@@ -50,7 +50,7 @@ def test_what_stands_in_the_file_is_what_is_played(tmp_path: Path) -> None:
     assert scenario.seed == 5
     assert scenario.machine == MachineSettings(scan_ms=20, clock=False, sessions=(7, 8))
     assert scenario.events == (Event("refuse", at_s=(1.0, 2.5), answer=4, count=3),)
-    assert scenario.faults == (Fault("exception", "commit", every=3, code=6, after_s=1.0, before_s=9.0),)
+    assert scenario.faults == (LineFault("exception", "commit", every=3, code=6, after_s=1.0, before_s=9.0),)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from drivers.camera.simulated import SimulatedCamera
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.simulated.contour import AcceptedContour
 from drivers.controller.simulated.controller import SimulatedController
-from drivers.controller.simulated.faults import Fault, FaultPlan
+from drivers.controller.simulated.faults import FaultPlan, LineFault
 from drivers.controller.simulated.program import Pace, TriggerNotPossible
 from drivers.controller.simulated.received import FramingName
 from service.config.config import Config
@@ -94,21 +94,21 @@ class Outcome:
     seconds: float
 
 
-def fault_rules(risk: float) -> list[Fault]:
+def fault_rules(risk: float) -> list[LineFault]:
     """Every kind of fault; a read is struck a twentieth as often as a write, for most requests only look."""
-    rules = [Fault(kind, request="write", chance=risk / 12) for kind in LINE_FAULTS]  # type: ignore[arg-type]
-    rules += [Fault(kind, request="write", chance=risk / 12) for kind in CONNECTION_FAULTS]  # type: ignore[arg-type]
-    rules += [Fault("exception", request="write", chance=risk / 30, code=code, delay_s=0.1) for code in EXCEPTIONS]
+    rules = [LineFault(kind, request="write", chance=risk / 12) for kind in LINE_FAULTS]  # type: ignore[arg-type]
+    rules += [LineFault(kind, request="write", chance=risk / 12) for kind in CONNECTION_FAULTS]  # type: ignore[arg-type]
+    rules += [LineFault("exception", request="write", chance=risk / 30, code=code, delay_s=0.1) for code in EXCEPTIONS]
     for delay_s in LATE:
-        rules += [Fault("late-write", request="write", chance=risk / 20, delay_s=delay_s)]
-        rules += [Fault("late-reply", request="write", chance=risk / 40, delay_s=delay_s)]
-        rules += [Fault("repeated-reply", request="any", chance=risk / 200, delay_s=delay_s)]
-        rules += [Fault("late-reply", request="read", chance=risk / 400, delay_s=delay_s)]
-    rules += [Fault("exception", request="read", chance=risk / 400, code=code) for code in EXCEPTIONS]
-    rules += [Fault(kind, request="read", chance=risk / 100) for kind in (*LINE_FAULTS, *CONNECTION_FAULTS)]  # type: ignore[arg-type]
+        rules += [LineFault("late-write", request="write", chance=risk / 20, delay_s=delay_s)]
+        rules += [LineFault("late-reply", request="write", chance=risk / 40, delay_s=delay_s)]
+        rules += [LineFault("repeated-reply", request="any", chance=risk / 200, delay_s=delay_s)]
+        rules += [LineFault("late-reply", request="read", chance=risk / 400, delay_s=delay_s)]
+    rules += [LineFault("exception", request="read", chance=risk / 400, code=code) for code in EXCEPTIONS]
+    rules += [LineFault(kind, request="read", chance=risk / 100) for kind in (*LINE_FAULTS, *CONNECTION_FAULTS)]  # type: ignore[arg-type]
     # The commit and what comes just before it: where a mistake would cost most.
-    rules += [Fault(kind, request="commit", chance=risk / 6) for kind in ("lost-reply", "reset-after")]  # type: ignore[arg-type]
-    rules += [Fault("late-write", request="clear", chance=risk / 12, delay_s=0.15)]
+    rules += [LineFault(kind, request="commit", chance=risk / 6) for kind in ("lost-reply", "reset-after")]  # type: ignore[arg-type]
+    rules += [LineFault("late-write", request="clear", chance=risk / 12, delay_s=0.15)]
     return rules
 
 

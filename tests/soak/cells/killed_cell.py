@@ -23,7 +23,7 @@ import numpy as np
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.simulated.contour import AcceptedContour
 from drivers.controller.simulated.controller import SimulatedController
-from drivers.controller.simulated.faults import Fault, FaultPlan, targets_of
+from drivers.controller.simulated.faults import FaultPlan, LineFault, targets_of
 from drivers.controller.simulated.program import TriggerNotPossible
 from drivers.controller.simulated.received import ReceivedRequest
 from tests.soak.cells.crossed_line import crossed_line
@@ -76,7 +76,7 @@ class Sniper(SimulatedController):
     armed: tuple[str, str, int] | None = None
     on_kill: Callable[[], None]
 
-    def strike(self, request: ReceivedRequest) -> Fault | None:
+    def strike(self, request: ReceivedRequest) -> LineFault | None:
         if self.armed is None:
             return super().strike(request)
         step, moment, count = self.armed
@@ -88,10 +88,10 @@ class Sniper(SimulatedController):
         self.armed = None
         if moment == "before":
             self.on_kill()
-            return Fault("lost-request")
+            return LineFault("lost-request")
         if moment == "after":
             asyncio.get_running_loop().call_soon(self.on_kill)
-            return Fault("lost-reply")
+            return LineFault("lost-reply")
         asyncio.get_running_loop().call_soon(self.on_kill)  # the reply is in the client's socket by then
         return None
 
@@ -190,12 +190,12 @@ class KilledCell:
         killing = self.killing
         plan = FaultPlan(
             [
-                Fault("lost-reply", chance=killing.risk),
-                Fault("late-write", request="write", chance=killing.risk, delay_s=0.5),
-                Fault(
+                LineFault("lost-reply", chance=killing.risk),
+                LineFault("late-write", request="write", chance=killing.risk, delay_s=0.5),
+                LineFault(
                     "late-write", request="write", chance=killing.risk, delay_s=1.5
                 ),  # lands in the next service's time
-                Fault("exception", request="write", chance=killing.risk, code=6),
+                LineFault("exception", request="write", chance=killing.risk, code=6),
             ],
             killing.seed,
         )

@@ -14,7 +14,7 @@ import pytest
 
 from drivers.controller import ControllerUnavailable
 from drivers.controller.modbus.reply_waiting import InPlaceWaiting
-from drivers.controller.modbus.request_queue import Connection
+from drivers.controller.modbus.request_queue import RequestQueue
 from drivers.controller.modbus.requests import read_registers, registers_of
 from drivers.controller.modbus.transports import TcpTransport
 
@@ -32,10 +32,10 @@ def far() -> Iterator[tuple[socket.socket, socket.socket]]:
 @pytest.fixture
 async def connection(
     far: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch
-) -> AsyncIterator[Connection]:
+) -> AsyncIterator[RequestQueue]:
     monkeypatch.setattr(InPlaceWaiting, "worth", lambda *_: True)
     near, _ = far
-    opened = Connection(TcpTransport("there", 502, begin=lambda: 0), (near.fileno(), near.close), 1, 5.0)
+    opened = RequestQueue(TcpTransport("there", 502, begin=lambda: 0), (near.fileno(), near.close), 1, 5.0)
     yield opened
     opened.end(ControllerUnavailable("the test is over"))
 
@@ -49,7 +49,7 @@ def value(number: int) -> bytes:
 
 
 async def test_a_prompt_reply_takes_no_turn_of_the_event_loop(
-    connection: Connection, far: tuple[socket.socket, socket.socket]
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket]
 ) -> None:
     says(far[1], 1, value(7))
     turns: list[int] = []
@@ -60,7 +60,7 @@ async def test_a_prompt_reply_takes_no_turn_of_the_event_loop(
 
 
 async def test_a_row_of_prompt_replies_lets_the_event_loop_turn_once_before_it(
-    connection: Connection, far: tuple[socket.socket, socket.socket]
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket]
 ) -> None:
     for number in (1, 2, 3, 4):
         says(far[1], number, value(number))
@@ -71,7 +71,7 @@ async def test_a_row_of_prompt_replies_lets_the_event_loop_turn_once_before_it(
 
 
 async def test_a_reply_that_is_late_comes_through_the_event_loop(
-    connection: Connection, far: tuple[socket.socket, socket.socket]
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket]
 ) -> None:
     asyncio.get_running_loop().call_later(0.001, says, far[1], 1, value(7))
     (reply,) = await connection.run([READ])
@@ -79,7 +79,7 @@ async def test_a_reply_that_is_late_comes_through_the_event_loop(
 
 
 async def test_a_row_goes_on_in_place_after_a_late_reply(
-    connection: Connection, far: tuple[socket.socket, socket.socket]
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket]
 ) -> None:
     def late_then_two() -> None:
         for number in (1, 2, 3):
@@ -90,7 +90,7 @@ async def test_a_row_goes_on_in_place_after_a_late_reply(
 
 
 async def test_the_other_end_going_away_meanwhile_is_an_error(
-    connection: Connection, far: tuple[socket.socket, socket.socket]
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket]
 ) -> None:
     far[1].close()
     with pytest.raises(ControllerUnavailable, match="there:502"):
@@ -98,14 +98,14 @@ async def test_the_other_end_going_away_meanwhile_is_an_error(
 
 
 async def test_a_glance_gives_the_reply_that_is_there(
-    connection: Connection, far: tuple[socket.socket, socket.socket]
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket]
 ) -> None:
     says(far[1], 1, value(7))
     assert connection.at_once(READ) == value(7)
 
 
 async def test_a_glance_without_a_reply_gives_none_and_its_late_reply_is_no_others(
-    connection: Connection, far: tuple[socket.socket, socket.socket]
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket]
 ) -> None:
     assert connection.at_once(READ) is None
     asking = asyncio.ensure_future(connection.run([READ]))
@@ -117,14 +117,14 @@ async def test_a_glance_without_a_reply_gives_none_and_its_late_reply_is_no_othe
 
 @pytest.mark.parametrize("pdu", [b"\x83\x02", b"\x83\x0b", b"\x10\x00\x00\x00\x01"])
 async def test_a_glance_that_is_refused_or_answered_with_nonsense_gives_none(
-    connection: Connection, far: tuple[socket.socket, socket.socket], pdu: bytes
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket], pdu: bytes
 ) -> None:
     says(far[1], 1, pdu)
     assert connection.at_once(READ) is None
 
 
 async def test_a_glance_does_not_jump_the_queue(
-    connection: Connection, far: tuple[socket.socket, socket.socket]
+    connection: RequestQueue, far: tuple[socket.socket, socket.socket]
 ) -> None:
     asking = asyncio.ensure_future(connection.run([READ]))
     await asyncio.sleep(0)
@@ -136,6 +136,6 @@ async def test_a_glance_does_not_jump_the_queue(
         far[1].recv(100, socket.MSG_DONTWAIT)
 
 
-async def test_a_glance_on_a_connection_that_has_ended_gives_none(connection: Connection) -> None:
+async def test_a_glance_on_a_connection_that_has_ended_gives_none(connection: RequestQueue) -> None:
     connection.end(ControllerUnavailable("gone"))
     assert connection.at_once(READ) is None

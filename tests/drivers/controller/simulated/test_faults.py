@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.simulated.controller import SimulatedController
-from drivers.controller.simulated.faults import FAULT_KINDS, Fault, FaultPlan, targets_of
+from drivers.controller.simulated.faults import FAULT_KINDS, FaultPlan, LineFault, targets_of
 from drivers.controller.simulated.received import FramingName, ReceivedRequest
 from drivers.controller.simulated.server import QUIET_S, RegisterServer
 from tests.support.controller.raw_client import Client, page, simulated
@@ -38,7 +38,7 @@ async def silent(client: Client) -> bool:
 
 
 def with_fault(kind: str, **options: object) -> SimulatedController:
-    return simulated(faults=FaultPlan([Fault(kind, **{"at": (1,), "request": "write", **options})]))  # type: ignore[arg-type]
+    return simulated(faults=FaultPlan([LineFault(kind, **{"at": (1,), "request": "write", **options})]))  # type: ignore[arg-type]
 
 
 # --- on TCP ---------------------------------------------------------------------------------------------------------
@@ -182,7 +182,7 @@ def rtu(pdu: bytes) -> bytes:
 
 async def test_a_garbled_reply_has_a_wrong_crc_and_the_next_one_a_right_one(line: tuple[int, str]) -> None:
     near, name = line
-    plan = FaultPlan([Fault("garbled-reply", at=(1,))])
+    plan = FaultPlan([LineFault("garbled-reply", at=(1,))])
     async with SimulatedController.on_serial(name, scan_s=0.001, faults=plan):
         os.write(near, rtu(COMMIT))
         garbled = await heard(near)
@@ -220,7 +220,7 @@ def test_every_kind_of_fault_is_explained() -> None:
 
 
 def test_a_rule_strikes_the_requests_that_it_names_and_no_others() -> None:
-    plan = FaultPlan([Fault("lost-reply", request="commit", every=2, times=2)])
+    plan = FaultPlan([LineFault("lost-reply", request="commit", every=2, times=2)])
     layout = MailboxLayout()
     struck = [
         plan.strike(targets_of(pdu, layout), 0.0) is not None
@@ -230,7 +230,7 @@ def test_a_rule_strikes_the_requests_that_it_names_and_no_others() -> None:
 
 
 def test_a_rule_holds_in_its_time_only() -> None:
-    plan = FaultPlan([Fault("lost-reply", every=1, after_s=1, before_s=2)])
+    plan = FaultPlan([LineFault("lost-reply", every=1, after_s=1, before_s=2)])
     assert [plan.strike(frozenset({"any"}), at) is not None for at in (0.9, 1.0, 1.9, 2.0)] == [
         False,
         True,
@@ -241,7 +241,7 @@ def test_a_rule_holds_in_its_time_only() -> None:
 
 def test_the_same_seed_strikes_the_same_requests() -> None:
     def struck(seed: int) -> list[bool]:
-        plan = FaultPlan([Fault("lost-reply", chance=0.3)], seed)
+        plan = FaultPlan([LineFault("lost-reply", chance=0.3)], seed)
         return [plan.strike(frozenset({"any"}), 0.0) is not None for _ in range(200)]
 
     assert struck(1) == struck(1)

@@ -62,8 +62,9 @@ class OnTerminal:
 
     def ended(self) -> int:
         """The exit status, once all was read."""
+        give_up_at = time.monotonic() + 60
         while self._read(0.2):
-            pass
+            assert time.monotonic() < give_up_at, "it goes on"
         status = self._process.wait(60)
         os.close(self._master)
         return status

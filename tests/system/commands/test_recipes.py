@@ -36,7 +36,7 @@ class Bench:
         )
 
     def reload(self, expected: str) -> None:
-        self.service.daemon.reload()
+        self.service.reload()
         until(lambda: expected in self.service.text, what=expected)
 
     def hand_over(self) -> dict[str, object]:
@@ -111,7 +111,7 @@ def test_the_controllers_register_chooses_the_recipe_and_one_that_is_gone_is_ref
         assert (ring @ [1, 1]).argmax() == 0
         config = cell.folder / "config.yaml"
         config.write_text(config.read_text().replace(f", {two}", ""))
-        cell.service.daemon.reload()
+        cell.service.reload()
         until(lambda: any(job["reason"] == 122 for job in cell.settled()), what="122")
         assert "recipe 2 is not configured; there are 1" in cell.service.text
     finally:

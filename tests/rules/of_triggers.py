@@ -71,7 +71,8 @@ RULES = (
         f"{EXECUTOR}::Executor.run",
         f"{IN_EXECUTOR}::test_a_trigger_of_the_controller_waits_for_the_job_in_flight",
         "await self._execute_submitted(self._submitted)\n                continue",
-        "await self._execute_submitted(self._submitted)\n                await self._wake.wait()",
+        "await self._execute_submitted(self._submitted)\n                self._wake.clear()\n"
+        "                await self._wake.wait()",
     ),
     Rule(
         "Trigger 2: values skipped over count as missed",

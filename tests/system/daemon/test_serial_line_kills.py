@@ -80,8 +80,9 @@ def test_a_job_in_flight_at_a_kill_is_told_and_is_as_complete_as_any_other(tmp_p
         second = terminal.line().split()[1]
         assert terminal.line().startswith(f"DONE {second} ")
         resumed, usual = archived(cell, first_number, "accepted"), archived(cell, int(second), "accepted")
-        until(lambda: "draft.json" not in files(cell, int(second)), what="the end of the draft")
-        assert files(cell, first_number) == files(cell, int(second)) == ["accepted.json", "frame.png", "overlay.jpg"]
+        whole = ["accepted.json", "frame.png", "overlay.jpg"]
+        for number in (first_number, int(second)):
+            until(lambda number=number: files(cell, number) == whole, what=f"all the evidence of job {number}")
         assert resumed.keys() == usual.keys()
         assert resumed["measurement"].keys() == usual["measurement"].keys()
         assert len(resumed["measurement"]["millimetres"]["exterior"]) == int(vertices)

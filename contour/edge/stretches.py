@@ -1,0 +1,29 @@
+"""What the parts of an outline rest on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+State = Literal["seen", "bridged", "covered"]
+Hider = Literal["object", "compound", "ink", "glare"]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of a contour's ring and what it rests on; lengths from the ring's first vertex on, in its order, pixels.
+
+    `seen`: wall ends or cut material against the table. `bridged`: hidden, but both sides lie on one line or arc and
+    agree. `covered`: hidden, and not to be bridged. `by` is what hides it, as far as known.
+    """
+
+    ring: int
+    """0 the exterior; holes follow."""
+    from_px: float
+    to_px: float
+    state: State
+    by: Hider | None
+    bound_px: float
+    """95 % bound on the position of this stretch, pixels."""
+    straight: bool = True
+    """Bridged along a line; False: along an arc or a curve."""

@@ -40,6 +40,7 @@ class Reason(IntEnum):
     UNCERTAINTY_TOO_LARGE = 114
     OUTSIDE_WORK_AREA = 115
     SEVERAL_BLOCKS = 116
+    EDGE_COVERED = 117
     BUSY = 120
     NOT_READY = 121
     UNKNOWN_RECIPE = 122
@@ -184,6 +185,16 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
         Explanation(
             "На столе больше одной заготовки.",
             "Оставьте на столе одну заготовку или выберите рецепт, который берёт наибольшую (pieces: largest).",
+        ),
+    ),
+    Reason.EDGE_COVERED: (
+        Explanation(
+            "Something lies over the block's edge, or hides it.",
+            "Take away what lies there: tape, clamps, hands, cables; the overlay shows in red where.",
+        ),
+        Explanation(
+            "Кромка заготовки чем-то закрыта.",
+            "Уберите то, что лежит на кромке: ленту, прижим, руку, кабель; на снимке это место отмечено красным.",
         ),
     ),
     Reason.BUSY: (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from contour.acceptance.block_findings import (
@@ -14,6 +15,7 @@ from contour.acceptance.block_findings import (
     touches_region,
     vague,
 )
+from contour.acceptance.edge_findings import edge_covered
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.findings import Finding, Limits, Refusal
 from contour.acceptance.picture_findings import badly_seen, useless_picture
@@ -25,6 +27,7 @@ from contour.acceptance.polygon_findings import (
     too_many_points,
     too_unsure,
 )
+from contour.acceptance.sent_evidence import SentStretch
 from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour, area, contour_defect
@@ -48,11 +51,13 @@ def judge(
     *,
     traced: CheckedTrace | None = None,
     budget: ErrorBudget | None = None,
+    evidence: Sequence[SentStretch] | None = None,
 ) -> tuple[Finding, ...]:
     """Every reason to refuse the polygon, lowest code first; empty = accepted.
 
     `traced`, what the polygon was made of, adds what was seen besides. Where there is a limit to the uncertainty in
-    millimetres, a `budget` of None (nobody knows it) is refused as one too large. Where cells turn out to be none, the
+    millimetres, a `budget` of None (nobody knows it) is refused as one too large. `evidence` is what the polygon rests
+    on, None = its method does not say. Where cells turn out to be none, the
     view's picture is judged as a whole, too: by a pitch that is none nothing looks blurred.
     """
     trace = traced.trace if traced else None
@@ -73,6 +78,7 @@ def judge(
         outside_work_area(polygon.millimetres, limits.work_area_mm),
         outside_calibration(polygon.pixels, limits.sure),
         several_blocks(trace, limits),
+        edge_covered(evidence, polygon, limits),
         too_many_points(polygon.pixels, limits.max_vertices),
         not_cuttable(polygon),
     ]

@@ -23,6 +23,7 @@ class Refusal(IntEnum):
     UNCERTAINTY_TOO_LARGE = 114
     OUTSIDE_WORK_AREA = 115
     SEVERAL_BLOCKS = 116
+    EDGE_COVERED = 117
     TOO_MANY_POINTS = 130
     SELF_INTERSECTING = 131
 
@@ -39,7 +40,8 @@ class Limits:
     `work_area_mm` is a polygon in the machine frame, `sure` states the part of the picture that the calibration covers;
     None = not checked, as are `max_uncertainty_mm` and `max_disagreement_pitches`.
     `pieces` one: no other block may be in view; largest: a smaller one may. `block_share` of the traced block's area
-    makes another piece of comb a block, below that it is an offcut.
+    makes another piece of comb a block, below that it is an offcut. `max_bridged_mm` is how long a hidden part of the
+    edge may be that is bridged: of straight edges alone, or of arcs and curves, too. Without a calibration none is.
     """
 
     min_area_mm2: float = 0.0
@@ -52,6 +54,8 @@ class Limits:
     max_disagreement_pitches: float | None = None
     pieces: Literal["one", "largest"] = "one"
     block_share: float = 0.04
+    max_bridged_mm: float = 0.0
+    bridge: Literal["straight", "arcs"] = "straight"
     quality: QualityLimits = field(default_factory=QualityLimits)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,3 +28,10 @@ class Stretch:
     """95 % bound on the position of this stretch, pixels."""
     straight: bool = True
     """Bridged along a line; False: along an arc or a curve."""
+
+
+def bound_with_bridges(bound_px: float | None, stretches: Iterable[Stretch]) -> float | None:
+    """A whole outline's 95 % bound, pixels, no less than that of any bridged stretch; None where nobody knows it."""
+    if bound_px is None:
+        return None
+    return max(bound_px, *(stretch.bound_px for stretch in stretches if stretch.state == "bridged"), 0.0)

@@ -67,6 +67,14 @@ class Polygon:
     given_up_px: float = 0.0
     defect: str | None = None
 
+    def bound_px(self, traced_px: float) -> float:
+        """The 95 % bound on where the polygon's edges lie, where those traced have `traced_px`, pixels.
+
+        What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither. What the
+        vertex budget gave up is of one sign, and adds in full.
+        """
+        return float(np.hypot(traced_px, self.shift_px)) + self.given_up_px
+
 
 def cutting_polygon(
     contour_px: Contour,

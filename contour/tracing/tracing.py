@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from contour.edge.stretches import bound_with_bridges
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
@@ -39,8 +40,10 @@ def trace(
     if method is None:
         raise ParameterError(f"method is {settings.method!r}: expected one of {', '.join(_METHODS)}.")
     found = method(picture, settings, rectifier=rectifier, on_stage=on_stage)
+    sure_px = bound_with_bridges(found.uncertainty_px, found.evidence or ())
     # As seen is y up: counter-clockwise then is clockwise by the formula, whose y runs down in pixels.
-    return replace(found, contour=oriented_contour(found.contour, counter_clockwise=False))
+    contour = oriented_contour(found.contour, counter_clockwise=False)
+    return replace(found, contour=contour, uncertainty_px=sure_px)
 
 
 class _MethodCall(Protocol):

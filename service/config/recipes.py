@@ -90,6 +90,12 @@ class Recipe(Model):
     pieces: Literal["one", "largest"] = Field(
         "one", description="one: other blocks in view are refused; largest: smaller ones are not."
     )
+    max_bridged_mm: float = Field(
+        0, ge=0, le=1000, description="Longest hidden part of the edge that may be bridged, mm; 0 = none."
+    )
+    bridge: Literal["straight", "arcs"] = Field(
+        "straight", description="straight: of straight edges alone; arcs: of arcs and curves, too."
+    )
     roi_px: tuple[Number, ...] = Field(
         (), description="Nothing is seen outside of it: left, top, right, bottom, px; none = the whole picture."
     )
@@ -144,7 +150,12 @@ class Recipe(Model):
     @property
     def needs_millimetres(self) -> str | None:
         """The first of its keys that means nothing without a calibration."""
-        meant = {"roi_mm": self.roi_mm, "margin_mm": self.margin_mm, "start": isinstance(self.start, tuple)}
+        meant = {
+            "roi_mm": self.roi_mm,
+            "margin_mm": self.margin_mm,
+            "start": isinstance(self.start, tuple),
+            "max_bridged_mm": self.max_bridged_mm,
+        }
         return next((key for key, value in meant.items() if value), None)
 
     @property

@@ -15,6 +15,7 @@ from contour.acceptance.block_findings import other_blocks
 from contour.acceptance.error_budget import ErrorBudget, error_budget
 from contour.acceptance.findings import Finding, Limits
 from contour.acceptance.picture_findings import judge_table
+from contour.acceptance.sent_evidence import SentStretch, sent_evidence
 from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
@@ -155,10 +156,12 @@ class Measurer:
             result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour, quality=checked.quality
         )
         polygon = self._polygon(traced.contour, recipe, thickness_mm, watch)
-        sure_px = _uncertainty_px(traced, polygon)
+        sure_px = None if traced.uncertainty_px is None else polygon.bound_px(traced.uncertainty_px)
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
+        evidence = self._evidence(traced, polygon, budget, thickness_mm)
         limits = self._limits(recipe)
-        findings = judge(polygon, View((width, height), region, picture), limits, traced=checked, budget=budget)
+        view = View((width, height), region, picture)
+        findings = judge(polygon, view, limits, traced=checked, budget=budget, evidence=evidence)
         watch.lap("judge")
         return replace(
             result,
@@ -169,6 +172,7 @@ class Measurer:
             area_mm2=polygon.area_mm2,
             uncertainty_px=sure_px,
             uncertainty=budget,
+            evidence=evidence,
             findings=rejections(findings),
         )
 
@@ -217,6 +221,16 @@ class Measurer:
             mm_per_px=polygon.mm_per_px,
         )
 
+    def _evidence(
+        self, traced: Trace, polygon: Polygon, budget: ErrorBudget | None, thickness_mm: float
+    ) -> tuple[SentStretch, ...] | None:
+        calibration = self._calibration
+        if calibration is None:
+            return sent_evidence(traced, polygon, budget, None)
+        return sent_evidence(
+            traced, polygon, budget, lambda px: calibration.to_machine(calibration.to_work(px, thickness_mm))
+        )
+
     def _limits(self, recipe: Recipe) -> Limits:
         return Limits(
             min_area_mm2=recipe.min_area_mm2,
@@ -225,20 +239,11 @@ class Measurer:
             work_area_mm=self._work_area_mm,
             sure=None if self._calibration is None else self._calibration.uncertainty,
             pieces=recipe.pieces,
+            max_bridged_mm=recipe.max_bridged_mm,
+            bridge=recipe.bridge,
             max_uncertainty_mm=recipe.max_uncertainty_mm or None,
             max_disagreement_pitches=recipe.max_disagreement_pitches or None,
         )
-
-
-def _uncertainty_px(traced: Trace, polygon: Polygon) -> float | None:
-    """95 % bound on where the polygon's edges lie, px; None where tracing gives none.
-
-    What leaving vertices out shifts adds to what tracing may be off by: of neither sign, known to neither. What the
-    vertex budget gave up is of one sign, and adds in full.
-    """
-    if traced.uncertainty_px is None:
-        return None
-    return float(np.hypot(traced.uncertainty_px, polygon.shift_px)) + polygon.given_up_px
 
 
 def _checked_trace(

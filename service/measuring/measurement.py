@@ -9,9 +9,12 @@ import numpy as np
 
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
+from contour.acceptance.sent_evidence import SentStretch
 from contour.geometry.rings import Contour, Ring
 from service.measuring.calibration_guard import Rejection
 from service.reasons import Reason
+
+_STRETCH_FIELDS = ("ring", "from_px", "to_px", "from_mm", "to_mm", "state", "by", "bound_px", "bound_mm")
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,7 @@ class Measurement:
 
     pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
     has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
-    was refused (116).
+    was refused (116). evidence: what the contour rests on, stretches along its rings; None where nobody says.
     """
 
     method: str
@@ -33,6 +36,7 @@ class Measurement:
     area_mm2: float | None = None
     uncertainty_px: float | None = None
     uncertainty: ErrorBudget | None = None
+    evidence: tuple[SentStretch, ...] | None = None
     thickness_mm: float | None = None
     aligned: bool = False
     quality: Quality | None = None
@@ -61,6 +65,13 @@ class Measurement:
             return None
         width, height = np.ptp(self.millimetres.exterior, axis=0).tolist()
         return width, height
+
+    @property
+    def evidence_fields(self) -> list[dict[str, Any]] | None:
+        """The evidence as `combtrace trace --json` and documents tell it."""
+        if self.evidence is None:
+            return None
+        return [{name: getattr(stretch, name) for name in _STRETCH_FIELDS} for stretch in self.evidence]
 
     def summary(self) -> dict[str, Any]:
         """What the journal keeps of it."""

@@ -17,6 +17,7 @@ from pydantic import ValidationError
 
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
+from contour.acceptance.sent_evidence import SentStretch
 from contour.geometry.rings import Contour
 from drivers.camera import Frame
 from drivers.controller.mailbox.page_text import pages_from_text
@@ -186,7 +187,7 @@ def _plain_frame(draft: ArchivedJob) -> Frame:
 
 def _measurement(draft: ArchivedJob) -> Measurement:
     known = draft.document["measurement"]
-    quality, uncertainty = known["quality"], known["uncertainty"]
+    quality, uncertainty, evidence = known["quality"], known["uncertainty"], known.get("evidence")
     return Measurement(
         method=known["method"],
         polarity=known["polarity"],
@@ -197,6 +198,7 @@ def _measurement(draft: ArchivedJob) -> Measurement:
         area_mm2=known["area_mm2"],
         uncertainty_px=known["uncertainty_px"],
         uncertainty=None if uncertainty is None else ErrorBudget(**uncertainty),
+        evidence=None if evidence is None else tuple(SentStretch(**stretch) for stretch in evidence),
         thickness_mm=known["thickness_mm"],
         aligned=known["aligned"],
         quality=None if quality is None else Quality(**quality),

@@ -131,6 +131,7 @@ def measurement_fields(measurement: Measurement) -> dict[str, Any]:
         "area_px2": measurement.area_px2,
         "uncertainty_px": measurement.uncertainty_px,
         "uncertainty": None if measurement.uncertainty is None else asdict(measurement.uncertainty),
+        "evidence": measurement.evidence_fields,
         "reasons": [{"code": int(reason), "text": text} for reason, text in measurement.findings],
         "pixels": contour_fields(measurement.pixels),
         "millimetres": contour_fields(measurement.millimetres),

@@ -52,6 +52,7 @@ def record_of(image: Path, measurement: Measurement) -> dict[str, Any]:
         "pixels": _rings(measurement.pixels),
         "area_px2": measurement.area_px2,
         "uncertainty_px": measurement.uncertainty_px,
+        "evidence": measurement.evidence_fields,
         "frame": "machine",
         "thickness_mm": measurement.thickness_mm,
         "millimetres": _rings(measurement.millimetres),

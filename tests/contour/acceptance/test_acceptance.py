@@ -47,6 +47,7 @@ def test_codes_and_names_are_the_protocols() -> None:
         114: "uncertainty_too_large",
         115: "outside_work_area",
         116: "several_blocks",
+        117: "edge_covered",
         130: "too_many_points",
         131: "self_intersecting",
     }

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from contour.calibration.position_uncertainty import PositionUncertainty
+from contour.edge.stretches import Stretch
 from contour.errors import ParameterError, PictureError
-from contour.geometry.rings import area, hausdorff
+from contour.geometry.rings import area, hausdorff, perimeter
 from contour.synthetic import render
+from contour.tracing import tracing
 from service.config.recipes import Recipe
 from service.measuring.calibration_file import load_record
 from service.measuring.measure import Measurer, trace_settings
@@ -186,6 +188,66 @@ def test_a_method_that_is_not_built_in_is_an_error(rendered) -> None:
     recipe = RECIPE.model_copy(update={"method": "magic"})
     with pytest.raises(ParameterError):
         Measurer(None).measure(rendered.picture, recipe, 20)
+
+
+@pytest.fixture
+def half_bridged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of every traced exterior 20 px from its 30th on are told as bridged, within 5 px."""
+    method = tracing._METHODS["wall-tips"]
+
+    def told(*args, **options):
+        found = method(*args, **options)
+        around = perimeter(found.contour.exterior)
+        evidence = (
+            Stretch(0, 0.0, 30.0, "seen", None, 0.3),
+            Stretch(0, 30.0, 50.0, "bridged", "glare", 5.0),
+            Stretch(0, 50.0, around, "seen", None, 0.4),
+        )
+        return replace(found, evidence=evidence)
+
+    monkeypatch.setitem(tracing._METHODS, "wall-tips", told)
+
+
+def test_what_the_contour_rests_on_is_told_along_the_polygon_and_judged(
+    rendered, measurer: Measurer, half_bridged: None
+) -> None:
+    refused = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM)
+    assert refused.reasons == (Reason.EDGE_COVERED,)
+    assert refused.texts[0].startswith("Glare lies over 7.5 mm (20 px) of the block's edge near (")
+    assert refused.pixels is not None
+    assert refused.millimetres is not None
+    fields = refused.evidence_fields
+    assert fields is not None
+    (bridged,) = [stretch for stretch in fields if stretch["state"] == "bridged"]
+    assert list(bridged) == [
+        "ring", "from_px", "to_px", "from_mm", "to_mm", "state", "by", "bound_px", "bound_mm"
+    ]  # fmt: skip
+    assert bridged["to_mm"] - bridged["from_mm"] == pytest.approx(0.375 * 20, rel=0.05)
+    assert bridged["bound_mm"] == pytest.approx(0.385 * 5, rel=0.05)
+    assert [fields[0]["from_px"], fields[0]["from_mm"]] == [0.0, 0.0]
+    assert fields[-1]["to_px"] == pytest.approx(perimeter(refused.pixels.exterior))
+    assert fields[-1]["to_mm"] == pytest.approx(perimeter(refused.millimetres.exterior))
+
+
+def test_a_bridge_that_the_recipe_allows_is_in_the_bound_of_the_whole(
+    rendered, measurer: Measurer, half_bridged: None
+) -> None:
+    allowed = measurer.measure(rendered.picture, RECIPE.model_copy(update={"max_bridged_mm": 8.0}), THICKNESS_MM)
+    assert allowed.findings == ()
+    assert allowed.evidence is not None
+    assert allowed.uncertainty_px == max(stretch.bound_px for stretch in allowed.evidence) >= 5.0
+    assert allowed.uncertainty_mm == max(stretch.bound_mm or 0.0 for stretch in allowed.evidence)
+
+
+def test_without_a_calibration_no_length_in_millimetres_is_known_and_nothing_is_bridged(
+    rendered, half_bridged: None
+) -> None:
+    seen = Measurer(None).measure(rendered.picture, RECIPE.model_copy(update={"max_bridged_mm": 8.0}), 20)
+    assert seen.reasons == (Reason.EDGE_COVERED,)
+    assert seen.evidence_fields is not None
+    assert {(stretch["from_mm"], stretch["to_mm"], stretch["bound_mm"]) for stretch in seen.evidence_fields} == {
+        (None, None, None)
+    }
 
 
 def test_the_summary_for_the_journal_is_plain_json(rendered, measurer: Measurer) -> None:

@@ -15,6 +15,7 @@ import pytest
 
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
+from contour.acceptance.sent_evidence import SentStretch
 from drivers.camera import Frame
 from service.config.recipes import Recipe
 from service.link.contour_message import Envelope, contour_pages
@@ -37,7 +38,8 @@ TAKEN = Job(
 def evidence(job: Job = TAKEN) -> Evidence:
     """As a job has it when its pages are made."""
     quality = Quality(200.0, 60.0, 1.5, 0.8, 20.0, 0.01)
-    found = measured(uncertainty_px=0.5, uncertainty=ErrorBudget(0.1, 0.2, None), quality=quality)
+    rests_on = (SentStretch(0, 0.0, 40.0, "seen", None, 0.5), SentStretch(0, 40.0, 300.0, "covered", "object", 9.0))
+    found = measured(uncertainty_px=0.5, uncertainty=ErrorBudget(0.1, 0.2, None), quality=quality, evidence=rests_on)
     envelope = Envelope(job.job_id, 1, 60_000, 30_000, 9, 5, True)
     pages = contour_pages(found, envelope)
     return Evidence(job, Measurer(None), RECIPE, 20.0, FRAME, found, envelope, pages)
@@ -108,6 +110,7 @@ def test_after_a_restart_the_evidence_is_to_the_byte_what_it_is_without(tmp_path
     archived = load_archived(tmp_path / "killed", 7)
     assert np.array_equal(archived.frame(), FRAME.pixels)
     assert archived.document["job"]["outcome"] == "accepted"
+    assert [stretch["state"] for stretch in archived.document["measurement"]["evidence"]] == ["seen", "covered"]
 
 
 def test_without_a_draft_the_evidence_is_the_same(tmp_path: Path) -> None:

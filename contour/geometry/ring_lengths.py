@@ -1,0 +1,63 @@
+"""Places on a closed ring, told by their length along it from the first vertex on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.rings import Ring
+
+_AT_ONCE = 256
+
+
+@dataclass(frozen=True, eq=False)
+class RingLengths:
+    """A ring's vertices and edges, shape (N, 2) both, the length at which each edge begins, (N,), and the ring's own.
+
+    All in the ring's unit.
+    """
+
+    ring: Ring
+    edges: Float64s
+    starts: Float64s
+    length: float
+
+    @classmethod
+    def of(cls, ring: Ring) -> RingLengths:
+        """The lengths along a ring."""
+        edges = np.roll(ring, -1, axis=0) - ring
+        ends = np.cumsum(np.hypot(*edges.T))
+        return cls(ring, edges, np.concatenate([[0.0], ends[:-1]]), float(ends[-1]))
+
+    def places(self, lengths: Float64s) -> tuple[Indices, Float64s]:
+        """The edge on which each length from 0 to the ring's ends, and the share of the edge up to there, (M,) both."""
+        edge = np.clip(np.searchsorted(self.starts, lengths, side="right") - 1, 0, len(self.ring) - 1)
+        share = (lengths - self.starts[edge]) / self._edge_lengths(edge)
+        return edge, np.clip(share, 0.0, 1.0)
+
+    def at(self, lengths: Float64s) -> Float64s:
+        """The points at lengths, which go on around the ring, shape (M, 2)."""
+        edge, share = self.places(np.mod(lengths, self.length))
+        return np.asarray(self.ring[edge] + share[:, None] * self.edges[edge])
+
+    def along_edge(self, edge: Indices, points: Float64s) -> Float64s:
+        """The lengths at which points, shape (M, 2), are nearest to one given edge each, (M,)."""
+        long = self._edge_lengths(edge)
+        along = ((points - self.ring[edge]) * self.edges[edge]).sum(axis=1) / long
+        return np.asarray(self.starts[edge] + np.clip(along, 0.0, long))
+
+    def feet(self, points: Float64s) -> Float64s:
+        """The length at which the ring is nearest to each point, shape (M,)."""
+        nearest = np.empty(len(points), np.intp)
+        long2 = np.maximum((self.edges**2).sum(axis=1), np.finfo(float).tiny)
+        for first in range(0, len(points), _AT_ONCE):
+            offset = points[first : first + _AT_ONCE, None] - self.ring
+            share = np.clip((offset * self.edges).sum(axis=2) / long2, 0.0, 1.0)
+            apart = ((offset - share[:, :, None] * self.edges) ** 2).sum(axis=2)
+            nearest[first : first + _AT_ONCE] = apart.argmin(axis=1)
+        return self.along_edge(nearest, points)
+
+    def _edge_lengths(self, edge: Indices) -> Float64s:
+        return np.asarray(np.maximum(np.hypot(*self.edges[edge].T), np.finfo(float).tiny))

@@ -42,6 +42,11 @@ class RingLengths:
         edge, share = self.places(np.mod(lengths, self.length))
         return np.asarray(self.ring[edge] + share[:, None] * self.edges[edge])
 
+    def path(self, start: float, end: float) -> Float64s:
+        """The ring from one length to a later one, no farther on than its end: both places and the vertices between."""
+        between = self.ring[(self.starts > start) & (self.starts < end)]
+        return np.vstack([self.at(np.array([start])), between, self.at(np.array([end]))])
+
     def along_edge(self, edge: Indices, points: Float64s) -> Float64s:
         """The lengths at which points, shape (M, 2), are nearest to one given edge each, (M,)."""
         long = self._edge_lengths(edge)

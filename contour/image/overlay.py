@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s, Int32s
+from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring
 from contour.image import opencv as _cv
 from contour.image.picture_check import check_picture
@@ -19,6 +20,7 @@ ACCEPTED: Colour = (80, 220, 60)
 REFUSED: Colour = (60, 60, 240)
 HOLE: Colour = (230, 170, 40)
 VERTEX: Colour = (40, 220, 250)
+DOUBTED: Colour = (85, 138, 255)
 """Blue, green, red. Readable on both dark and bright, and apart for people who tell red from green poorly."""
 
 _TEXT: Colour = (235, 235, 235)
@@ -35,6 +37,22 @@ _VEIL = 0.35
 _MOST_MARKS = 400
 """More vertices than this are a line of dots: they are left out."""
 
+_DASH_PX = 20.0
+"""From dash to dash, on a picture of `_UNIT_PX`."""
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A part of a contour's ring (0 the exterior, holes follow) that was not seen, by lengths from its first vertex on.
+
+    Where it is not covered it is bridged.
+    """
+
+    ring: int
+    from_px: float
+    to_px: float
+    covered: bool
+
 
 def draw_overlay(
     picture: Bytes,
@@ -45,6 +63,7 @@ def draw_overlay(
     marks: bool = True,
     uncertainty_px: float | None = None,
     others_px: Sequence[Ring] = (),
+    hidden: Sequence[Hidden] = (),
 ) -> Bytes:
     """The picture as BGR, shape (H, W, 3), with the contour, its vertices and lines of text; the input stays as it is.
 
@@ -52,7 +71,8 @@ def draw_overlay(
 
     Exterior green, or red where `refused`, holes blue, vertices yellow (without `marks` none). The first caption line
     is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `others_px`,
-    outlines of what lies besides, are drawn like the exterior, without vertices. Raises PictureError.
+    outlines of what lies besides, are drawn like the exterior, without vertices. Of `hidden` parts bridged ones are
+    dashed, covered ones red and wide; the rest of a refused exterior then is orange. Raises PictureError.
     """
     check_picture(picture)
     canvas = _cv.bgr(picture)
@@ -67,7 +87,10 @@ def draw_overlay(
             _draw_band(canvas, contour_px, uncertainty_px, unit)
         for hole in contour_px.holes:
             _draw_ring(canvas, hole, HOLE, unit)
-        _draw_ring(canvas, contour_px.exterior, REFUSED if refused else ACCEPTED, unit)
+        doubted = any(part.covered for part in hidden)
+        _draw_ring(canvas, contour_px.exterior, (DOUBTED if doubted else REFUSED) if refused else ACCEPTED, unit)
+        for part in hidden:
+            _draw_hidden(canvas, RingLengths.of(contour_px.rings[part.ring]), part, unit)
         if marks and contour_px.point_count <= _MOST_MARKS:
             for ring in contour_px.rings:
                 _mark_vertices(canvas, ring, unit)
@@ -88,6 +111,24 @@ def _draw_ring(canvas: Bytes, ring: Ring, colour: Colour, unit: float) -> None:
     # A dark line below keeps the colour visible on bright walls.
     for tone, thickness in (((0, 0, 0), width + 2), (colour, width)):
         cv2.polylines(canvas, [points], True, tone, thickness, cv2.LINE_AA, _FRACTION_BITS)
+
+
+def _draw_hidden(canvas: Bytes, ring: RingLengths, part: Hidden, unit: float) -> None:
+    """Over the line of its ring."""
+    if part.covered:
+        _draw_path(canvas, ring.path(part.from_px, part.to_px), (0, 0, 0), 2 * _line_width(unit) + 2)
+        _draw_path(canvas, ring.path(part.from_px, part.to_px), REFUSED, 2 * _line_width(unit))
+        return
+    count = max(round((part.to_px - part.from_px) / (_DASH_PX * unit)), 1)
+    # Gaps are drawn: a quarter of the way each, which the line's round ends make longer.
+    ends = np.linspace(part.from_px, part.to_px, 8 * count + 1)
+    for start, end in zip(ends[3::8].tolist(), ends[5::8].tolist(), strict=True):
+        _draw_path(canvas, ring.path(start, end), (0, 0, 0), _line_width(unit) + 2)
+
+
+def _draw_path(canvas: Bytes, path: Float64s, colour: Colour, width: int) -> None:
+    points = _fixed_point(path).reshape(-1, 1, 2)
+    cv2.polylines(canvas, [points], False, colour, width, cv2.LINE_AA, _FRACTION_BITS)
 
 
 def _draw_band(canvas: Bytes, contour_px: Contour, half_px: float, unit: float) -> None:

@@ -11,6 +11,7 @@ from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
 from contour.acceptance.sent_evidence import SentStretch
 from contour.geometry.rings import Contour, Ring
+from contour.image.overlay import Hidden
 from service.measuring.calibration_guard import Rejection
 from service.reasons import Reason
 
@@ -72,6 +73,12 @@ class Measurement:
         if self.evidence is None:
             return None
         return [{name: getattr(stretch, name) for name in _STRETCH_FIELDS} for stretch in self.evidence]
+
+    @property
+    def hidden(self) -> list[Hidden]:
+        """The parts of the contour that were not seen, for an overlay."""
+        parts = [stretch for stretch in self.evidence or () if stretch.state != "seen"]
+        return [Hidden(part.ring, part.from_px, part.to_px, part.state == "covered") for part in parts]
 
     def summary(self) -> dict[str, Any]:
         """What the journal keeps of it."""

@@ -78,6 +78,12 @@ class ArchivedJob:
             return None
         return Contour(np.array(found["exterior"]), tuple(np.array(hole) for hole in found["holes"]))
 
+    @property
+    def evidence(self) -> tuple[SentStretch, ...] | None:
+        """What the polygon rests on; None where nobody said, as in documents of earlier versions."""
+        found = self.document["measurement"].get("evidence")
+        return None if found is None else tuple(SentStretch(**stretch) for stretch in found)
+
     @cached_property
     def recipe_settings(self) -> dict[str, Any]:
         """The recipe's whole settings."""
@@ -187,7 +193,7 @@ def _plain_frame(draft: ArchivedJob) -> Frame:
 
 def _measurement(draft: ArchivedJob) -> Measurement:
     known = draft.document["measurement"]
-    quality, uncertainty, evidence = known["quality"], known["uncertainty"], known.get("evidence")
+    quality, uncertainty = known["quality"], known["uncertainty"]
     return Measurement(
         method=known["method"],
         polarity=known["polarity"],
@@ -198,7 +204,7 @@ def _measurement(draft: ArchivedJob) -> Measurement:
         area_mm2=known["area_mm2"],
         uncertainty_px=known["uncertainty_px"],
         uncertainty=None if uncertainty is None else ErrorBudget(**uncertainty),
-        evidence=None if evidence is None else tuple(SentStretch(**stretch) for stretch in evidence),
+        evidence=draft.evidence,
         thickness_mm=known["thickness_mm"],
         aligned=known["aligned"],
         quality=None if quality is None else Quality(**quality),

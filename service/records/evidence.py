@@ -164,6 +164,7 @@ def overlay_bytes(frame: Frame, measurement: Measurement) -> bytes:
         refused=bool(measurement.findings),
         uncertainty_px=measurement.uncertainty_px,
         others_px=measurement.other_blocks_px,
+        hidden=measurement.hidden,
     )
     height, width = drawn.shape[:2]
     scale = OVERLAY_PX / max(height, width)

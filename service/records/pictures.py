@@ -26,6 +26,7 @@ def write_overlay(path: Path, picture: NDArray[np.uint8], measurement: Measureme
         refused=refused,
         uncertainty_px=measurement.uncertainty_px,
         others_px=measurement.other_blocks_px,
+        hidden=measurement.hidden,
     )
     write_picture(path, drawn)
 

@@ -1,4 +1,4 @@
-"""What is drawn over a job's frame: its contour in pixels, the band of its uncertainty, fixed marks, and millimetres.
+"""What is drawn over a job's frame: its contour, what of it was hidden, its uncertainty, fixed marks, and millimetres.
 
 All in pixels of the full frame, (0, 0) the centre of the top-left one.
 """
@@ -7,19 +7,22 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
+from contour.acceptance.sent_evidence import SentStretch
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
 from contour.geometry.arrays import Float64s
+from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, area
 from service.measuring.calibration_file import CalibrationFileError, CalibrationRecord, record_of
 from service.records.archived_job import ArchivedJob, EvidenceError
-from service.web.models import Axis, Drawing, Grid, SentinelMark
+from service.web.models import Axis, Drawing, Grid, HiddenPart, SentinelMark
 
 GRID_COLUMNS, GRID_ROWS = 33, 25  # a browser interpolates between them: docs/how-to/operators-guide.md says how well
 LINES_WANTED = 10
@@ -44,6 +47,7 @@ def drawing(archived: ArchivedJob) -> Drawing:
         refused=document["job"]["outcome"] not in ("accepted", "written"),
         exterior=_pairs(pixels.exterior) if pixels else [],
         holes=[_pairs(hole) for hole in pixels.holes] if pixels else [],
+        hidden=_hidden(archived.evidence or (), pixels) if measured and pixels else [],
         band_px=_band_px(measured["uncertainty_mm"] if measured else None, pixels, millimetres),
         size_mm=None if millimetres is None else _size(millimetres),
         sentinels=list(backdrop.sentinels),
@@ -78,6 +82,15 @@ def _backdrop(calibration: str, width: int, height: int, thickness_mm: float) ->
 
 def _pairs(points: Float64s) -> list[tuple[float, float]]:
     return [(round(float(x), 2), round(float(y), 2)) for x, y in points]
+
+
+def _hidden(evidence: Sequence[SentStretch], pixels: Contour) -> list[HiddenPart]:
+    rings = [RingLengths.of(ring) for ring in pixels.rings]
+    return [
+        HiddenPart(covered=part.state == "covered", points=_pairs(rings[part.ring].path(part.from_px, part.to_px)))
+        for part in evidence
+        if part.state != "seen"
+    ]
 
 
 def _size(millimetres: Contour) -> tuple[float, float]:

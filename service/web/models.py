@@ -198,6 +198,13 @@ class SentinelMark(Answer):
     corners: Points
 
 
+class HiddenPart(Answer):
+    """A part of the contour that was not seen: a line of points, bridged where it is not covered."""
+
+    covered: bool
+    points: Points
+
+
 class Drawing(Answer):
     """What is drawn over a job's frame, in its pixels; (0, 0) is the centre of the top-left one."""
 
@@ -207,6 +214,7 @@ class Drawing(Answer):
     refused: bool
     exterior: Points
     holes: list[Points]
+    hidden: list[HiddenPart]
     band_px: float | None = Field(description="What the contour may be off by.")
     size_mm: tuple[float, float] | None
     sentinels: list[SentinelMark]

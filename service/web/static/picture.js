@@ -46,12 +46,17 @@ export function show(next, address) {
   setTimeout(swap, MOST_WAIT_MS);
 }
 
+function line(points) {
+  return `M${points.map(([x, y]) => `${x} ${y}`).join("L")}`;
+}
+
 function path(points) {
-  return `M${points.map(([x, y]) => `${x} ${y}`).join("L")}Z`;
+  return `${line(points)}Z`;
 }
 
 function contour() {
-  const group = draw("g", { class: drawing.refused ? "refused" : "" });
+  const told = drawing.hidden.length ? "told" : "";
+  const group = draw("g", { class: drawing.refused ? `refused ${told}` : "" });
   for (const mark of drawing.sentinels) group.append(draw("path", { class: "sentinel", d: path(mark.corners) }));
   const rings = [drawing.exterior, ...drawing.holes].filter((ring) => ring.length);
   if (!rings.length) return group;
@@ -60,6 +65,7 @@ function contour() {
   group.append(draw("path", { class: "under", d: all }));
   for (const hole of drawing.holes) group.append(draw("path", { class: "hole", d: path(hole) }));
   group.append(draw("path", { class: "exterior", d: path(drawing.exterior) }));
+  for (const { covered, points } of drawing.hidden) group.append(draw("path", { class: covered ? "covered" : "bridged", d: line(points) }));
   const corners = rings.flat();
   if (corners.length <= MOST_MARKS) group.append(draw("path", { class: "vertices", d: corners.map(([x, y]) => `M${x} ${y}h0`).join("") }));
   return group;

@@ -30,6 +30,12 @@ def test_along_one_edge_it_ends_where_the_edge_does() -> None:
     assert RingLengths.of(SQUARE).along_edge(edge, points).tolist() == [10.0, 14.0, 20.0]
 
 
+def test_a_path_has_both_ends_and_the_vertices_between() -> None:
+    square = RingLengths.of(SQUARE)
+    assert square.path(4.0, 22.0).tolist() == [[4, 0], [10, 0], [10, 10], [8, 10]]
+    assert square.path(30.0, 40.0).tolist() == [[0, 10], [0, 0]]
+
+
 def test_a_vertex_given_twice_does_no_harm() -> None:
     ring = RingLengths.of(SQUARE[[0, 1, 1, 2, 3]])
     assert ring.at(np.array([10.0, 15.0])).tolist() == [[10, 0], [10, 5]]

@@ -4,7 +4,7 @@ import pytest
 
 from contour.errors import PictureError
 from contour.geometry.rings import Contour
-from contour.image.overlay import ACCEPTED, HOLE, REFUSED, VERTEX, draw_overlay
+from contour.image.overlay import ACCEPTED, DOUBTED, HOLE, REFUSED, VERTEX, Hidden, draw_overlay
 from tests.support.pictures.rings import SQUARE
 
 OUTLINE = Contour(SQUARE * [50, 30] + [150.0, 150.0], (SQUARE[::-1] * 8 + [300.0, 250.0],))
@@ -112,3 +112,21 @@ def test_what_lies_beside_is_outlined_too_without_vertices() -> None:
     assert near(drawn, 400, 150, REFUSED)
     assert near(drawn, 725, 150, REFUSED)
     assert not near(drawn, 700, 150, VERTEX, reach=4)
+
+
+def test_of_hidden_parts_covered_ones_are_red_and_bridged_ones_dashed() -> None:
+    """The exterior's first edge runs from (150, 150) to the right, the hole's from (300, 330)."""
+    parts = [Hidden(0, 100.0, 200.0, True), Hidden(0, 300.0, 400.0, False), Hidden(1, 0.0, 60.0, True)]
+    blank = np.zeros((600, 800), np.uint8)
+    drawn = draw_overlay(blank, OUTLINE, refused=True, hidden=parts, marks=False)
+    assert near(drawn, 300, 150, REFUSED, reach=1)
+    assert near(drawn, 200, 150, DOUBTED, reach=1)
+    assert near(drawn, 330, 330, REFUSED, reach=1)
+    assert near(drawn, 370, 330, HOLE, reach=1)
+    dashes = drawn[150, 451:550].max(axis=1) > 128
+    assert np.count_nonzero(np.diff(dashes.astype(int))) == 10
+    assert 0.3 < dashes.mean() < 0.7
+    assert dashes[0]
+    assert dashes[-1]
+    assert near(draw_overlay(blank, OUTLINE, refused=True, hidden=parts[1:2]), 200, 150, REFUSED, reach=1)
+    assert near(draw_overlay(blank, OUTLINE, hidden=parts[1:2]), 200, 150, ACCEPTED, reach=1)

@@ -75,6 +75,28 @@ def test_size_and_band_are_the_contours() -> None:
     assert shown.band_px == pytest.approx(2 * px_per_mm, rel=0.02)
 
 
+def test_hidden_parts_are_lines_along_the_contour_in_pixels() -> None:
+    document = archived().document["measurement"]
+    corners = np.array(document["pixels"]["exterior"])
+    half, side = (math.dist(corners[0], corners[1]) * share for share in (0.5, 1.0))
+    common = {"ring": 0, "by": "object", "bound_px": 1.0, "from_mm": None, "to_mm": None, "bound_mm": None}
+    evidence = [
+        {**common, "from_px": 0.0, "to_px": half, "state": "seen"},
+        {**common, "from_px": half, "to_px": side + 10.0, "state": "covered"},
+        {**common, "from_px": side + 10.0, "to_px": side + 20.0, "state": "bridged"},
+    ]
+    covered, bridged = drawing(archived(measurement={**document, "evidence": evidence})).hidden
+    assert (covered.covered, bridged.covered) == (True, False)
+    along = (corners[2] - corners[1]) / math.dist(corners[1], corners[2])
+    ends = [corners[:2].mean(axis=0), corners[1], corners[1] + 10 * along, corners[1] + 20 * along]
+    assert np.array([*covered.points, bridged.points[1]]) == pytest.approx(np.array(ends), abs=0.01)
+    assert bridged.points[0] == covered.points[-1]
+
+
+def test_a_document_that_says_nothing_of_hidden_parts_has_none() -> None:
+    assert drawing(archived()).hidden == []
+
+
 def test_without_calibration_or_contour_the_frame_is_shown_alone() -> None:
     shown = drawing(archived(calibration=None, measurement=None, job={"outcome": "refused"}))
     assert (shown.grid, shown.axes, shown.exterior, shown.band_px, shown.size_mm, shown.refused) == (

@@ -231,6 +231,24 @@ def test_a_contour_whose_frame_does_not_come_is_shown_without_one(panel: Panel, 
         route.abort()
 
 
+def test_hidden_parts_of_the_edge_are_told_from_what_was_seen(panel: Panel) -> None:
+    """Seen is solid, bridged dashed, covered red, also where the contour was refused for it."""
+    page = panel.page
+    parts = [{"covered": covered, "points": [[300, y], [500, y]]} for covered, y in ((False, 200), (True, 300))]
+
+    def with_parts(route: Route) -> None:
+        drawing = route.fetch().json()
+        route.fulfill(json={**drawing, "refused": True, "hidden": parts})
+
+    page.route("**/drawing", with_parts)
+    panel.ordered()
+    expect(page.locator("#view path.covered")).to_have_attribute("d", "M300 300L500 300")
+    expect(page.locator("#view path.covered")).to_have_css("stroke", "rgb(242, 32, 46)")
+    expect(page.locator("#view path.bridged")).to_have_attribute("d", "M300 200L500 200")
+    expect(page.locator("#view path.bridged")).to_have_css("stroke-dasharray", "6px, 6px")
+    expect(page.locator("#view path.exterior")).to_have_css("stroke-dasharray", "none")
+
+
 def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:
     page = panel.page
     number = panel.ordered()

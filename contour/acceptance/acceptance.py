@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from contour.acceptance.block_findings import (
@@ -27,7 +26,7 @@ from contour.acceptance.polygon_findings import (
     too_many_points,
     too_unsure,
 )
-from contour.acceptance.sent_evidence import SentStretch
+from contour.acceptance.sent_evidence import ToMillimetres
 from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour, area, contour_defect
@@ -51,13 +50,13 @@ def judge(
     *,
     traced: CheckedTrace | None = None,
     budget: ErrorBudget | None = None,
-    evidence: Sequence[SentStretch] | None = None,
+    to_mm: ToMillimetres | None = None,
 ) -> tuple[Finding, ...]:
     """Every reason to refuse the polygon, lowest code first; empty = accepted.
 
     `traced`, what the polygon was made of, adds what was seen besides. Where there is a limit to the uncertainty in
-    millimetres, a `budget` of None (nobody knows it) is refused as one too large. `evidence` is what the polygon rests
-    on, None = its method does not say. Where cells turn out to be none, the
+    millimetres, a `budget` of None (nobody knows it) is refused as one too large. `to_mm` is the
+    calibration, where there is one. Where cells turn out to be none, the
     view's picture is judged as a whole, too: by a pitch that is none nothing looks blurred.
     """
     trace = traced.trace if traced else None
@@ -78,7 +77,7 @@ def judge(
         outside_work_area(polygon.millimetres, limits.work_area_mm),
         outside_calibration(polygon.pixels, limits.sure),
         several_blocks(trace, limits),
-        edge_covered(evidence, polygon, limits),
+        edge_covered(trace, to_mm, limits),
         too_many_points(polygon.pixels, limits.max_vertices),
         not_cuttable(polygon),
     ]

@@ -9,10 +9,10 @@ from itertools import groupby
 import numpy as np
 
 from contour.acceptance.findings import Finding, Limits, Refusal
-from contour.acceptance.sent_evidence import SentStretch
+from contour.acceptance.sent_evidence import ToMillimetres
+from contour.edge.stretches import Stretch
 from contour.geometry.ring_lengths import RingLengths
-from contour.geometry.rings import Ring
-from contour.polygon.polygon import Polygon
+from contour.tracing.trace import Trace
 
 _HIDERS = {
     "object": ("An object lies", "Take it away."),
@@ -27,7 +27,9 @@ _HIDERS = {
 class _Run:
     """Hidden stretches that follow one another on a ring, also across its first vertex: one hidden part of the edge."""
 
-    stretches: tuple[SentStretch, ...]
+    stretches: tuple[Stretch, ...]
+    ring: RingLengths
+    to_mm: ToMillimetres | None
 
     @property
     def length_px(self) -> float:
@@ -35,8 +37,10 @@ class _Run:
 
     @property
     def length_mm(self) -> float | None:
-        lengths = [s.to_mm - s.from_mm for s in self.stretches if s.to_mm is not None and s.from_mm is not None]
-        return sum(lengths) if len(lengths) == len(self.stretches) else None
+        if self.to_mm is None:
+            return None
+        paths = [self.to_mm(self.ring.path(stretch.from_px, stretch.to_px)) for stretch in self.stretches]
+        return float(sum(np.hypot(*np.diff(path, axis=0).T).sum() for path in paths))
 
     @property
     def by(self) -> str | None:
@@ -47,56 +51,48 @@ class _Run:
         """Why it is not to be bridged; None where it is."""
         if any(stretch.state == "covered" for stretch in self.stretches):
             return "how it runs below cannot be told"
-        if self.length_mm is None or self.length_mm > limits.max_bridged_mm:
+        length_mm = self.length_mm
+        if length_mm is None or length_mm > limits.max_bridged_mm:
             return f"the recipe allows {limits.max_bridged_mm:g} mm to be bridged"
         if limits.bridge == "straight" and not all(stretch.straight for stretch in self.stretches):
             return "it is not straight there, and the recipe has straight edges bridged alone"
         return None
 
+    def __str__(self) -> str:
+        """How long it is, and where its middle lies, in pixels, and in millimetres where they are known."""
+        number = self.stretches[0].ring
+        middle = self.ring.at(np.array([self.stretches[0].from_px + self.length_px / 2]))
+        long, (x, y) = f"{self.length_px:.0f} px", middle[0]
+        place = f"({x:.0f}, {y:.0f}) px"
+        if self.to_mm is not None:
+            x, y = self.to_mm(middle)[0]
+            long, place = f"{self.length_mm:.1f} mm ({long})", f"{place}, ({x:.1f}, {y:.1f}) mm"
+        edge = f"the edge of hole {number}" if number else "the block's edge"
+        return f"{long} of {edge} near {place}"
 
-def edge_covered(evidence: Sequence[SentStretch] | None, polygon: Polygon, limits: Limits) -> Finding | None:
+
+def edge_covered(traced: Trace | None, to_mm: ToMillimetres | None, limits: Limits) -> Finding | None:
     """Parts of the edge that are hidden and not to be bridged, or not over that length."""
-    runs = [run for run in _hidden_runs(evidence or ()) if run.objection(limits)]
+    if traced is None or traced.evidence is None:
+        return None
+    runs = [run for run in _hidden_runs(traced, traced.evidence, to_mm) if run.objection(limits)]
     if not runs:
         return None
     worst = max(runs, key=lambda run: run.length_px)
     what, advice = _HIDERS[worst.by]
-    ring = worst.stretches[0].ring
-    edge = f"the edge of hole {ring}" if ring else "the block's edge"
     more = f", and {len(runs) - 1} more" if runs[1:] else ""
-    seen = f"{what} over {_long(worst)} of {edge} near {_place(worst, polygon)}{more}"
-    return Finding(Refusal.EDGE_COVERED, f"{seen}: {worst.objection(limits)}. {advice}")
+    return Finding(Refusal.EDGE_COVERED, f"{what} over {worst}{more}: {worst.objection(limits)}. {advice}")
 
 
-def _hidden_runs(evidence: Sequence[SentStretch]) -> list[_Run]:
+def _hidden_runs(traced: Trace, evidence: Sequence[Stretch], to_mm: ToMillimetres | None) -> list[_Run]:
     found = []
-    for _, ring in groupby(evidence, key=lambda stretch: stretch.ring):
+    for number, ring in groupby(evidence, key=lambda stretch: stretch.ring):
         groups = [
             (hidden, tuple(group)) for hidden, group in groupby(ring, key=lambda stretch: stretch.state != "seen")
         ]
         if len(groups) > 1 and groups[0][0] and groups[-1][0]:
             # The ring goes on behind its first vertex.
             groups[0] = (True, groups.pop()[1] + groups[0][1])
-        found += [_Run(stretches) for hidden, stretches in groups if hidden]
+        lengths = RingLengths.of(traced.contour.rings[number])
+        found += [_Run(stretches, lengths, to_mm) for hidden, stretches in groups if hidden]
     return found
-
-
-def _long(run: _Run) -> str:
-    pixels = f"{run.length_px:.0f} px"
-    return pixels if run.length_mm is None else f"{run.length_mm:.1f} mm ({pixels})"
-
-
-def _place(run: _Run, polygon: Polygon) -> str:
-    """The middle of the run, in pixels, and in millimetres of the machine frame where they are known."""
-    first = run.stretches[0]
-    x, y = _middle(polygon.pixels.rings[first.ring], first.from_px, run.length_px)
-    told = f"({x:.0f}, {y:.0f}) px"
-    if polygon.millimetres is not None and first.from_mm is not None and run.length_mm is not None:
-        x, y = _middle(polygon.millimetres.rings[first.ring], first.from_mm, run.length_mm)
-        told += f", ({x:.1f}, {y:.1f}) mm"
-    return told
-
-
-def _middle(ring: Ring, start: float, long: float) -> tuple[float, float]:
-    x, y = RingLengths.of(ring).at(np.array([start + long / 2]))[0].tolist()
-    return x, y

@@ -94,7 +94,7 @@ class Recipe(Model):
         0, ge=0, le=1000, description="Longest hidden part of the edge that may be bridged, mm; 0 = none."
     )
     bridge: Literal["straight", "arcs"] = Field(
-        "straight", description="straight: of straight edges alone; arcs: of arcs and curves, too."
+        "straight", description="straight: only straight edges are bridged; arcs: arcs and curves, too."
     )
     roi_px: tuple[Number, ...] = Field(
         (), description="Nothing is seen outside of it: left, top, right, bottom, px; none = the whole picture."

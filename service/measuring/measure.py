@@ -15,7 +15,7 @@ from contour.acceptance.block_findings import other_blocks
 from contour.acceptance.error_budget import ErrorBudget, error_budget
 from contour.acceptance.findings import Finding, Limits
 from contour.acceptance.picture_findings import judge_table
-from contour.acceptance.sent_evidence import SentStretch, sent_evidence
+from contour.acceptance.sent_evidence import ToMillimetres, sent_evidence
 from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
@@ -26,7 +26,7 @@ from contour.image.region import Region
 from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
-from contour.tracing.trace import Trace, TraceSettings
+from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from service.config.recipes import Recipe
 from service.measuring.calibration_guard import CalibrationGuard, Rejection
@@ -158,10 +158,10 @@ class Measurer:
         polygon = self._polygon(traced.contour, recipe, thickness_mm, watch)
         sure_px = None if traced.uncertainty_px is None else polygon.bound_px(traced.uncertainty_px)
         budget = self._budget(polygon, recipe, thickness_mm, sure_px)
-        evidence = self._evidence(traced, polygon, budget, thickness_mm)
+        to_mm = self._to_mm(thickness_mm)
         limits = self._limits(recipe)
         view = View((width, height), region, picture)
-        findings = judge(polygon, view, limits, traced=checked, budget=budget, evidence=evidence)
+        findings = judge(polygon, view, limits, traced=checked, budget=budget, to_mm=to_mm)
         watch.lap("judge")
         return replace(
             result,
@@ -172,7 +172,7 @@ class Measurer:
             area_mm2=polygon.area_mm2,
             uncertainty_px=sure_px,
             uncertainty=budget,
-            evidence=evidence,
+            evidence=sent_evidence(traced, polygon, budget, to_mm),
             findings=rejections(findings),
         )
 
@@ -221,15 +221,11 @@ class Measurer:
             mm_per_px=polygon.mm_per_px,
         )
 
-    def _evidence(
-        self, traced: Trace, polygon: Polygon, budget: ErrorBudget | None, thickness_mm: float
-    ) -> tuple[SentStretch, ...] | None:
+    def _to_mm(self, thickness_mm: float) -> ToMillimetres | None:
         calibration = self._calibration
         if calibration is None:
-            return sent_evidence(traced, polygon, budget, None)
-        return sent_evidence(
-            traced, polygon, budget, lambda px: calibration.to_machine(calibration.to_work(px, thickness_mm))
-        )
+            return None
+        return lambda pixels: calibration.to_machine(calibration.to_work(pixels, thickness_mm))
 
     def _limits(self, recipe: Recipe) -> Limits:
         return Limits(

@@ -55,9 +55,9 @@ def judge(
     """Every reason to refuse the polygon, lowest code first; empty = accepted.
 
     `traced`, what the polygon was made of, adds what was seen besides. Where there is a limit to the uncertainty in
-    millimetres, a `budget` of None (nobody knows it) is refused as one too large. `to_mm` is the
-    calibration, where there is one. Where cells turn out to be none, the
-    view's picture is judged as a whole, too: by a pitch that is none nothing looks blurred.
+    millimetres, a `budget` of None (nobody knows it) is refused as one too large. `to_mm` is None without a
+    calibration. Where cells turn out to be none, the view's picture is judged as a whole, too: by a pitch that is none
+    nothing looks blurred.
     """
     trace = traced.trace if traced else None
     # With a margin the polygon may well leave the picture; what was seen may not.

@@ -162,6 +162,7 @@ class Measurer:
         limits = self._limits(recipe)
         view = View((width, height), region, picture)
         findings = judge(polygon, view, limits, traced=checked, budget=budget, to_mm=to_mm)
+        evidence = sent_evidence(traced, polygon, budget, to_mm)
         watch.lap("judge")
         return replace(
             result,
@@ -172,7 +173,7 @@ class Measurer:
             area_mm2=polygon.area_mm2,
             uncertainty_px=sure_px,
             uncertainty=budget,
-            evidence=sent_evidence(traced, polygon, budget, to_mm),
+            evidence=evidence,
             findings=rejections(findings),
         )
 

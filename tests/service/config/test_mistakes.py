@@ -66,6 +66,7 @@ def told(tmp_path: Path, *, camera: str = "", period: str = "1", recipe: str = "
         ({"recipe": "    roi_px: [a, 0, 9, 9]"}, "line 14: recipes[1].roi_px[0]: seen 'a', expected a number"),
         ({"recipe": "    margin_mm: 2"}, "calibration is missing: a recipe's margin_mm needs millimetres"),
         ({"recipe": "    start: [0, 0]"}, "calibration is missing: a recipe's start needs millimetres"),
+        ({"recipe": "    max_bridged_mm: 5"}, "calibration is missing: a recipe's max_bridged_mm needs millimetres"),
     ],
 )
 def test_a_mistake_names_line_and_key_and_says_what_is_expected(

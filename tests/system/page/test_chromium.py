@@ -247,6 +247,7 @@ def test_hidden_parts_of_the_edge_are_told_from_what_was_seen(panel: Panel) -> N
     expect(page.locator("#view path.bridged")).to_have_attribute("d", "M300 200L500 200")
     expect(page.locator("#view path.bridged")).to_have_css("stroke-dasharray", "6px, 6px")
     expect(page.locator("#view path.exterior")).to_have_css("stroke-dasharray", "none")
+    page.unroute_all(behavior="wait")
 
 
 def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:

@@ -1,7 +1,7 @@
 """Renders a block of known outline through a known camera: truth for tests, demo, bench and docs.
 
-What it does not model: a lens's blur beyond a Gaussian, interreflection between foils, walls bent or crushed at the
-cut, rolling shutter, colour filter mosaics.
+What it does not model: a lens's blur beyond a Gaussian, interreflection between foils, rolling shutter, colour filter
+mosaics.
 """
 
 from contour.synthetic.camera import CameraModel, camera_above, densified
@@ -19,22 +19,34 @@ from contour.synthetic.outlines import (
     polygon,
     rectangle,
     signed_distance,
+    thick_line,
     u_shape,
     with_holes,
 )
 from contour.synthetic.rendering import Rendered, pitch_px, render, truth_px
 from contour.synthetic.scene import Clutter, Light, Material, Scene, Sensor, Table
+from contour.synthetic.things import Cover, Crush, Filling, Flare, Ink, Mirror, Shade, Strip, Structure, Thing
 
 __all__ = [
     "CameraModel",
     "CellGeometry",
     "Clutter",
+    "Cover",
+    "Crush",
+    "Filling",
+    "Flare",
+    "Ink",
     "Light",
     "Material",
+    "Mirror",
     "Rendered",
     "Scene",
     "Sensor",
+    "Shade",
+    "Strip",
+    "Structure",
     "Table",
+    "Thing",
     "area_coverage",
     "blob",
     "broken_off",
@@ -51,6 +63,7 @@ __all__ = [
     "rectangle",
     "render",
     "signed_distance",
+    "thick_line",
     "truth_px",
     "u_shape",
     "with_holes",

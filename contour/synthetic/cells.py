@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from contour.errors import ParameterError
-from contour.geometry.arrays import Float32s, Float64s, Int32s
+from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s
 
 CellKind = Literal["honeycomb", "irregular", "foam", "perforated", "solid"]
 
@@ -88,6 +88,8 @@ class Lattice:
     tone: Float32s
     shift: Float32s
     cell: Float32s
+    filled: Bytes | None = None
+    """For each cell what fills it, 0 = nothing; None where nothing fills any."""
 
     def index(self, i: Float32s, j: Float32s) -> Int32s:
         """Row of the tables for the cell (i, j)."""
@@ -111,6 +113,8 @@ class WallField:
     tone: Float32s
     cell: Float32s
     lean: Float32s
+    filled: Bytes | None = None
+    """What fills the cell that the point lies in, 0 = nothing."""
 
 
 def lattice_coordinates(geometry: CellGeometry, x_mm: Float64s, y_mm: Float64s, seed: int) -> tuple[Float64s, Float64s]:
@@ -278,7 +282,7 @@ def _hexagons(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s
         distance, wall = np.where(better, gap, distance), np.where(better, owner, wall)
         half = np.where(better, width, half)
     distance = np.where(best < -500.0, np.float32(1e3), distance)
-    return WallField(distance, half, lattice.tone.ravel()[wall], lattice.cell[here], dx - dy)
+    return WallField(distance, half, lattice.tone.ravel()[wall], lattice.cell[here], dx - dy, _of(lattice.filled, here))
 
 
 def _holes(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s) -> WallField:
@@ -334,7 +338,11 @@ def _voronoi(geometry: CellGeometry, lattice: Lattice, x: Float32s, y: Float32s)
     tone = lattice.tone[pair, 1]
     half = np.float32(0.5 * geometry.wall_mm) * (np.float32(0.6) + np.float32(0.8) * lattice.cell[pair])
     lean = (dx - at[1][0]) - (dy - at[1][1])
-    return WallField(distance.astype(np.float32), half, tone, lattice.cell[id1], lean)
+    return WallField(distance.astype(np.float32), half, tone, lattice.cell[id1], lean, _of(lattice.filled, id1))
+
+
+def _of(table: Bytes | None, cell: Int32s) -> Bytes | None:
+    return None if table is None else table[cell]
 
 
 def lattice_centres(geometry: CellGeometry, lattice: Lattice) -> Float64s:

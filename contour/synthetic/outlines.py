@@ -125,6 +125,19 @@ def broken_off(contour: Contour, start: float, end: float, depth: float, seed: i
     return Contour(np.concatenate((kept[:after], [a], torn, [b], kept[after:])), contour.holes)
 
 
+def thick_line(points: Sequence[Point], width: float) -> Contour:
+    """The area of a line of this width through points, its ends round."""
+    path = np.array(points, dtype=np.float64)
+    along = np.gradient(path, axis=0)
+    along /= np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-9)[:, None]
+    normal = np.column_stack((-along[:, 1], along[:, 0]))
+    angle = np.linspace(0.0, math.pi, 9)[1:-1, None]
+    end = path[-1] + 0.5 * width * (np.sin(angle) * along[-1] - np.cos(angle) * normal[-1])
+    start = path[0] + 0.5 * width * (np.cos(angle) * normal[0] - np.sin(angle) * along[0])
+    sides = (path - 0.5 * width * normal, (path + 0.5 * width * normal)[::-1])
+    return Contour(_oriented(np.concatenate((sides[0], end, sides[1], start)), 1.0))
+
+
 def with_holes(contour: Contour, *holes: Ring) -> Contour:
     """The contour with more holes."""
     return Contour(contour.exterior, (*contour.holes, *(_oriented(hole, -1.0) for hole in holes)))

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float32s
+from contour.geometry.arrays import Bools, Bytes, Float32s
 from contour.geometry.rings import Contour
 from contour.synthetic.camera import CameraModel
 from contour.synthetic.depth import Relief, relief
 from contour.synthetic.scene import Scene
 from contour.synthetic.sensor import dust, expose, illumination, patches
+from contour.synthetic.shop_floor.covers import lay_covers, visible
+from contour.synthetic.shop_floor.lights import add_flares, shaded
+from contour.synthetic.shop_floor.marks import ink_tops, inked_table, mirrored
+from contour.synthetic.shop_floor.structures import structured
 from contour.synthetic.surface import surface
 from contour.synthetic.table import smooth_noise, table_glare, table_light
+from contour.synthetic.things import Strip
 
 
 @dataclass(frozen=True)
@@ -22,6 +27,7 @@ class Rendered:
 
     `picture` is uint8, (H, W) grey or (H, W, 3) BGR. `truth_mm` is the outline as given (work frame, top plane);
     `truth_px` the same, densified in millimetres and projected. `pitch_px` is the root of the mean cell area × 1.1547.
+    `visible` says of each vertex of `truth_px`, ring by ring, whether nothing lies over it.
     """
 
     picture: Bytes
@@ -30,6 +36,7 @@ class Rendered:
     camera: CameraModel
     thickness_mm: float
     pitch_px: float
+    visible: tuple[Bools, ...] = ()
 
 
 def render(scene: Scene) -> Rendered:
@@ -38,7 +45,9 @@ def render(scene: Scene) -> Rendered:
     _texture(scene, light)
     block = relief(scene, cover, light)
     picture = expose(scene.sensor, _planes(scene, block), scene.seed)
-    return Rendered(picture, truth_px(scene), scene.outline, scene.camera, scene.thickness_mm, pitch_px(scene))
+    truth = truth_px(scene)
+    seen = visible(scene, truth)
+    return Rendered(picture, truth, scene.outline, scene.camera, scene.thickness_mm, pitch_px(scene), seen)
 
 
 def truth_px(scene: Scene) -> Contour:
@@ -62,15 +71,20 @@ def _tops(scene: Scene) -> tuple[Float32s, Float32s]:
     """Cover and light of the top planes of all pieces, shape (H, W)."""
     shape = (scene.camera.height, scene.camera.width)
     cover, light = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
-    for number, outline in enumerate((scene.outline, *scene.clutter.neighbours)):
-        piece = surface(scene, outline, scene.seed + 1000 * number)
+    strips = [thing for thing in scene.things if isinstance(thing, Strip)]
+    pieces = [(scene, outline) for outline in (scene.outline, *scene.clutter.neighbours)]
+    pieces += [(replace(scene, cells=strip.cells), strip.outline) for strip in strips]
+    for number, (whole, outline) in enumerate(pieces):
+        piece = surface(whole, outline, scene.seed + 1000 * number)
         if piece is None:
             continue
         rows = slice(piece.top, piece.top + piece.cover.shape[0])
         columns = slice(piece.left, piece.left + piece.cover.shape[1])
         np.add(cover[rows, columns], piece.cover, out=cover[rows, columns])
         np.add(light[rows, columns], piece.light, out=light[rows, columns])
-    return np.minimum(cover, 1.0), light
+    np.minimum(cover, 1.0, out=cover)
+    ink_tops(scene, cover, light)
+    return cover, light
 
 
 def _texture(scene: Scene, light: Float32s) -> None:
@@ -86,11 +100,14 @@ def _texture(scene: Scene, light: Float32s) -> None:
 
 def _planes(scene: Scene, block: Relief) -> list[Float32s]:
     """Light that reaches the sensor, one plane for grey, three for colour."""
-    falling = illumination(scene)
+    falling = illumination(scene) if not scene.things else illumination(scene) * shaded(scene, on_block=True)
     shine = patches(scene)
     walls = block.light * falling if shine is None else block.light * falling * shine
     open_share = 1.0 - block.cover
     table = table_light(scene) * open_share * falling
+    if scene.things:
+        below = table_light(scene) * structured(scene) * inked_table(scene) * shaded(scene, on_block=False)
+        table = (below * falling + mirrored(scene, walls)) * open_share
     glare = table_glare(scene) * open_share if scene.light.glare > 0.0 else np.float32(0.0)
     if not scene.sensor.colour:
         planes = [np.asarray(walls + table + glare, dtype=np.float32)]
@@ -99,5 +116,8 @@ def _planes(scene: Scene, block: Relief) -> list[Float32s]:
             np.asarray(walls * np.float32(a) + table * np.float32(b) + glare, dtype=np.float32)
             for a, b in zip(scene.material.colour, scene.table.colour, strict=True)
         ]
+    if scene.things:
+        add_flares(scene, planes, block.cover)
+        lay_covers(scene, planes, falling)
     dust(scene, planes)
     return planes

@@ -9,11 +9,7 @@ from contour.errors import ParameterError
 from contour.geometry.rings import Contour
 from contour.synthetic.camera import CameraModel
 from contour.synthetic.cells import CellGeometry
-
-Colour = tuple[float, float, float]
-"""Blue, green, red factors; their mean is about 1."""
-
-GREY: Colour = (1.0, 1.0, 1.0)
+from contour.synthetic.things import GREY, Colour, Thing
 
 
 @dataclass(frozen=True)
@@ -106,6 +102,14 @@ class Sensor:
     colour: bool = False
     """BGR instead of grey."""
     supersample: int = 2
+    motion_px: tuple[float, float] = (0.0, 0.0)
+    """How far the picture moved while it was exposed, right and down."""
+    row_noise: float = 0.0
+    """Sigma of what each row reads too much, share of full scale."""
+    hot_pixels: float = 0.0
+    """Share of pixels that read too much whatever they see."""
+    gamma: float = 1.0
+    """Exponent between light and grey level."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,8 @@ class Scene:
     name: str = ""
     edge: Literal["cut", "cells"] = "cut"
     """`cells`: the outline follows whole cells; told to methods, not rendered."""
+    things: tuple[Thing, ...] = ()
+    """What lies on, beside and under the block; the later ones over the earlier ones."""
 
     def __post_init__(self) -> None:
         if self.thickness_mm < 0.0:

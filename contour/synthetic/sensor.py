@@ -58,15 +58,44 @@ def expose(sensor: Sensor, planes: list[Float32s], seed: int) -> Bytes:
     rng = np.random.default_rng([seed, 43])
     seen = []
     for plane in planes:
-        light = np.maximum(blurred(plane, sensor.blur_px), 0.0)
+        light = np.maximum(_moved(blurred(plane, sensor.blur_px), sensor.motion_px), 0.0)
         if sensor.bloom > 0.0:
             light = light + np.float32(sensor.bloom) * blurred(np.maximum(light - 1.0, 0.0), 6.0)
         if sensor.shot_noise > 0.0 or sensor.read_noise > 0.0:
             spread = np.sqrt(np.float32(sensor.shot_noise**2) * light + np.float32(sensor.read_noise**2))
             light = light + spread * rng.standard_normal(light.shape, dtype=np.float32)
+        light = _read_out(sensor, light, rng)
         seen.append(np.clip(np.rint(light * np.float32(255.0)), 0.0, 255.0).astype(np.uint8))
     picture = seen[0] if len(seen) == 1 else np.ascontiguousarray(np.stack(seen, axis=-1))
     return picture if sensor.jpeg_quality <= 0 else _compressed(picture, sensor.jpeg_quality)
+
+
+def _moved(light: Float32s, motion_px: tuple[float, float]) -> Float32s:
+    """The light smeared along a straight way, centred."""
+    length = math.hypot(*motion_px)
+    if length < 0.1:
+        return light
+    reach = math.ceil(length / 2.0) + 1
+    kernel = np.zeros((2 * reach + 1, 2 * reach + 1), dtype=np.float32)
+    for share in np.linspace(-0.5, 0.5, 16 * reach):
+        x, y = reach + share * motion_px[0], reach + share * motion_px[1]
+        for column, part_x in ((math.floor(x), 1.0 - x % 1.0), (math.floor(x) + 1, x % 1.0)):
+            for row, part_y in ((math.floor(y), 1.0 - y % 1.0), (math.floor(y) + 1, y % 1.0)):
+                kernel[row, column] += part_x * part_y
+    return np.asarray(cv2.filter2D(light, -1, kernel / kernel.sum()), dtype=np.float32)
+
+
+def _read_out(sensor: Sensor, light: Float32s, rng: np.random.Generator) -> Float32s:
+    """What a cheap sensor makes of its light: rows of their own level, pixels that are always bright, a gamma."""
+    if sensor.row_noise > 0.0:
+        rows = rng.standard_normal((light.shape[0], 1), dtype=np.float32)
+        light = light + np.float32(sensor.row_noise) * rows
+    if sensor.hot_pixels > 0.0:
+        hot = rng.random(light.shape, dtype=np.float32) < sensor.hot_pixels
+        light = np.where(hot, np.maximum(light, rng.uniform(0.3, 1.0, light.shape)), light).astype(np.float32)
+    if sensor.gamma != 1.0:
+        light = np.clip(light, 0.0, 1.0) ** np.float32(sensor.gamma)
+    return light
 
 
 def _compressed(picture: Bytes, quality: int) -> Bytes:

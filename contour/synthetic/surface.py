@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -11,10 +11,20 @@ import numpy as np
 from contour.geometry.arrays import Float32s
 from contour.geometry.rings import Contour
 from contour.image.pixel_grid import pixels_of, samples_of
-from contour.synthetic.cells import Lattice, WallTones, draw_lattice, lattice_centres, lattice_coordinates, wall_field
+from contour.synthetic.cells import (
+    Lattice,
+    WallField,
+    WallTones,
+    draw_lattice,
+    lattice_centres,
+    lattice_coordinates,
+    wall_field,
+)
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import signed_distance
 from contour.synthetic.scene import Scene
+from contour.synthetic.shop_floor.cells_changed import filled_cells, fillings, pressed
+from contour.synthetic.things import Crush
 
 
 @dataclass(frozen=True)
@@ -62,7 +72,8 @@ def _fill(
     """Turn `inside` (share inside the outline) into the share of material, and write its light beside it, by bands."""
     camera, ss, cells = scene.camera, scene.sensor.supersample, scene.cells
     scale = camera.mm_per_px(_middle(outline), scene.thickness_mm) / ss
-    finest = 8.0 if cells.wobble > 0.0 else 2.0
+    bent = cells.wobble > 0.0 or any(isinstance(thing, Crush) for thing in scene.things)
+    finest = 8.0 if bent else 2.0
     step = int(np.clip(cells.pitch_mm / scale / finest, 4, 32))
     height, width = inside.shape
     rows, columns = math.ceil(height / step), math.ceil(width / step)
@@ -70,11 +81,15 @@ def _fill(
     v = pixels_of(np.arange(-1, rows + 1), step)
     grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
     work = camera.back_project(samples_of(grid, ss) + np.array(origin), scene.thickness_mm)
+    if scene.things and outline is scene.outline:
+        work = pressed(scene, outline, work)
     x, y = lattice_coordinates(cells, work[:, 0], work[:, 1], seed)
     material = scene.material
     tones = WallTones(material.glints, material.spread, material.sheen)
     lattice = draw_lattice(cells, x, y, seed, tones)
     _close_rim(scene, outline, lattice)
+    if outline is scene.outline:
+        lattice = replace(lattice, filled=filled_cells(scene, cells, lattice))
     nodes = np.stack((x, y), axis=-1).reshape(rows + 2, columns + 2, 2).astype(np.float32)
     band = max(1, 96 // step)
     for first in range(0, rows, band):
@@ -97,6 +112,9 @@ def _paint(scene: Scene, lattice: Lattice, places: Float32s, scale: float, cover
     far = np.clip((-field.half_width - field.distance) * per_mm + np.float32(0.5), 0.0, 1.0)
     wall = near - far
     top = np.float32(material.top)
+    if field.filled is not None:
+        _pour(scene, field, wall, cover, light)
+        return
     if cells.skin <= 0.0:
         cover *= wall
         np.multiply(cover, field.tone * top, out=light)
@@ -107,6 +125,19 @@ def _paint(scene: Scene, lattice: Lattice, places: Float32s, scale: float, cover
     inside = cover.copy()
     cover *= wall + skin
     np.multiply(inside, wall * field.tone * top + skin * bulge * np.float32(material.skin), out=light)
+
+
+def _pour(scene: Scene, field: WallField, wall: Float32s, cover: Float32s, light: Float32s) -> None:
+    """`cover` by walls and by what fills cells up to the cut, and the light of both, in place."""
+    numbers, found = field.filled, fillings(scene)
+    levels = np.array([0.0, *(filling.level for filling in found)], dtype=np.float32)[numbers]
+    shown = np.array([1.0, *(filling.walls for filling in found)], dtype=np.float32)[numbers]
+    full = (levels > 0.0).astype(np.float32)
+    levels *= 1.0 + 0.12 * field.lean  # it sinks a little towards one side
+    inside = cover.copy()
+    cover *= np.maximum(wall, full)
+    seen = wall * np.where(full > 0.0, shown, np.float32(1.0))
+    np.multiply(inside, seen * field.tone * np.float32(scene.material.top) + full * (1.0 - seen) * levels, out=light)
 
 
 def _close_rim(scene: Scene, outline: Contour, lattice: Lattice) -> None:

@@ -1,0 +1,213 @@
+"""Right, wrong or refused when things lie on the block: `python -m benchmarks.accuracy.shop_floor` (`--help`).
+
+Pictures of `shop_floor_scenes`, measured as the service measures them, by a recipe that says nothing. An accepted
+outline is wrong where a visible place of the true outline lies farther than half a cell from it, or a place of it
+farther than half a cell from the true outline, hidden parts included.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from benchmarks.page_section import table
+from contour.geometry.arrays import Bools, Float64s
+from contour.geometry.rings import Contour
+from contour.synthetic import Rendered, render
+from service.config.recipes import Recipe
+from service.measuring.measure import Measurer
+from tests.support.scenes.metrics import distances, rectified_edges, samples
+from tests.support.scenes.shop_floor_scenes import KINDS, ShopFloorScene, shop_floor_scene
+from tests.support.scenes.trials import calibration_for
+
+FIRST = 500_000
+WRONG_PITCHES = 0.5
+SPACING_PX = 1.0
+TRUE, HIDDEN, FOUND = (80, 220, 60), (0, 200, 255), (60, 60, 255)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a picture. Lengths in pixels; those of an outline are None where there is none.
+
+    `off_px` is how far the outline lies off at worst, `within` the share of the visible true outline that lies within
+    the stated bound, `true_px` within how much 95 % of it lie.
+    """
+
+    kinds: tuple[str, ...]
+    seed: int
+    codes: tuple[int, ...]
+    pitch_px: float
+    hidden_px: float
+    off_px: float | None = None
+    bound_px: float | None = None
+    true_px: float | None = None
+    within: float | None = None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the outline would be sent."""
+        return not self.codes
+
+    @property
+    def wrong(self) -> bool:
+        """Accepted, but off by more than half a cell somewhere."""
+        return self.accepted and (self.off_px is None or self.off_px > WRONG_PITCHES * self.pitch_px)
+
+    @property
+    def broken(self) -> bool:
+        """Accepted with a bound that does not hold 95 % of the outline."""
+        return self.accepted and (self.within is None or self.within < 0.95)
+
+    @property
+    def row(self) -> str:
+        """The row of the table it counts in."""
+        if len(self.kinds) == 1:
+            return self.kinds[0]
+        return "two at once, edge hidden" if self.hidden_px > 0.0 else "two at once, edge seen"
+
+    def line(self) -> str:
+        """The verdict in one line."""
+        said = "WRONG" if self.wrong else "right" if self.accepted else "refused"
+        cells = "" if self.off_px is None else f"off {self.off_px / self.pitch_px:5.2f} cells"
+        bound = "" if self.bound_px is None else f"bound {self.bound_px:5.2f} px, true {self.true_px:5.2f} px"
+        parts = ["+".join(self.kinds), str(self.seed), said, ",".join(map(str, self.codes)) or "-"]
+        broken = "BROKEN" if self.broken else ""
+        hidden = f"hidden {self.hidden_px / self.pitch_px:4.1f} cells" if self.hidden_px > 0.0 else ""
+        return " ".join([*parts, f"pitch {self.pitch_px:4.1f} px", cells, bound, broken, hidden]).strip()
+
+
+def judged(kind: str, seed: int, *, alone: bool = False, save: Path | None = None) -> Verdict:
+    """The verdict on one picture; an overlay goes to the folder `save` where it is wrong."""
+    scene = shop_floor_scene(kind, seed, alone=alone)
+    rendered = render(scene.scene)
+    verdict, found = _measured(scene, rendered)
+    if save is not None and verdict.wrong:
+        cv2.imwrite(str(save / f"{scene.name}.png"), overlay(rendered, found))
+    return verdict
+
+
+def _measured(scene: ShopFloorScene, rendered: Rendered) -> tuple[Verdict, Contour | None]:
+    calibration = calibration_for(rendered.camera)
+    seen = Measurer(calibration).measure(rendered.picture, _recipe(), rendered.thickness_mm)
+    codes = tuple(int(reason) for reason in seen.reasons)
+    places, clear = true_places(rendered)
+    hidden_px = float(SPACING_PX * np.count_nonzero(~clear))
+    verdict = Verdict(scene.kinds, scene.scene.seed, codes, rendered.pitch_px, hidden_px)
+    if seen.pixels is None or seen.uncertainty_px is None:
+        return verdict, seen.pixels
+    outline = rectified_edges(seen.pixels, calibration.rectifier(rendered.thickness_mm))
+    to_found = distances(places[clear], outline)
+    to_truth = distances(samples(outline, SPACING_PX), rendered.truth_px)
+    return Verdict(
+        scene.kinds,
+        scene.scene.seed,
+        codes,
+        rendered.pitch_px,
+        hidden_px,
+        max(float(to_found.max()), float(to_truth.max())),
+        seen.uncertainty_px,
+        float(np.percentile(to_found, 95)),
+        float(np.mean(to_found <= seen.uncertainty_px)),
+    ), outline
+
+
+def _recipe() -> Recipe:
+    """A recipe that says nothing: with it nothing hidden is bridged."""
+    return Recipe(number=1, name="default", min_area_mm2=0.0)
+
+
+def true_places(rendered: Rendered) -> tuple[Float64s, Bools]:
+    """Places along the true outline at equal spacing, pixels, shape (N, 2), and whether each is visible."""
+    places, clear = [], []
+    for ring, seen in zip(rendered.truth_px.rings, rendered.visible, strict=True):
+        closed = np.concatenate((ring, ring[:1]))
+        reached = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))))
+        at = np.arange(0.0, reached[-1], SPACING_PX)
+        places.append(np.column_stack([np.interp(at, reached, closed[:, axis]) for axis in (0, 1)]))
+        clear.append(np.interp(at, reached, np.append(seen, seen[0]).astype(np.float64)) > 0.99)
+    return np.concatenate(places), np.concatenate(clear)
+
+
+def overlay(rendered: Rendered, found: Contour | None) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    """The picture with the true outline (green, orange where hidden) and the found one (red)."""
+    grey = rendered.picture.ndim == 2
+    drawn = cv2.cvtColor(rendered.picture, cv2.COLOR_GRAY2BGR) if grey else rendered.picture.copy()
+    places, clear = true_places(rendered)
+    for (x, y), seen in zip(np.rint(places).astype(int).tolist(), clear.tolist(), strict=True):
+        cv2.circle(drawn, (x, y), 1, TRUE if seen else HIDDEN, -1)
+    for ring in found.rings if found is not None else ():
+        cv2.polylines(drawn, [np.rint(ring * 16).astype(np.int32)], True, FOUND, 1, cv2.LINE_AA, 4)
+    return np.asarray(drawn, dtype=np.uint8)
+
+
+def report(verdicts: Sequence[Verdict]) -> str:
+    """The table as Markdown, a row a kind."""
+    rows = [_row(name, [v for v in verdicts if v.row == name]) for name in dict.fromkeys(v.row for v in verdicts)]
+    head = ["", "pictures", "right", "wrong, accepted", "refused", "by", "bound broken", "bound over true 95th"]
+    return table(head, [*rows, _row("all", verdicts)])
+
+
+def _row(name: str, some: Sequence[Verdict]) -> list[str]:
+    taken = [v for v in some if v.accepted]
+    wrong = sum(v.wrong for v in taken)
+    codes = Counter(v.codes[0] for v in some if not v.accepted)
+    by = " ".join(f"{code}×{count}" for code, count in sorted(codes.items()))
+    ratios = [v.bound_px / max(v.true_px, 0.05) for v in taken if v.bound_px is not None and v.true_px is not None]
+    ratio = f"{np.median(ratios):.2f}" if ratios else "–"
+    counts = [len(some), len(taken) - wrong, wrong, len(some) - len(taken)]
+    return [name, *map(str, counts), by, str(sum(v.broken for v in taken)), ratio]
+
+
+def run(
+    kinds: Iterable[str], seeds: Sequence[int], *, alone: bool, save: Path | None, workers: int
+) -> Iterator[Verdict]:
+    """The verdicts on all kinds and seeds, in order."""
+    jobs = [(kind, seed) for kind in kinds for seed in seeds]
+    judge = partial(judged, alone=alone, save=save)
+    if workers == 1:
+        cv2.setNumThreads(1)
+        yield from (judge(*job) for job in jobs)
+        return
+    with ProcessPoolExecutor(workers, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
+        yield from pool.map(judge, *zip(*jobs, strict=True))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run; 0 when no wrong outline was accepted, else 1."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy.shop_floor", description=__doc__)
+    parser.add_argument("--kinds", default=",".join(KINDS), help="comma-separated; all if not given")
+    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="pictures of each kind")
+    parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="the first seed")
+    parser.add_argument("--alone", action="store_true", help="never two kinds at once")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")
+    parser.add_argument("--list", action="store_true", help="a line for each picture as well")
+    parser.add_argument("--save", type=Path, metavar="DIR", help="overlays of wrong outlines go here")
+    options = parser.parse_args(arguments)
+    kinds = options.kinds.split(",")
+    unknown = [kind for kind in kinds if kind not in KINDS]
+    if unknown:
+        parser.error(f"unknown kinds {', '.join(unknown)}; expected some of {', '.join(KINDS)}")
+    if options.save is not None:
+        options.save.mkdir(parents=True, exist_ok=True)
+    seeds = range(options.first, options.first + options.seeds)
+    verdicts = []
+    for verdict in run(kinds, seeds, alone=options.alone, save=options.save, workers=options.workers):
+        verdicts.append(verdict)
+        if options.list:
+            print(verdict.line(), flush=True)
+    print(report(verdicts))
+    return int(any(verdict.wrong for verdict in verdicts))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

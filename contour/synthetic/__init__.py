@@ -25,7 +25,7 @@ from contour.synthetic.outlines import (
 )
 from contour.synthetic.rendering import Rendered, pitch_px, render, truth_px
 from contour.synthetic.scene import Clutter, Light, Material, Scene, Sensor, Table
-from contour.synthetic.things import Cover, Crush, Filling, Flare, Ink, Mirror, Shade, Strip, Structure, Thing
+from contour.synthetic.things import Cover, Crush, Filling, Flare, Ink, Mirror, Shade, Slip, Strip, Structure, Thing
 
 __all__ = [
     "CameraModel",
@@ -43,6 +43,7 @@ __all__ = [
     "Scene",
     "Sensor",
     "Shade",
+    "Slip",
     "Strip",
     "Structure",
     "Table",

@@ -14,7 +14,7 @@ from contour.synthetic.scene import Scene
 from contour.synthetic.sensor import dust, expose, illumination, patches
 from contour.synthetic.shop_floor.covers import lay_covers, visible
 from contour.synthetic.shop_floor.lights import add_flares, shaded
-from contour.synthetic.shop_floor.marks import ink_tops, inked_table, mirrored
+from contour.synthetic.shop_floor.marks import ink_tops, inked_table, mirrored, tints
 from contour.synthetic.shop_floor.structures import structured
 from contour.synthetic.surface import surface
 from contour.synthetic.table import smooth_noise, table_glare, table_light
@@ -41,10 +41,10 @@ class Rendered:
 
 def render(scene: Scene) -> Rendered:
     """The scene's picture; the same scene always gives the same bytes."""
-    cover, light = _tops(scene)
+    cover, light, filled = _tops(scene)
     _texture(scene, light)
     block = relief(scene, cover, light)
-    picture = expose(scene.sensor, _planes(scene, block), scene.seed)
+    picture = expose(scene.sensor, _planes(scene, block, filled), scene.seed)
     truth = truth_px(scene)
     seen = visible(scene, truth)
     return Rendered(picture, truth, scene.outline, scene.camera, scene.thickness_mm, pitch_px(scene), seen)
@@ -67,13 +67,14 @@ def _middle(scene: Scene) -> tuple[float, float]:
     return (x, y)
 
 
-def _tops(scene: Scene) -> tuple[Float32s, Float32s]:
-    """Cover and light of the top planes of all pieces, shape (H, W)."""
+def _tops(scene: Scene) -> tuple[Float32s, Float32s, Bytes | None]:
+    """Cover and light of the top planes of all pieces, shape (H, W), and what fills the block's cells, if anything."""
     shape = (scene.camera.height, scene.camera.width)
     cover, light = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)
     strips = [thing for thing in scene.things if isinstance(thing, Strip)]
     pieces = [(scene, outline) for outline in (scene.outline, *scene.clutter.neighbours)]
     pieces += [(replace(scene, cells=strip.cells), strip.outline) for strip in strips]
+    filled: Bytes | None = None
     for number, (whole, outline) in enumerate(pieces):
         piece = surface(whole, outline, scene.seed + 1000 * number)
         if piece is None:
@@ -82,9 +83,12 @@ def _tops(scene: Scene) -> tuple[Float32s, Float32s]:
         columns = slice(piece.left, piece.left + piece.cover.shape[1])
         np.add(cover[rows, columns], piece.cover, out=cover[rows, columns])
         np.add(light[rows, columns], piece.light, out=light[rows, columns])
+        if piece.filled is not None:
+            filled = np.zeros(shape, dtype=np.uint8)
+            filled[rows, columns] = piece.filled
     np.minimum(cover, 1.0, out=cover)
     ink_tops(scene, cover, light)
-    return cover, light
+    return cover, light, filled
 
 
 def _texture(scene: Scene, light: Float32s) -> None:
@@ -98,7 +102,7 @@ def _texture(scene: Scene, light: Float32s) -> None:
     light *= np.clip(1.0 + np.float32(scene.material.texture) * noise + spots, 0.1, 3.0)
 
 
-def _planes(scene: Scene, block: Relief) -> list[Float32s]:
+def _planes(scene: Scene, block: Relief, filled: Bytes | None) -> list[Float32s]:
     """Light that reaches the sensor, one plane for grey, three for colour."""
     falling = illumination(scene) if not scene.things else illumination(scene) * shaded(scene, on_block=True)
     shine = patches(scene)
@@ -113,8 +117,8 @@ def _planes(scene: Scene, block: Relief) -> list[Float32s]:
         planes = [np.asarray(walls + table + glare, dtype=np.float32)]
     else:
         planes = [
-            np.asarray(walls * np.float32(a) + table * np.float32(b) + glare, dtype=np.float32)
-            for a, b in zip(scene.material.colour, scene.table.colour, strict=True)
+            np.asarray(walls * a + table * np.float32(b) + glare, dtype=np.float32)
+            for a, b in zip(tints(scene, filled), scene.table.colour, strict=True)
         ]
     if scene.things:
         add_flares(scene, planes, block.cover)

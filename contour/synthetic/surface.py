@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Float32s
+from contour.geometry.arrays import Bytes, Float32s
 from contour.geometry.rings import Contour
 from contour.image.pixel_grid import pixels_of, samples_of
 from contour.synthetic.cells import (
@@ -24,7 +24,7 @@ from contour.synthetic.coverage import area_coverage
 from contour.synthetic.outlines import signed_distance
 from contour.synthetic.scene import Scene
 from contour.synthetic.shop_floor.cells_changed import filled_cells, fillings, pressed
-from contour.synthetic.things import Crush
+from contour.synthetic.things import Crush, Slip
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,19 @@ class Surface:
     """A piece's top plane over the window of the picture that starts at pixel (left, top).
 
     `cover` is the share of each pixel that is material, `light` the light it returns (premultiplied by the share),
-    both shape (H, W), float32.
+    both shape (H, W), float32. `filled` says what fills the cell there, 0 = nothing, shape (H, W); None: no cell is.
     """
 
     left: int
     top: int
     cover: Float32s
     light: Float32s
+    filled: Bytes | None = None
+
+    def rows(self, part: slice) -> Surface:
+        """Some rows of it, the same memory."""
+        filled = None if self.filled is None else self.filled[part]
+        return Surface(self.left, self.top + part.start, self.cover[part], self.light[part], filled)
 
 
 def surface(scene: Scene, outline: Contour, seed: int) -> Surface | None:
@@ -55,9 +61,12 @@ def surface(scene: Scene, outline: Contour, seed: int) -> Surface | None:
     rings = [(ring - [left - 0.5, top - 0.5]) * ss - 0.5 for ring in seen.rings]
     inside = area_coverage(rings, width, height)
     light = np.empty_like(inside)
-    _fill(scene, outline, seed, (left, top), inside, light)
+    filled = np.zeros(inside.shape, dtype=np.uint8) if outline is scene.outline and fillings(scene) else None
+    _fill(scene, outline, seed, Surface(left, top, inside, light, filled))
     size = (right - left, bottom - top)
-    return Surface(left, top, _shrunk(inside, size), _shrunk(light, size))
+    if filled is not None:
+        filled = filled[::ss, ::ss]
+    return Surface(left, top, _shrunk(inside, size), _shrunk(light, size), filled)
 
 
 def _shrunk(raster: Float32s, size: tuple[int, int]) -> Float32s:
@@ -66,21 +75,22 @@ def _shrunk(raster: Float32s, size: tuple[int, int]) -> Float32s:
     return np.asarray(cv2.resize(raster, size, interpolation=cv2.INTER_AREA), dtype=np.float32)
 
 
-def _fill(
-    scene: Scene, outline: Contour, seed: int, origin: tuple[int, int], inside: Float32s, light: Float32s
-) -> None:
-    """Turn `inside` (share inside the outline) into the share of material, and write its light beside it, by bands."""
+def _fill(scene: Scene, outline: Contour, seed: int, fine_px: Surface) -> None:
+    """Turn the cover (share inside the outline) into the share of material, and write the rest beside it, by bands.
+
+    `fine_px` is the surface on finer pixels, `supersample` to each of the picture's.
+    """
     camera, ss, cells = scene.camera, scene.sensor.supersample, scene.cells
     scale = camera.mm_per_px(_middle(outline), scene.thickness_mm) / ss
-    bent = cells.wobble > 0.0 or any(isinstance(thing, Crush) for thing in scene.things)
+    bent = cells.wobble > 0.0 or any(isinstance(thing, Crush | Slip) for thing in scene.things)
     finest = 8.0 if bent else 2.0
     step = int(np.clip(cells.pitch_mm / scale / finest, 4, 32))
-    height, width = inside.shape
+    height, width = fine_px.cover.shape
     rows, columns = math.ceil(height / step), math.ceil(width / step)
     u = pixels_of(np.arange(-1, columns + 1), step)
     v = pixels_of(np.arange(-1, rows + 1), step)
     grid = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
-    work = camera.back_project(samples_of(grid, ss) + np.array(origin), scene.thickness_mm)
+    work = camera.back_project(samples_of(grid, ss) + np.array([fine_px.left, fine_px.top]), scene.thickness_mm)
     if scene.things and outline is scene.outline:
         work = pressed(scene, outline, work)
     x, y = lattice_coordinates(cells, work[:, 0], work[:, 1], seed)
@@ -99,12 +109,12 @@ def _fill(
         stop = min(height, last * step)
         part = slice(first * step, stop)
         fine = fine[step : step + stop - first * step, step : step + width]
-        _paint(scene, lattice, np.asarray(fine, np.float32), scale, inside[part], light[part])
+        _paint(scene, lattice, np.asarray(fine, np.float32), scale, fine_px.rows(part))
 
 
-def _paint(scene: Scene, lattice: Lattice, places: Float32s, scale: float, cover: Float32s, light: Float32s) -> None:
-    """`cover` by walls at lattice places (H, W, 2), and the light they return, in place."""
-    material, cells = scene.material, scene.cells
+def _paint(scene: Scene, lattice: Lattice, places: Float32s, scale: float, part: Surface) -> None:
+    """The part's cover by walls at lattice places (H, W, 2), and the light they return, in place."""
+    material, cells, cover, light = scene.material, scene.cells, part.cover, part.light
     x, y = np.ascontiguousarray(places[..., 0]), np.ascontiguousarray(places[..., 1])
     field = wall_field(cells, lattice, x, y)
     per_mm = np.float32(1.0 / scale)
@@ -112,7 +122,8 @@ def _paint(scene: Scene, lattice: Lattice, places: Float32s, scale: float, cover
     far = np.clip((-field.half_width - field.distance) * per_mm + np.float32(0.5), 0.0, 1.0)
     wall = near - far
     top = np.float32(material.top)
-    if field.filled is not None:
+    if field.filled is not None and part.filled is not None:
+        part.filled[...] = field.filled
         _pour(scene, field, wall, cover, light)
         return
     if cells.skin <= 0.0:

@@ -56,7 +56,7 @@ class Filling:
 class Ink:
     """Felt-pen strokes on wall tops, and on the table where they go on there."""
 
-    area: Contour
+    strokes: tuple[Contour, ...]
     level: float
     colour: Colour = GREY
     strength: float = 0.85
@@ -99,6 +99,16 @@ class Crush:
 
 
 @dataclass(frozen=True)
+class Slip:
+    """Two pieces of core in one block: the cells left of a line were moved along it, against the others."""
+
+    at: Point
+    along: Point
+    """Unit vector."""
+    shift_mm: float
+
+
+@dataclass(frozen=True)
 class Flare:
     """A bright spot or streak of light that is added to all that is seen there."""
 
@@ -133,4 +143,4 @@ class Structure:
     angle_deg: float = 0.0
 
 
-Thing = Cover | Filling | Ink | Mirror | Strip | Crush | Flare | Shade | Structure
+Thing = Cover | Filling | Ink | Mirror | Strip | Crush | Slip | Flare | Shade | Structure

@@ -11,7 +11,7 @@ from contour.geometry.rings import Contour
 from contour.synthetic.cells import CellGeometry, Lattice, lattice_centres
 from contour.synthetic.outlines import signed_distance
 from contour.synthetic.scene import Scene
-from contour.synthetic.things import Crush, Filling
+from contour.synthetic.things import Crush, Filling, Slip
 
 
 def fillings(scene: Scene) -> tuple[Filling, ...]:
@@ -36,10 +36,15 @@ def filled_cells(scene: Scene, cells: CellGeometry, lattice: Lattice) -> Bytes |
 
 
 def pressed(scene: Scene, outline: Contour, places: Float64s) -> Float64s:
-    """Where the cells seen at these places were before they were crushed, work millimetres, shape (N, 2)."""
+    """Where the cells seen at these places were before they slipped or were crushed, work millimetres, shape (N, 2)."""
     result = places
-    for number, crush in enumerate(thing for thing in scene.things if isinstance(thing, Crush)):
-        result = _pressed(crush, outline, result, np.random.default_rng([scene.seed, 64, number]))
+    for number, thing in enumerate(scene.things):
+        if isinstance(thing, Crush):
+            result = _pressed(thing, outline, result, np.random.default_rng([scene.seed, 64, number]))
+        elif isinstance(thing, Slip):
+            x, y = thing.along
+            left = (places - np.array(thing.at)) @ np.array([-y, x]) > 0.0
+            result = result - left[:, None] * thing.shift_mm * np.array([x, y])
     return result
 
 

@@ -5,20 +5,39 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Float32s
+from contour.geometry.arrays import Bytes, Float32s
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.scene import Scene
-from contour.synthetic.shop_floor.masks import px_mm, share_of
+from contour.synthetic.shop_floor.masks import px_mm, share_of_any
 from contour.synthetic.table import blurred
-from contour.synthetic.things import Ink, Mirror
+from contour.synthetic.things import Filling, Ink, Mirror
 
 
 def ink_tops(scene: Scene, cover: Float32s, light: Float32s) -> None:
     """Write on the wall tops: change their light (premultiplied by the cover) in place."""
     for thing in scene.things:
         if isinstance(thing, Ink):
-            share = np.float32(thing.strength) * share_of(scene, thing.area, scene.thickness_mm)
+            share = np.float32(thing.strength) * share_of_any(scene, thing.strokes, scene.thickness_mm)
             light += share * (np.float32(thing.level) * cover - light)
+
+
+def tints(scene: Scene, filled: Bytes | None) -> list[Float32s | np.float32]:
+    """Colour factors of the block's light, blue, green, red: its material's, but where it is filled or written on."""
+    fillings = [thing for thing in scene.things if isinstance(thing, Filling)]
+    inks = [
+        (np.float32(thing.strength) * share_of_any(scene, thing.strokes, scene.thickness_mm), thing.colour)
+        for thing in scene.things
+        if isinstance(thing, Ink)
+    ]
+    factors: list[Float32s | np.float32] = []
+    for channel, material in enumerate(scene.material.colour):
+        factor: Float32s | np.float32 = np.float32(material)
+        if filled is not None:
+            factor = np.array([material, *(one.colour[channel] for one in fillings)], dtype=np.float32)[filled]
+        for share, colour in inks:
+            factor = factor + share * (np.float32(colour[channel]) - factor)
+        factors.append(factor)
+    return factors
 
 
 def inked_table(scene: Scene) -> Float32s | np.float32:
@@ -27,7 +46,7 @@ def inked_table(scene: Scene) -> Float32s | np.float32:
     for thing in scene.things:
         if isinstance(thing, Ink) and thing.on_table:
             change = np.float32(thing.strength * (thing.level / max(scene.table.level, 1e-3) - 1.0))
-            factor = factor * (1.0 + change * share_of(scene, thing.area, 0.0))
+            factor = factor * (1.0 + change * share_of_any(scene, thing.strokes, 0.0))
     return factor
 
 

@@ -20,6 +20,14 @@ def share_of(scene: Scene, area: Contour, z_mm: float) -> Float32s:
     return area_coverage(rings, camera.width, camera.height)
 
 
+def share_of_any(scene: Scene, areas: Sequence[Contour], z_mm: float) -> Float32s:
+    """Share of each pixel that one of the areas covers at this height, shape (H, W), float32."""
+    share = np.zeros((scene.camera.height, scene.camera.width), dtype=np.float32)
+    for area in areas:
+        np.maximum(share, share_of(scene, area, z_mm), out=share)
+    return share
+
+
 def px_mm(scene: Scene) -> float:
     """Millimetres per pixel at the block's top."""
     x, y = scene.outline.exterior.mean(axis=0).tolist()

@@ -24,6 +24,7 @@ from contour.synthetic import (
     Mirror,
     Scene,
     Shade,
+    Slip,
     Strip,
     Structure,
     Thing,
@@ -140,6 +141,9 @@ def _tape(rng: np.random.Generator, scene: Scene) -> Scene:
     beyond = float(rng.uniform(0.5, 8.0)) * pitch
     centre = place.point(0.0, 0.5 * (beyond - deep))
     turn = place.out_deg + float(rng.normal(0.0, 25.0))
+    if rng.random() < 0.2:  # laid along the edge
+        turn, wide, beyond = turn + 90.0, deep + min(beyond, 3.0 * pitch), float(rng.uniform(1.0, 6.0)) * pitch
+        centre = place.point(0.0, float(rng.uniform(-0.3, 0.3)) * wide)
     tape = Cover(
         rectangle(centre, deep + beyond, wide, turn),
         _level(rng, scene),
@@ -262,7 +266,9 @@ def _splice(rng: np.random.Generator, scene: Scene) -> Scene:
     wave = float(rng.uniform(0.0, 0.4)) * pitch * np.sin(share * long / pitch + float(rng.uniform(0.0, 6.0)))
     path = middle + share[:, None] * long * along + wave[:, None] * across
     area = thick_line([(float(x), float(y)) for x, y in path], float(rng.uniform(1.0, 2.0)) * pitch)
-    return _with(scene, replace(_filling(rng, scene, area), share=1.0))
+    x, y = along.tolist()
+    slip = Slip((float(middle[0]), float(middle[1])), (x, y), float(rng.uniform(0.0, 1.0)) * pitch)
+    return _with(scene, replace(_filling(rng, scene, area), share=1.0), slip)
 
 
 def _crushed(rng: np.random.Generator, scene: Scene) -> Scene:
@@ -279,8 +285,8 @@ def _crushed(rng: np.random.Generator, scene: Scene) -> Scene:
                 (-x, -y),
                 float(rng.uniform(3.0, 12.0)) * pitch,
                 deep,
-                float(rng.uniform(0.15, 0.5)) * deep,
-                float(rng.uniform(0.0, 0.25)) * pitch,
+                float(rng.uniform(0.25, 0.6)) * deep,
+                float(rng.uniform(0.0, 0.3)) * pitch,
             )
         )
     return _with(scene, *things)
@@ -291,19 +297,20 @@ def _writing(rng: np.random.Generator, scene: Scene) -> Scene:
     pitch = scene.cells.pitch_mm
     size, width = float(rng.uniform(3.0, 9.0)) * pitch, float(rng.uniform(0.3, 1.3)) * pitch
     place, turn = _place(rng, scene), float(rng.uniform(0.0, 360.0))
-    out = float(rng.uniform(-2.0, 0.5)) * size
+    out = float(rng.uniform(-1.5, 0.3)) * size
     bright = rng.random() < 0.4
     level = float(rng.uniform(0.8, 1.0)) if bright else float(rng.uniform(0.02, 0.25))
-    ink = Ink(rectangle((0.0, 0.0), 1.0, 1.0), level, _colour(rng, 0.5), float(rng.uniform(0.5, 1.0)))
-    ink = replace(ink, on_table=bool(rng.random() < 0.5))
-    things: list[Thing] = []
-    for letter in range(int(rng.integers(2, 6))):
+    strokes = []
+    letters = int(rng.integers(2, 6))
+    for letter in range(letters):
         corners = np.cumsum(rng.uniform(-0.5, 0.5, (int(rng.integers(3, 6)), 2)), axis=0) * size
         at = np.linspace(0.0, len(corners) - 1.0, 40)
         path = np.column_stack([np.interp(at, np.arange(len(corners)), corners[:, axis]) for axis in (0, 1)])
-        area = thick_line([(float(x) + letter * 0.9 * size, float(y)) for x, y in path], width)
-        things.append(replace(ink, area=moved(moved(area, (0.0, 0.0), turn), place.point(0.0, out))))
-    return _with(scene, *things)
+        first = (letter - 0.5 * letters) * 0.9 * size
+        area = thick_line([(float(x) + first, float(y)) for x, y in path], width)
+        strokes.append(moved(moved(area, (0.0, 0.0), turn), place.point(0.0, out)))
+    strength, on_table = float(rng.uniform(0.5, 1.0)), bool(rng.random() < 0.5)
+    return _with(scene, Ink(tuple(strokes), level, _colour(rng, 0.5), strength, on_table))
 
 
 # --- what lies beside it, and light -----------------------------------------------------------------------------------

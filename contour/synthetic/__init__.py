@@ -25,7 +25,20 @@ from contour.synthetic.outlines import (
 )
 from contour.synthetic.rendering import Rendered, pitch_px, render, truth_px
 from contour.synthetic.scene import Clutter, Light, Material, Scene, Sensor, Table
-from contour.synthetic.things import Cover, Crush, Filling, Flare, Ink, Mirror, Shade, Slip, Strip, Structure, Thing
+from contour.synthetic.things import (
+    Cover,
+    Crush,
+    Fade,
+    Filling,
+    Flare,
+    Ink,
+    Mirror,
+    Shade,
+    Slip,
+    Strip,
+    Structure,
+    Thing,
+)
 
 __all__ = [
     "CameraModel",
@@ -33,6 +46,7 @@ __all__ = [
     "Clutter",
     "Cover",
     "Crush",
+    "Fade",
     "Filling",
     "Flare",
     "Ink",

@@ -13,7 +13,7 @@ from contour.synthetic.depth import Relief, relief
 from contour.synthetic.scene import Scene
 from contour.synthetic.sensor import dust, expose, illumination, patches
 from contour.synthetic.shop_floor.covers import lay_covers, visible
-from contour.synthetic.shop_floor.lights import add_flares, shaded
+from contour.synthetic.shop_floor.lights import add_flares, faded, shaded
 from contour.synthetic.shop_floor.marks import ink_tops, inked_table, mirrored, tints
 from contour.synthetic.shop_floor.structures import structured
 from contour.synthetic.surface import surface
@@ -104,14 +104,19 @@ def _texture(scene: Scene, light: Float32s) -> None:
 
 def _planes(scene: Scene, block: Relief, filled: Bytes | None) -> list[Float32s]:
     """Light that reaches the sensor, one plane for grey, three for colour."""
-    falling = illumination(scene) if not scene.things else illumination(scene) * shaded(scene, on_block=True)
+    falling = illumination(scene)
+    if scene.things:
+        falling *= shaded(scene, on_block=True)
     shine = patches(scene)
     walls = block.light * falling if shine is None else block.light * falling * shine
     open_share = 1.0 - block.cover
-    table = table_light(scene) * open_share * falling
+    table = table_light(scene)
     if scene.things:
-        below = table_light(scene) * structured(scene) * inked_table(scene) * shaded(scene, on_block=False)
-        table = (below * falling + mirrored(scene, walls)) * open_share
+        walls *= faded(scene)
+        table *= structured(scene) * inked_table(scene) * shaded(scene, on_block=False)
+    table = table * open_share * falling
+    if scene.things:
+        table += mirrored(scene, walls) * open_share
     glare = table_glare(scene) * open_share if scene.light.glare > 0.0 else np.float32(0.0)
     if not scene.sensor.colour:
         planes = [np.asarray(walls + table + glare, dtype=np.float32)]

@@ -133,6 +133,16 @@ class Shade:
 
 
 @dataclass(frozen=True)
+class Fade:
+    """Walls seen from straight above return less light: 1 − depth in the middle of the place."""
+
+    at: Point
+    depth: float
+    size_mm: float
+    """Sigma."""
+
+
+@dataclass(frozen=True)
 class Structure:
     """A table that is not even: its light is multiplied by a pattern of mean about 1."""
 
@@ -143,4 +153,4 @@ class Structure:
     angle_deg: float = 0.0
 
 
-Thing = Cover | Filling | Ink | Mirror | Strip | Crush | Slip | Flare | Shade | Structure
+Thing = Cover | Filling | Ink | Mirror | Strip | Crush | Slip | Flare | Shade | Fade | Structure

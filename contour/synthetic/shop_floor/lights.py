@@ -8,7 +8,7 @@ from contour.geometry.arrays import Float32s
 from contour.synthetic.scene import Scene
 from contour.synthetic.shop_floor.masks import image_angle, pixel_of, px_mm, share_of
 from contour.synthetic.table import blurred
-from contour.synthetic.things import Flare, Shade
+from contour.synthetic.things import Fade, Flare, Shade
 
 
 def shaded(scene: Scene, *, on_block: bool) -> Float32s:
@@ -28,6 +28,15 @@ def add_flares(scene: Scene, planes: list[Float32s], cover: Float32s) -> None:
             spot = _spot(scene, thing) * (1.0 - np.float32(1.0 - thing.on_block) * cover)
             for plane in planes:
                 np.add(plane, spot, out=plane)
+
+
+def faded(scene: Scene) -> Float32s | np.float32:
+    """What is left of the walls' light where they fade, as a factor: shape (H, W), or 1."""
+    factor: Float32s | np.float32 = np.float32(1.0)
+    for thing in scene.things:
+        if isinstance(thing, Fade):
+            factor = factor * (1.0 - _spot(scene, Flare(thing.at, thing.depth, (thing.size_mm, thing.size_mm))))
+    return factor
 
 
 def _spot(scene: Scene, flare: Flare) -> Float32s:

@@ -8,7 +8,7 @@ import numpy as np
 from contour.geometry.arrays import Bytes, Float32s
 from contour.synthetic.coverage import area_coverage
 from contour.synthetic.scene import Scene
-from contour.synthetic.shop_floor.masks import px_mm, share_of_any
+from contour.synthetic.shop_floor.masks import px_mm, share_of, share_of_any
 from contour.synthetic.table import blurred
 from contour.synthetic.things import Filling, Ink, Mirror
 
@@ -41,12 +41,15 @@ def tints(scene: Scene, filled: Bytes | None) -> list[Float32s | np.float32]:
 
 
 def inked_table(scene: Scene) -> Float32s | np.float32:
-    """What ink makes of the table's light, as a factor: shape (H, W), or 1."""
-    factor: Float32s | np.float32 = np.float32(1.0)
-    for thing in scene.things:
-        if isinstance(thing, Ink) and thing.on_table:
-            change = np.float32(thing.strength * (thing.level / max(scene.table.level, 1e-3) - 1.0))
-            factor = factor * (1.0 + change * share_of_any(scene, thing.strokes, 0.0))
+    """What ink beside the block makes of the table's light, as a factor: shape (H, W), or 1."""
+    inks = [thing for thing in scene.things if isinstance(thing, Ink) and thing.on_table]
+    if not inks:
+        return np.float32(1.0)
+    beside = 1.0 - share_of(scene, scene.outline, 0.0)
+    factor = np.ones_like(beside)
+    for ink in inks:
+        change = np.float32(ink.strength * (ink.level / max(scene.table.level, 1e-3) - 1.0))
+        factor *= 1.0 + change * beside * share_of_any(scene, ink.strokes, 0.0)
     return factor
 
 

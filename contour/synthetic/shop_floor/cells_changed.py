@@ -56,7 +56,9 @@ def _pressed(crush: Crush, outline: Contour, places: Float64s, rng: np.random.Ge
     near = np.flatnonzero((off**2).sum(axis=1) < reach**2)
     if len(near) == 0:
         return places
-    depth = np.clip(signed_distance(outline, places[near]), 0.0, crush.depth_mm) / crush.depth_mm
+    # Beside another edge, around a corner, cells are as deep as they lie behind this one.
+    depth = np.maximum(signed_distance(outline, places[near]), off[near] @ inward)
+    depth = np.clip(depth, 0.0, crush.depth_mm) / crush.depth_mm
     along = off[near] @ tangent
     window = np.clip(1.0 - np.abs(along) / (0.5 * crush.length_mm), 0.0, 1.0)
     fade = (1.0 - depth) ** 2 * np.minimum(1.0, 3.0 * window)

@@ -101,8 +101,8 @@ def test_the_same_kind_and_seed_give_the_same_bytes_and_another_seed_does_not():
 
 
 def test_a_quarter_of_the_scenes_have_two_kinds_and_an_undisturbed_one_has_none():
-    both = [len(shop_floor_scene("dust", seed).kinds) == 2 for seed in range(60)]
-    assert 6 <= sum(both) <= 26
+    both = [len(shop_floor_scene("dust", seed).kinds) == 2 for seed in range(40)]
+    assert 4 <= sum(both) <= 18
     assert all(shop_floor_scene("undisturbed", seed).kinds == ("undisturbed",) for seed in range(20))
 
 
@@ -121,7 +121,7 @@ def test_a_scene_without_things_looks_as_it_always_did():
         cells=CellGeometry(kind="irregular", pitch_mm=14.0, jitter=0.2, broken=0.02, warp=0.1),
         material=Material(),
         clutter=Clutter(specks=20, debris=5),
-        sensor=Sensor(colour=True),
+        sensor=dataclasses.replace(PLAIN.sensor, colour=True),
     )
     assert np.abs(render(scene).picture[40:200:20, 80:250:30, 0].astype(int) - BEFORE).max() <= 1
 
@@ -266,8 +266,7 @@ def test_a_flare_adds_light_where_it_is_and_less_on_the_block_where_asked():
     extra = done.picture.astype(int) - plain.picture
     assert extra[118:122, 252:255].min() > 0.3 * 255
     assert extra[118:122, 290:].max() == 0
-    walls = plain.picture > 0.75 * 255
-    assert extra[walls].max() <= 1
+    assert extra[plain.picture == plain.picture.max()].max() <= 1
 
 
 def test_walls_fade_in_the_middle_and_stay_at_the_edge():

@@ -74,7 +74,7 @@ def shop_floor_block(seed: int) -> Scene:
         seed=seed,
         name=f"floor-{seed}",
     )
-    return _quiet(_placed(rng, scene))
+    return quiet(_placed(rng, scene), LEAST_CONTRAST)
 
 
 def _outline(rng: np.random.Generator, across: float, seed: int, radius: float) -> Contour:
@@ -239,9 +239,9 @@ def _placed(rng: np.random.Generator, scene: Scene) -> Scene:
     return placed
 
 
-def _quiet(scene: Scene) -> Scene:
-    """The scene with as much less noise as its darkest walls need."""
-    share = min(1.0, contrast_to_noise(scene) / LEAST_CONTRAST)
+def quiet(scene: Scene, least: float) -> Scene:
+    """The scene with as much less noise as its darkest walls need to stand out of it by `least` sigmas."""
+    share = min(1.0, contrast_to_noise(scene) / least)
     sensor = scene.sensor
     return replace(
         scene, sensor=replace(sensor, shot_noise=sensor.shot_noise * share, read_noise=sensor.read_noise * share)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,12 +20,16 @@ from contour.synthetic import (
     pitch_px,
     rectangle,
 )
+from tests.support.scenes.shop_floor.blocks import quiet
 from tests.support.scenes.shop_floor.places import a_colour, a_place, extent, with_things
 
 Drawn = Callable[[np.random.Generator, Scene], Scene]
+DIM_CONTRAST = 6.0
+"""Sigmas of a pixel's noise by which walls stand out of their cells in little light."""
 
 
 def mirror(rng: np.random.Generator, scene: Scene) -> Scene:
+    """A polished table that mirrors walls half a cell to three cells beyond the edge."""
     reach = float(rng.uniform(0.5, 3.0)) * scene.cells.pitch_mm
     return with_things(scene, Mirror(float(rng.uniform(0.08, 0.55)), reach, float(rng.uniform(0.5, 3.0))))
 
@@ -56,11 +61,14 @@ def fading(rng: np.random.Generator, scene: Scene) -> Scene:
 
 
 def dust(rng: np.random.Generator, scene: Scene) -> Scene:
+    """Specks everywhere, and up to forty chips on the table."""
     clutter = replace(scene.clutter, specks=int(rng.integers(200, 2500)), debris=int(rng.integers(0, 40)))
     return replace(scene, clutter=clutter)
 
 
-def structured(kind: str) -> Drawn:
+def structured(kind: Literal["wood", "brushed", "slots", "old-cuts"]) -> Drawn:
+    """A table of this kind, about as bright as the walls (brighter than dark ones)."""
+
     def draw(rng: np.random.Generator, scene: Scene) -> Scene:
         pitch, dark = scene.cells.pitch_mm, scene.material.top < scene.table.level
         top = scene.material.top
@@ -77,31 +85,34 @@ def structured(kind: str) -> Drawn:
     return draw
 
 
-def sensor(change: Callable[[np.random.Generator, Scene], dict[str, object]]) -> Drawn:
+def sensor(change: Callable[[np.random.Generator, Scene], dict[str, Any]]) -> Drawn:
+    """The sensor changed as drawn."""
+
     def draw(rng: np.random.Generator, scene: Scene) -> Scene:
         return replace(scene, sensor=replace(scene.sensor, **change(rng, scene)))
 
     return draw
 
 
-def motion(rng: np.random.Generator, scene: Scene) -> dict[str, object]:
+def motion(rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
     """4 to 13 px, but within a third of a pitch."""
     most = min(13.0, pitch_px(scene) / 3.0)
     return _smear(rng, float(rng.uniform(min(4.0, most), most)))
 
 
-def motion_far(rng: np.random.Generator, scene: Scene) -> dict[str, object]:
+def motion_far(rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
     """Farther than a third of a pitch."""
     least = pitch_px(scene) / 3.0
     return _smear(rng, float(rng.uniform(least, max(13.0, 1.5 * least))))
 
 
-def _smear(rng: np.random.Generator, length: float) -> dict[str, object]:
+def _smear(rng: np.random.Generator, length: float) -> dict[str, Any]:
     angle = float(rng.uniform(0.0, 2.0 * math.pi))
     return {"motion_px": (length * math.cos(angle), length * math.sin(angle))}
 
 
-def gamma(rng: np.random.Generator, scene: Scene) -> dict[str, object]:
+def gamma(rng: np.random.Generator, scene: Scene) -> dict[str, Any]:
+    """An exponent of 0.45 to 2."""
     return {"gamma": math.exp(float(rng.uniform(math.log(0.45), math.log(2.0))))}
 
 
@@ -115,7 +126,9 @@ def blown_out(rng: np.random.Generator, scene: Scene) -> Scene:
 
 
 def dim(rng: np.random.Generator, scene: Scene) -> Scene:
-    return replace(scene, light=replace(scene.light, level=scene.light.level * float(rng.uniform(0.15, 0.3))))
+    """About a fifth of the light; walls still stand out of the noise."""
+    level = scene.light.level * float(rng.uniform(0.15, 0.3))
+    return quiet(replace(scene, light=replace(scene.light, level=level)), DIM_CONTRAST)
 
 
 def coloured(rng: np.random.Generator, scene: Scene) -> Scene:

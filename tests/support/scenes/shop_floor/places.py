@@ -68,12 +68,14 @@ def _level_of(scene: Scene, grey: float) -> float:
 
 
 def a_colour(rng: np.random.Generator, spread: float = 0.35) -> tuple[float, float, float]:
+    """Factors of blue, green and red about 1."""
     tint = np.exp(rng.normal(0.0, spread, 3))
     blue, green, red = (tint / tint.mean()).tolist()
     return (blue, green, red)
 
 
 def with_things(scene: Scene, *things: Thing) -> Scene:
+    """The scene with these over what it has."""
     return replace(scene, things=(*scene.things, *things))
 
 

@@ -45,9 +45,8 @@ def _wood(scene: Scene, structure: Structure, rng: np.random.Generator) -> Float
     ring = np.float32(2.0 * math.pi / (structure.scale_mm * rng.uniform(0.05, 0.2)))
     year = 0.5 + 0.5 * np.sin((across + wave) * ring + smooth_noise(rng, shape, 60.0))
     pores = streaks(rng, shape, angle, 1.6)
-    plank = np.floor(across / np.float32(structure.scale_mm) + np.float32(rng.uniform()))
-    tones = rng.normal(0.0, 0.35, 512).astype(np.float32)[plank.astype(np.int32) % 512]
-    place = across / np.float32(structure.scale_mm)
+    place = across / np.float32(structure.scale_mm) + np.float32(rng.uniform())
+    tones = rng.normal(0.0, 0.35, 512).astype(np.float32)[np.floor(place).astype(np.int32) % 512]
     joint = np.abs(place - np.rint(place)) * np.float32(structure.scale_mm / px_mm(scene)) < 1.2
     grain = 0.9 * (year**3 - 0.3) + 0.45 * pores + tones
     return np.asarray((1.0 - np.float32(structure.contrast) * grain) * np.where(joint, 0.55, 1.0), dtype=np.float32)

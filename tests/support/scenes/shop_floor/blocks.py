@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contour.geometry.rings import Contour, Ring
+from contour.geometry.rings import Contour, Ring, area
 from contour.synthetic import (
     CellGeometry,
     Clutter,
@@ -36,6 +36,8 @@ from tests.support.scenes.bench_scenes import contrast_to_noise
 SIZES = ((1280, 1024), (1440, 1080), (1600, 1200), (1296, 972))
 BORDER_PX = 40.0
 LEAST_CONTRAST = 9.0
+LEAST_WIDE = 10.5
+"""Root of the block's area, in pitches, at least: a disc 12 cells across has 10.6."""
 _DRAWN = 1_204_711
 """Keeps these numbers apart from other families' of the same seed."""
 
@@ -102,7 +104,9 @@ def _outline(rng: np.random.Generator, across: float, seed: int, radius: float) 
         plain = u_shape((0.0, 0.0), long, long * aspect, 0.32 * long, float(rng.uniform(0.38, 0.5)) * long * aspect)
     elif kind == "holes":
         plain = _with_hole(rng, plain, long, aspect, across)
-    return moved(plain, (0.0, 0.0), turn)
+    wide = math.sqrt(area(plain)) * across / (2.0 * radius)
+    larger = max(1.0, LEAST_WIDE / wide)
+    return moved(Contour(plain.exterior * larger, tuple(hole * larger for hole in plain.holes)), (0.0, 0.0), turn)
 
 
 def _with_hole(rng: np.random.Generator, plain: Contour, long: float, aspect: float, across: float) -> Contour:

@@ -29,15 +29,16 @@ from tests.support.scenes.shop_floor.places import a_colour, a_level, a_place, e
 def compound(rng: np.random.Generator, scene: Scene) -> Scene:
     """Potting compound in patches of cells, one or two of them at the edge, flush with the cut."""
     pitch = scene.cells.pitch_mm
+    most = float(np.clip(0.16 * extent(scene) / pitch, 2.0, 5.0))
     things: list[Thing] = []
     for number in range(int(rng.integers(1, 4))):
         place = a_place(rng, scene)
-        radius = float(rng.uniform(1.5, 5.0)) * pitch
+        radius = float(rng.uniform(1.5, most)) * pitch
         out = float(rng.uniform(-0.5, 0.3)) * radius if number == 0 else -float(rng.uniform(0.0, 3.0)) * radius
         area = blob(place.point(0.0, out), radius, int(rng.integers(10_000)), 0.25)
         if rng.random() < 0.25:  # along the edge
-            area = rectangle(place.point(0.0, 0.0), float(rng.uniform(4.0, 16.0)) * pitch, 2.4 * radius)
-            area = moved(moved(area, (-place.at[0], -place.at[1])), place.point(0.0, 0.0), 0.0)
+            band = rectangle((0.0, 0.0), float(rng.uniform(4.0, 16.0)) * pitch, 1.5 * radius)
+            area = moved(moved(band, (0.0, 0.0), place.out_deg + 90.0), place.point(0.0, 0.0))
         things.append(_filling(rng, scene, area))
     return with_things(scene, *things)
 

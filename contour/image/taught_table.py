@@ -11,6 +11,7 @@ import numpy as np
 
 from contour.errors import CalibrationError, PictureError
 from contour.geometry.arrays import Bytes, Float32s
+from contour.image.line_noise import without_line_noise
 
 _CELL_PX = 16
 _RIM_CELLS = 2
@@ -95,6 +96,7 @@ def teach(pictures: Sequence[Bytes]) -> TaughtTable:
     if len(shapes) > 1:
         kinds = ", ".join(sorted({_kind(picture) for picture in pictures}))
         raise PictureError(f"The pictures differ: {kinds}; expected one size and kind. Do not change the camera.")
+    pictures = [without_line_noise(picture) for picture in pictures]
     total = np.zeros(pictures[0].shape, np.float32)
     for picture in pictures:
         total += picture

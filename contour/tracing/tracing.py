@@ -13,6 +13,7 @@ from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, oriented_contour
+from contour.image.line_noise import without_line_noise
 from contour.image.opencv import grey
 from contour.image.picture_check import check_picture
 from contour.tracing import binarize, direct_scan, find_contours, sliding_matrix
@@ -36,6 +37,7 @@ def trace(
     PictureError, ParameterError, NoBlockFound.
     """
     check_picture(picture)
+    picture = without_line_noise(picture)
     method = _METHODS.get(settings.method)
     if method is None:
         raise ParameterError(f"method is {settings.method!r}: expected one of {', '.join(_METHODS)}.")

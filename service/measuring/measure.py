@@ -21,6 +21,7 @@ from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError, NoBlockFound, ParameterError
 from contour.geometry.rectifier import CroppedRectifier, Rectifier
 from contour.geometry.rings import Contour, Ring, densified
+from contour.image.line_noise import without_line_noise
 from contour.image.picture_check import check_picture
 from contour.image.region import Region
 from contour.image.taught_table import TableLimits, TableLook, look_at
@@ -141,6 +142,7 @@ class Measurer:
         calibration = self._calibration
         if calibration is not None:
             calibration.check_fits(width, height)
+        picture = without_line_noise(picture)
         if self._table is not None:
             look = self._look_at_table(self._table, picture, camera)
             watch.lap("table")

@@ -34,8 +34,16 @@ def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed:
     """Chains whose spline is the shorter description: its misfit and parameters cost less than those of its lines and
     arcs.
 
-    A run that is not is cut at its sharpest joint, and its parts are tried.
+    A run that is not is cut at its sharpest joint, and its parts are tried. A ring that is mostly bent and has a single
+    corner is tried as one curve before: where few cells leave a bend unseen, two edges that meet far outside are cheap.
     """
+    whole = (
+        _as_curve(witnesses, segments, list(range(len(segments))), True, signed)
+        if _bent(witnesses, segments, found)
+        else None
+    )
+    if whole is not None:
+        return [whole]
     chains: list[Chain] = []
     linked = _links(witnesses, segments, found)
     waiting = _runs(segments, linked)
@@ -72,10 +80,22 @@ def _as_curve(
     return None
 
 
+def _bent(witnesses: Witnesses, segments: Segments, found: Joints) -> bool:
+    """Whether a ring is of arcs for the greater part, without a long straight edge, and has but one corner."""
+    arcs = int(segments.bend.sum())
+    corners = int((found.kink >= _SHARPEST).sum())
+    return bool(_supple(witnesses, segments, found).all()) and 2 * arcs > len(segments) > 1 and corners == 1
+
+
+def _supple(witnesses: Witnesses, segments: Segments, found: Joints) -> Bools:
+    """Which segments may be part of a free curve: arcs, and straight edges that are short."""
+    length = np.abs(found.end - np.roll(found.begin, 1))
+    return np.asarray(segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch_px), np.bool_)
+
+
 def _links(witnesses: Witnesses, segments: Segments, found: Joints) -> Bools:
     """True where a segment may flow into the next: no sharp turn, an arc on either side, no long straight edge."""
-    length = np.abs(found.end - np.roll(found.begin, 1))
-    supple = segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch_px)
+    supple = _supple(witnesses, segments, found)
     links: Bools = (
         (found.kink < _SHARPEST) & supple & np.roll(supple, -1) & (segments.bend | np.roll(segments.bend, -1))
     )

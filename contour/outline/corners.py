@@ -55,7 +55,7 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Bools) -> Joints:
     after = np.roll(np.arange(len(segments)), -1)
     following = segments.models.take(after)
     near, far = last, first[after]
-    point, met = _intersections(segments.models, following, near, far)
+    point, met = intersections(segments.models, following, near, far)
     _, tangent = feet(segments.models, near)
     _, next_tangent = feet(following, far)
     gap = np.abs(far - near)
@@ -88,7 +88,7 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Bools) -> Joints:
     return Joints(end, begin, np.where(aside < _ASIDE * witnesses.pitch_px, kink, np.inf))
 
 
-def _intersections(models: Models, following: Models, near: Complexes, far: Complexes) -> tuple[Complexes, Bools]:
+def intersections(models: Models, following: Models, near: Complexes, far: Complexes) -> tuple[Complexes, Bools]:
     """Where neighbours intersect nearest to the evidence (Newton on the two distances), and whether they do."""
     point = 0.5 * (near + far)
     foot, tangent = feet(models, near)

@@ -11,10 +11,14 @@ from contour.geometry.signed_distance import depth_inside
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 _FAR_OFF_PITCHES = 0.5
+# Cells are lost, and leave ends inside; but nothing puts two ends side by side outside of a block: one may be a chip.
+_FAR_OUTSIDE_PITCHES = 1.0 / 3.0
+_IN_A_ROW, _IN_A_ROW_OUTSIDE = 4, 2
 
 
 def check_against_evidence(evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: Rectifier | None) -> None:
-    """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side.
+    """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side, or leaves
+    two in a row outside by more than a third.
 
     A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
     picture a lens bends a long edge by more than a small cell.
@@ -25,12 +29,16 @@ def check_against_evidence(evidence: RingEvidence, ring: Ring, pitch_px: float, 
         ring, places = rectifier.rectify(ring), rectifier.rectify(places)
     depth = depth_inside(ring, places)
     # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
-    inside, outside = depth > _FAR_OFF_PITCHES * pitch_px, (depth < -_FAR_OFF_PITCHES * pitch_px)[ends]
-    for off, points in ((inside, evidence.points), (outside, evidence.points[ends])):
-        in_a_row = off & np.roll(off, 1) & np.roll(off, 2) & np.roll(off, 3)
+    inside, outside = depth / pitch_px, -depth[ends] / pitch_px
+    for off, points, most, how_far in (
+        (inside > _FAR_OFF_PITCHES, evidence.points, _IN_A_ROW, "half a cell"),
+        (outside > _FAR_OFF_PITCHES, evidence.points[ends], _IN_A_ROW, "half a cell"),
+        (outside > _FAR_OUTSIDE_PITCHES, evidence.points[ends], _IN_A_ROW_OUTSIDE, "a third of a cell"),
+    ):
+        in_a_row = np.all([np.roll(off, shift) for shift in range(most)], axis=0)
         if in_a_row.any():
             x, y = points[np.argmax(in_a_row)]
             raise NoBlockFound(
                 f"no block found: the outline that fits most wall ends passes those near ({x:.0f}, {y:.0f}) px by more "
-                "than half a cell. Check that nothing lies against the block, and that its edge is in focus"
+                f"than {how_far}. Check that nothing lies against the block, and that its edge is in focus"
             )

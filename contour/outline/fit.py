@@ -18,6 +18,7 @@ from contour.outline.labelling import label
 from contour.outline.lines_and_arcs import distance
 from contour.outline.missed_walls import overlooked, with_bounds
 from contour.outline.proposals import FEW, gather, propose
+from contour.outline.roundings import rounded
 from contour.outline.runs import Segments, around, fitted, runs
 from contour.outline.spread import Vertices, unseen_share, vertex_sigma
 from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
@@ -87,7 +88,7 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
     witnesses = scaled(witnesses, max(noise_from_neighbours(witnesses), 0.7))
     witnesses, segments = segmented(witnesses)
     inlier = _inlying(witnesses, residuals(witnesses, segments))
-    segments, found = without_reversed(witnesses, segments, inlier)
+    segments, found, arcs = rounded(witnesses, *without_reversed(witnesses, segments, inlier))
     residual = residuals(witnesses, segments)
     chains = free_curves(witnesses, segments, found, residual)
     for chain in chains:
@@ -96,13 +97,23 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
     found = bevelled(witnesses, segments, found, inlier, _material(evidence, rectifier))
     vertices = _vertices(witnesses, segments, found, chains)
     spread = _spread(residual[inlier], wall_px)
-    free = np.isin(np.arange(len(segments)), [k for chain in chains for k in chain.segments])
-    sigma = vertex_sigma(witnesses, segments, inlier, vertices, free=free, spread=spread)
+    given = _given_leverage(segments, inlier, arcs, chains)
+    sigma = vertex_sigma(witnesses, segments, inlier, vertices, given=given, spread=spread)
     ring = np.column_stack([vertices.ring.real, vertices.ring.imag])
     if rectifier is not None:
         ring = rectifier.unrectify(ring)
     pieces = len(segments) - sum(len(chain.segments) - 1 for chain in chains)
     return FittedRing(ring, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces)
+
+
+def _given_leverage(segments: Segments, inlier: Bools, arcs: Bools, chains: list[Chain]) -> Float64s:
+    """Leverage of roundings, whose radius is all that their witnesses tell, and of free curves, on the mean; nan for
+    other segments, shape (S,)."""
+    seen = np.bincount(segments.owner(len(inlier)), inlier, len(segments))
+    given = np.where(arcs, 1.0 / np.maximum(seen, 1.0), np.nan)
+    for chain in chains:
+        given[list(chain.segments)] = chain.curve.freedom / max(int(inlier[chain.witnesses].sum()), 1)
+    return given
 
 
 def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complexes:

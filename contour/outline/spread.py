@@ -15,6 +15,8 @@ _SHARPEST_SINE = 0.2
 # Pitches.
 _MOST = 1.0
 _MOST_FREE = 0.25
+# Between two witnesses a curve may bend as much again as it is drawn: standard deviation over the sagitta.
+_BEND_UNSEEN = 1.0
 
 
 @dataclass(frozen=True)
@@ -28,14 +30,16 @@ class Vertices:
 
 
 def vertex_sigma(
-    witnesses: Witnesses, segments: Segments, inlier: Bools, vertices: Vertices, *, free: Bools, spread: float
+    witnesses: Witnesses, segments: Segments, inlier: Bools, vertices: Vertices, *, given: Float64s, spread: float
 ) -> Float64s:
     """Standard deviation of each vertex, shape (M,), pixels: of its place across its segment, or of a corner's place.
 
     A segment's own deviation at a place is the residual spread times the root of the fit's leverage there; a corner's
     is both of its edges', over the sine of the angle between them. A segment of one witness says nothing of its own
     direction, so no vertex counts with more than `_MOST`: an outline farther off leaves walls out, and that is told
-    apart. free: segments of a curve that is drawn through all their witnesses together, shape (K,).
+    apart. given: leverage of segments that do not lie where their own witnesses alone say, parts of free curves and
+    roundings, nan for the others, shape (K,). Between two witnesses such a curve may bend more or less than it is
+    drawn, which tells the more the fewer they are.
     """
     ring, owners = vertices.ring, vertices.owners
     index, multiplicity = stretch(len(witnesses), segments.first, segments.length)
@@ -52,7 +56,7 @@ def vertex_sigma(
         place = (_along(segments.models.take(which), ring) - middle[which]) / scale[which]
         row = _powers(place, segments.bend[which])
         spread_there: Float64s = np.einsum("mi,mij,mj->m", row, inverse[which], row)
-        return spread_there
+        return np.where(np.isnan(given[which]), spread_there, given[which])
 
     first, second = owners[:, 0], owners[:, 1]
     one, other = leverage(first), leverage(second)
@@ -61,8 +65,22 @@ def vertex_sigma(
     sine = np.abs((tangent.conj() * next_tangent).imag)
     corner = (first != second) & (sine > _SHARPEST_SINE)
     ratio = np.where(corner, (one + other) / np.maximum(sine, _SHARPEST_SINE) ** 2, np.maximum(one, other))
-    most = np.where(free[first] | free[second], _MOST_FREE, _MOST) * witnesses.pitch_px
-    return np.minimum(spread * np.sqrt(ratio), most)
+    loose = ~np.isnan(given)
+    most = np.where(loose[first] | loose[second], _MOST_FREE, _MOST) * witnesses.pitch_px
+    unseen = np.where(loose[first] & loose[second], _bend_unseen(witnesses, inlier, ring), 0.0)
+    return np.minimum(np.hypot(spread * np.sqrt(ratio), unseen), most)
+
+
+def _bend_unseen(witnesses: Witnesses, inlier: Bools, ring: Complexes) -> Float64s:
+    """How far a curve may leave its vertices unseen, shape (M,), pixels: a share of the sagitta over the gap about
+    each, whose middle is half of it away from any witness.
+    """
+    ahead, back = np.roll(ring, -1) - ring, ring - np.roll(ring, 1)
+    turn = np.abs(np.angle(ahead * back.conj()))
+    curvature = 2.0 * turn / np.maximum(np.abs(ahead) + np.abs(back), 1e-9)
+    seen = witnesses.points[inlier] if inlier.any() else witnesses.points
+    nearest = np.abs(ring[:, None] - seen[None, :]).min(axis=1)
+    return np.asarray(_BEND_UNSEEN * curvature * (2.0 * nearest) ** 2 / 8.0, np.float64)
 
 
 def unseen_share(witnesses: Witnesses, inlier: Bools) -> float:

@@ -58,33 +58,37 @@ def parallax(light: Bytes, tip: Float64s, axis: Float64s, *, straight: Float64s,
     lever, normal, width = (((tip - middle) * normal).sum(axis=1))[seen], normal[seen], width[seen]
     factors, deviation = _fitted(lever, normal, width)
     share = float(factors[1])
-    largest = float(np.quantile(np.abs(share * lever - normal @ factors[2:]), 0.9))
+    largest = float(np.quantile(np.abs(share * lever - normal @ factors[2:4]), 0.9))
     if share < _SIGNIFICANT * deviation or largest < _LEAST_PX or factors[0] < 1.0:
         return none
-    return Parallax(share, middle + factors[2:] / share, float(factors[0]))
+    return Parallax(share, middle + factors[2:4] / share, float(factors[0]))
 
 
 def _fitted(lever: Float64s, normal: Float64s, width: Float64s) -> tuple[Float64s, float]:
     """Top width, share and displacement (x, y) at the picture's middle, and the share's standard deviation.
 
     width = top + |share · lever − normal · displacement|: linear once the signs are known, which the last turn gives. A
-    tilted camera stands over another place than the picture's middle.
+    tilted camera stands over another place than the picture's middle. Walls of one direction, the glued ribbons, are
+    thicker by themselves: two terms in twice the angle take that up.
     """
     side = np.sign(lever)
     weight = np.ones_like(width)
-    factors: Float64s = np.zeros(4)
-    covariance: Float64s = np.eye(4)
+    factors: Float64s = np.zeros(6)
+    covariance: Float64s = np.eye(6)
+    twice = (normal[:, 0] + 1j * normal[:, 1]) ** 2
     spread = 1.0
     for _ in range(_ROUNDS):
-        terms = np.stack([np.ones_like(lever), side * lever, -side * normal[:, 0], -side * normal[:, 1]], axis=1)
+        ribbons = (twice.real, twice.imag)
+        moved = (-side * normal[:, 0], -side * normal[:, 1])
+        terms = np.stack([np.ones_like(lever), side * lever, *moved, *ribbons], axis=1)
         root = np.sqrt(weight)[:, None]
         # Held near the middle by a few pixels' worth of doubt: ends on one side of it cannot tell both apart.
-        matrix = (terms * root).T @ (terms * root) + np.diag([0.0, 0.0, _MIDDLE_HOLD, _MIDDLE_HOLD])
+        matrix = (terms * root).T @ (terms * root) + np.diag([0.0, 0.0, _MIDDLE_HOLD, _MIDDLE_HOLD, 1.0, 1.0])
         factors = np.asarray(np.linalg.solve(matrix, (terms * root).T @ (width * root[:, 0])), np.float64)
         off = np.abs(width - terms @ factors)
         spread = max(1.4826 * float(np.median(off)), 0.1)
         weight = 1 / (1 + (off / (2 * spread)) ** 2)
-        side = np.where(factors[1] * lever - normal @ factors[2:] >= 0, 1.0, -1.0)
+        side = np.where(factors[1] * lever - normal @ factors[2:4] >= 0, 1.0, -1.0)
         covariance = np.asarray(np.linalg.inv(matrix), np.float64)
     return factors, spread * float(np.sqrt(covariance[1, 1]))
 

@@ -58,3 +58,16 @@ def test_three_ends_in_a_row_are_missing_cells() -> None:
     off = np.isin(np.arange(len(evidence.points)), np.arange(10, 13))
     moved = evidence.points - np.where(off, 0.8 * PITCH, 0.0)[:, None] * evidence.normal
     check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
+
+
+def test_two_ends_side_by_side_outside_are_material_that_the_outline_leaves_out_and_one_is_a_chip() -> None:
+    evidence = witnesses(BLOCK, seed=2)
+    for count, pitches in ((1, 0.6), (2, 0.25)):
+        off = np.isin(np.arange(len(evidence.points)), np.arange(10, 10 + count))
+        moved = evidence.points + np.where(off, pitches * PITCH, 0.0)[:, None] * evidence.normal
+        check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
+    moved = (
+        evidence.points + np.where(np.isin(np.arange(len(off)), (10, 11)), 0.4 * PITCH, 0.0)[:, None] * evidence.normal
+    )
+    with pytest.raises(NoBlockFound, match="more than a third of a cell"):
+        check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)

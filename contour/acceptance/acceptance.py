@@ -63,6 +63,7 @@ def judge(
     # With a margin the polygon may well leave the picture; what was seen may not.
     outlines = [trace.contour.exterior] if trace else [polygon.pixels.exterior]
     nothing = [finding for finding in (no_walls(traced, limits.quality), no_comb(trace)) if finding]
+    covered = edge_covered(trace, to_mm, limits)
     findings = [
         *badly_seen(traced, limits.quality),
         *useless_picture(view.picture if nothing else None),
@@ -71,13 +72,14 @@ def judge(
         touches_border(outlines, view.size, limits.border_px),
         reaches_frame(trace),
         area_out_of_limits(polygon.area_mm2, limits),
-        disagrees(traced, limits.max_disagreement_pitches),
+        # Where something lies over the edge, that is why the picture says otherwise there.
+        None if covered else disagrees(traced, limits.max_disagreement_pitches),
         vague(trace),
         too_unsure(polygon.millimetres, budget, limits.max_uncertainty_mm),
         outside_work_area(polygon.millimetres, limits.work_area_mm),
         outside_calibration(polygon.pixels, limits.sure),
         several_blocks(trace, limits),
-        edge_covered(trace, to_mm, limits),
+        covered,
         too_many_points(polygon.pixels, limits.max_vertices),
         not_cuttable(polygon),
     ]

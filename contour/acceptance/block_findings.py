@@ -114,9 +114,19 @@ def several_blocks(traced: Trace | None, limits: Limits) -> Finding | None:
 
 
 def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | None:
-    """Contour and busy part of the picture farther apart than `limit` pitches."""
+    """Contour and busy part of the picture farther apart than `limit` pitches, or a bump or dent that chips make."""
     if traced is None or traced.disagreement is None or limit is None:
         return None
+    if traced.narrow is not None:
+        narrow = traced.narrow
+        what = "stands out of its edge" if narrow.outwards else "goes into its edge"
+        x, y = narrow.place_px
+        return Finding(
+            Refusal.METHODS_DISAGREE,
+            f"The contour {what} by {narrow.depth_pitches:.1f} cells over {narrow.width_pitches:.1f} cells near "
+            f"({x:.0f}, {y:.0f}) px: so narrow a part may be a chip that clings to the block, or cells lost. Look at "
+            "the overlay; take chips away, or set max_disagreement_pitches: 0 for parts that narrow.",
+        )
     apart = traced.disagreement
     advice = "Look at the overlay; check light and table, and that nothing lies against the block."
     if apart.pitches > limit:

@@ -55,8 +55,11 @@ class Disagreement:
         return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
 
 
-def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreement:
+def disagreement(picture: Bytes, contour: Contour, pitch_px: float, flat: Bytes | None = None) -> Disagreement:
     """The widest disagreement between the contour, in pixels, and the busy part of `picture`, grey or BGR, uint8.
+
+    `flat`, (h, w) on a grid over the picture, not 0 where something flat that is not the table fills cells or lies over
+    them: no account of the edge there, inside the contour or out of it; what hides the edge is another finding.
 
     Width is that of the largest disc that fits into the difference; a spike or a notch has little, but its tip lies far
     from the busy region's border. Busy parts that the contour does not reach do not count: several blocks are another
@@ -67,6 +70,12 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float) -> Disagreem
     small_pitch_px = pitch_px / shrink
     busy = _without_small_gaps(_busy(small, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
     ours = _drawn(contour, busy.shape[:2], shrink)
+    filled = np.zeros_like(busy)
+    if flat is not None and flat.any():
+        there = cv2.resize(flat, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
+        filled = np.asarray(cv2.dilate(there * np.uint8(255), _disc(_BLUR_PITCHES * small_pitch_px * 2)), np.uint8)
+    busy = np.asarray(cv2.bitwise_or(busy, cv2.bitwise_and(filled, ours)), np.uint8)
+    busy = np.asarray(cv2.bitwise_and(busy, cv2.bitwise_not(_but(filled, ours))), np.uint8)
     around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * small_pitch_px)), np.uint8)
     level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)

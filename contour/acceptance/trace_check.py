@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from contour.acceptance.disagreement import Disagreement, disagreement
+from contour.acceptance.narrow_features import NarrowFeature, narrow_feature
 from contour.acceptance.quality import Quality, block_quality
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
@@ -20,18 +23,20 @@ class CheckedTrace:
     """A trace with what its picture says of it.
 
     `quality` says how well its walls are seen. `disagreement` is the widest one with the busy part of the picture, None
-    without a pitch.
+    without a pitch. `narrow`: its deepest bump or dent that is no wider than a chip.
     """
 
     trace: Trace
     quality: Quality | None = None
     disagreement: Disagreement | None = None
+    narrow: NarrowFeature | None = None
 
     def moved(self, first: Float64s) -> CheckedTrace:
         """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
         apart = None if self.disagreement is None else self.disagreement.moved(x, y)
-        return replace(self, trace=self.trace.moved(first), disagreement=apart)
+        narrow = None if self.narrow is None else self.narrow.moved(x, y)
+        return replace(self, trace=self.trace.moved(first), disagreement=apart, narrow=narrow)
 
 
 def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> CheckedTrace:
@@ -40,10 +45,13 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
     `picture` and `rectifier` are those it was traced with.
     """
     quality = block_quality(picture, traced.light, traced.contour, traced.pitch_px)
-    apart = None
+    apart = narrow = None
     if traced.pitch_px is not None:
-        apart = disagreement(picture, _bent(traced, traced.pitch_px, rectifier), traced.pitch_px)
-    return CheckedTrace(traced, quality, apart)
+        flat = None if traced.look is None else traced.look.lit.astype(np.uint8)
+        apart = disagreement(picture, _bent(traced, traced.pitch_px, rectifier), traced.pitch_px, flat)
+        # Only where the edge was cut: closed cells are serrated.
+        narrow = None if traced.evidence is None else narrow_feature(traced.contour, traced.pitch_px)
+    return CheckedTrace(traced, quality, apart, narrow)
 
 
 def _bent(traced: Trace, pitch_px: float, rectifier: Rectifier | None) -> Contour:

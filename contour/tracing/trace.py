@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from contour.edge.stretches import Stretch
+from contour.edge.table_look import TableLook
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rings import Contour
 from contour.image.region import shifted
@@ -40,7 +41,8 @@ class Trace:
     `light` is the channel in which its walls were seen, (H, W), uint8, of what was looked at. `others` are pieces of
     comb beside it, `comb` what a cut block's cells look like (None where no method looked).
     `reaches_frame`: its walls go on to the last pixels of what was looked at.
-    `evidence`: what the contour rests on, stretches without gaps along each ring; None where the method does not say.
+    `evidence`: what the contour rests on, stretches without gaps along each ring, and `look` what lies about it; None
+    where the method does not say.
     """
 
     method: Method
@@ -53,6 +55,7 @@ class Trace:
     comb: Comb | None = None
     reaches_frame: bool = False
     evidence: tuple[Stretch, ...] | None = None
+    look: TableLook | None = field(default=None, compare=False, repr=False)
 
     def moved(self, first: Float64s) -> Trace:
         """The trace in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""

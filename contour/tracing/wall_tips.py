@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from contour.edge.edge_evidence import ring_evidence
+from contour.edge.table_look import table_look
+from contour.edge.visible_edge import fit_visible
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
@@ -23,6 +28,8 @@ from contour.walls.wall_mask import wall_mask
 _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
+# What of a thing lay inside the block as it was first seen shows once the rest of it is known.
+_LOOKS = 2
 
 
 def wall_tips(
@@ -46,11 +53,22 @@ def wall_tips(
     if settings.edge == "cells":
         return _closed_cells(picture, light, settings, on_stage)
     seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"))
+    look = table_look(picture, seen)
+    for _ in range(_LOOKS):
+        if not look.touches(seen):
+            break
+        seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=look.hiding)
+        look = table_look(picture, seen)
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
-    rings = [_fitted(ring, seen, rectifier) for ring in seen.rings]
-    for evidence, ring in zip(seen.rings, rings, strict=True):
-        check_against_evidence(evidence, ring.ring, seen.pitch_px, rectifier)
+    visible = [
+        fit_visible(ring, picture, look, rectifier, lambda evidence: _fitted(evidence, seen, rectifier))
+        for ring in seen.rings
+        if not (ring.is_hole and look.fills(ring))
+    ]
+    for one in visible:
+        check_against_evidence(one.evidence, one.fitted.ring, seen.pitch_px, rectifier)
+    rings = [one.fitted for one in visible]
     exterior = rings[0]
     if exterior.unseen_share > _MOST_UNSEEN:
         raise NoBlockFound(
@@ -62,13 +80,18 @@ def wall_tips(
     # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
     sure_px = uncertainty(
-        list(zip(seen.rings, rings, strict=True)),
+        [(one.evidence, one.fitted) for one in visible],
         pitch_px=seen.pitch_px,
         blur_px=seen.blur_px,
         dark=seen.polarity == "dark",
     )
     on_stage("trace")
-    return _trace(seen, contour, light, uncertainty_px=sure_px)
+    evidence = tuple(
+        stretch
+        for number, (ring, one) in enumerate(zip(contour.rings, visible, strict=True))
+        for stretch in ring_evidence(number, ring, one, look, rectifier, sure_px)
+    )
+    return replace(_trace(seen, contour, light, uncertainty_px=sure_px), evidence=evidence, look=look)
 
 
 def _cut_off(light: Bytes, seen: BlockEvidence, on_stage: OnStage) -> Trace:

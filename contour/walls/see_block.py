@@ -32,10 +32,18 @@ _DARK_POINTS_PER_PITCH = 4
 _STRANDS_PITCHES = 5.0
 
 
-def see_block(picture: Bytes, light: Bytes, polarity: str, on_mask: Callable[[], None] = lambda: None) -> BlockEvidence:
+def see_block(
+    picture: Bytes,
+    light: Bytes,
+    polarity: str,
+    on_mask: Callable[[], None] = lambda: None,
+    *,
+    hidden: Bytes | None = None,
+) -> BlockEvidence:
     """Witnesses of the largest block in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `light` is its `wall_light`. `on_mask` is called when the wall mask is made. Raises NoBlockFound.
+    `light` is its `wall_light`. `on_mask` is called when the wall mask is made. `hidden`, (h, w), not 0 where something
+    hides the block, on a grid of any size over the picture: no walls are seen there. Raises NoBlockFound.
     """
     cells = probe(light, polarity)
     if picture.ndim == 3:
@@ -59,7 +67,7 @@ def see_block(picture: Bytes, light: Bytes, polarity: str, on_mask: Callable[[],
             f"no block found: cells of {cells.pitch_px:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
             "like noise. Check the light, and that a block lies in view"
         )
-    seen = without_specks(seen, cells.pitch_px / scale, cells.wall_px / scale)
+    seen = without_specks(_visible(seen, hidden), cells.pitch_px / scale, cells.wall_px / scale)
     midway = None if cells.bright else midway_to_table(small, cells.level, seen.contrast)
     if midway is not None:
         # Such a block is told from the table by its darkness: fainter walls would be more of its cells' own shades.
@@ -72,6 +80,15 @@ def see_block(picture: Bytes, light: Bytes, polarity: str, on_mask: Callable[[],
     evidence = block_evidence(light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
+
+
+def _visible(seen: WallMask, hidden: Bytes | None) -> WallMask:
+    """The mask without walls in what hides the block."""
+    if hidden is None:
+        return seen
+    there = cv2.resize(hidden, seen.mask.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    mask, faint = (np.where(there, np.uint8(0), part) for part in (seen.mask, seen.faint))
+    return replace(seen, mask=mask, faint=faint)
 
 
 def _darker_than_table(seen: WallMask, light: Bytes, midway: float) -> WallMask:

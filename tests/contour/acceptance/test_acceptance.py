@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 from contour.acceptance.acceptance import View, judge, judge_without_block
+from contour.acceptance.disagreement import Disagreement
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.findings import Finding, Limits, Refusal
+from contour.acceptance.narrow_features import NarrowFeature
 from contour.acceptance.quality import Quality
 from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.rings import Contour
@@ -206,6 +208,17 @@ def test_another_block_is_refused_where_the_recipe_wants_one() -> None:
 def test_an_offcut_is_no_block() -> None:
     assert judge(GOOD, FRAME, LIMITS, traced=traced(others=(Piece(390.0, (400, 50, 460, 120)),))) == ()
     assert judge(GOOD, FRAME, LIMITS, traced=traced(others=(Piece(410.0, (400, 50, 460, 120)),))) != ()
+
+
+@pytest.mark.parametrize(("outwards", "words"), [(True, "stands out of"), (False, "goes into")])
+def test_a_bump_or_dent_as_narrow_as_a_chip_is_told_with_its_size_and_place(outwards: bool, words: str) -> None:
+    narrow = NarrowFeature(1.25, 3.5, (40.0, 60.0), outwards)
+    seen = replace(traced(), disagreement=Disagreement(0.5, (0.0, 0.0), True, 0.0), narrow=narrow)
+    (finding,) = judge(GOOD, FRAME, replace(LIMITS, max_disagreement_pitches=2.0), traced=seen)
+    assert finding.refusal == Refusal.METHODS_DISAGREE
+    assert f"{words} its edge by 1.2 cells over 3.5 cells near (40, 60) px" in finding.text
+    assert "max_disagreement_pitches: 0" in finding.text
+    assert judge(GOOD, FRAME, replace(LIMITS, max_disagreement_pitches=None), traced=seen) == ()
 
 
 def test_of_two_nearly_equal_blocks_none_is_the_largest() -> None:

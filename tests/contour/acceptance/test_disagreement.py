@@ -187,3 +187,26 @@ def test_colour_counts_where_lightness_is_the_same() -> None:
     assert disagreement(picture, scene.truth_px, scene.pitch_px).pitches < 1.2
     half = contour(polygon(scene.truth_px).intersection(shapely.box(0, 0, 300, 480)))
     assert disagreement(picture, half, scene.pitch_px).pitches > LIMIT
+
+
+def test_what_is_flat_and_known_is_no_table_inside_the_contour() -> None:
+    """Compound: without cells it looks like table, with its place given it is no disagreement."""
+    scene = block("rectangle")
+    middle, size = scene.truth_px.exterior.mean(axis=0), 3.0 * scene.pitch_px
+    area = np.rint(middle + size * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])).astype(np.int32)
+    picture, flat = scene.picture.copy(), np.zeros((120, 160), np.uint8)
+    cv2.fillPoly(picture, [area], int(np.median(scene.picture[:20])))
+    cv2.fillPoly(flat, [area // 4], 1)
+    assert disagreement(picture, scene.truth_px, scene.pitch_px).pitches > LIMIT
+    assert disagreement(picture, scene.truth_px, scene.pitch_px, flat).pitches < 1.2
+    assert disagreement(picture, scene.truth_px, scene.pitch_px, np.zeros_like(flat)).pitches > LIMIT
+
+
+def test_what_is_flat_elsewhere_hides_no_disagreement() -> None:
+    scene = block("rectangle")
+    whole = polygon(scene.truth_px)
+    x0, y0, _, y1 = whole.bounds
+    half, flat = contour(whole & shapely.box(x0, y0, whole.centroid.x, y1)), np.zeros((120, 160), np.uint8)
+    flat[:10, :10] = 1
+    one, other = (disagreement(scene.picture, half, scene.pitch_px, given) for given in (None, flat))
+    assert other == one

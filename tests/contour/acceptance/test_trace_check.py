@@ -10,6 +10,7 @@ from contour.acceptance.disagreement import disagreement
 from contour.acceptance.quality import block_quality
 from contour.acceptance.trace_check import check_trace
 from contour.geometry.rectifier import CroppedRectifier
+from contour.geometry.rings import Contour
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from tests.support.pictures.small_scenes import block
@@ -40,6 +41,33 @@ def test_without_a_pitch_there_is_no_second_account() -> None:
     checked = check_trace(picture, replace(trace(picture, TraceSettings()), pitch_px=None), None)
     assert checked.quality is not None
     assert checked.disagreement is None
+
+
+def with_a_chip(contour: Contour) -> Contour:
+    """The contour with a square of two cells on its longest edge."""
+    ring = contour.exterior
+    long = np.hypot(*(np.roll(ring, -1, axis=0) - ring).T).argmax()
+    begin, end = ring[long], ring[(long + 1) % len(ring)]
+    along = (end - begin) / np.hypot(*(end - begin))
+    out = np.array([-along[1], along[0]])
+    out = out if out @ (begin - ring.mean(axis=0)) > 0 else -out
+    middle = 0.5 * (begin + end)
+    chip = [middle - 20 * along, middle - 20 * along + 40 * out, middle + 20 * along + 40 * out, middle + 20 * along]
+    return Contour(np.insert(ring, long + 1, chip, axis=0))
+
+
+def test_a_narrow_bump_of_a_cut_edge_is_told_and_moves_with_the_trace() -> None:
+    picture = block("rectangle").picture
+    traced = trace(picture, TraceSettings())
+    assert check_trace(picture, traced, None).narrow is None
+    chipped = replace(traced, contour=with_a_chip(traced.contour))
+    checked = check_trace(picture, chipped, None)
+    assert checked.narrow is not None
+    assert checked.narrow.outwards
+    moved = checked.moved(np.array([30.0, 20.0]))
+    assert moved.narrow == checked.narrow.moved(30.0, 20.0)
+    closed_cells = check_trace(picture, replace(chipped, evidence=None), None)
+    assert closed_cells.narrow is None
 
 
 def test_moved_moves_the_contour_and_the_place_of_disagreement() -> None:

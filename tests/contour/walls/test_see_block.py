@@ -143,6 +143,21 @@ def test_rings_turn_with_the_material_on_their_left() -> None:
     assert not exterior.is_hole
 
 
+def test_no_walls_are_seen_in_what_hides_the_block() -> None:
+    """On a grid over the picture: the witnesses go around it, and nothing else changes."""
+    rendered = picture()
+    plain = seen_in(rendered.picture, "auto").rings[0].points
+    corner = plain[plain[:, 0].argmax()]
+    hidden = np.zeros((150, 200), np.uint8)
+    x, y = (corner / 4).astype(int)
+    hidden[max(0, y - 15) : y + 15, max(0, x - 15) : x + 15] = 1
+    found = see_block(rendered.picture, wall_light(rendered.picture), "auto", hidden=hidden).rings[0].points
+    assert np.abs(found - corner).max(axis=1).min() > 50
+    far = np.abs(plain - corner).max(axis=1) > 120
+    nearest = np.hypot(*np.moveaxis(plain[far][:, None] - found, 2, 0)).min(axis=1)
+    assert nearest.max() < 0.5
+
+
 def test_chips_and_dust_beside_the_block_are_no_witnesses() -> None:
     rendered = picture(clutter=True)
     ring = seen_in(rendered.picture, "auto").rings[0]

@@ -1,0 +1,129 @@
+"""Bumps and dents of an outline too narrow to be told from a chip that clings to the block, or from cells lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import Contour, Ring
+
+# All in cell pitches. Narrower than this at its foot, farther out than that.
+_WIDTH, _DEPTH = 5.0, 0.75
+# Beside its foot the outline runs along it over so much, but for this angle; a corner between two such edges stands
+# out by half its width times the tangent.
+_BESIDE, _ANGLE_DEG = 2.0, 22.0
+_SLOPE = 0.5 * float(np.tan(np.radians(_ANGLE_DEG)))
+# What stands out by no more than this times what the edges on its two sides are apart is a step from one to the other.
+_STEP = 1.5
+_SPACING, _LONGEST = 0.25, 16.0
+# From foot to foot the narrowest is told: a wider one, farther out on the same edge, is no deeper by this.
+_DEEPER = 0.05
+
+
+@dataclass(frozen=True)
+class NarrowFeature:
+    """A bump (or dent) of the outline: how far it stands out of the line of its foot and how wide it is there, pitches;
+    its middle, pixels (x, y).
+    """
+
+    depth_pitches: float
+    width_pitches: float
+    place_px: tuple[float, float]
+    outwards: bool
+
+    def moved(self, x: float, y: float) -> NarrowFeature:
+        """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
+        return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
+
+
+def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
+    """The deepest bump or dent of a contour in pixels on an edge that goes on in its own direction; None without one.
+
+    A corner is none, nor is the end of an arm: there the edges beside it run another way.
+    """
+    found = [one for ring in contour.rings for one in [_deepest(ring, pitch_px)] if one is not None]
+    return max(found, key=lambda one: one.depth_pitches) if found else None
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """The outline beside each place of a ring, on one side of it, in two halves: their unit directions, and the middle
+    of the farther one, (N, 2) each.
+    """
+
+    near: Float64s
+    far: Float64s
+    middle: Float64s
+
+    @classmethod
+    def of(cls, places: Float64s, way: int, half: int) -> _Beside:
+        """Before (-1) or after (1) each place, halves of so many places."""
+        one, two = (np.roll(places, -way * reach, axis=0) for reach in (half, 2 * half))
+        return cls(_unit(way * (one - places)), _unit(way * (two - one)), (one + two) / 2)
+
+    def rolled(self, steps: int) -> _Beside:
+        """What lies beside the places so many steps on."""
+        return _Beside(*(np.roll(part, -steps, axis=0) for part in (self.near, self.far, self.middle)))
+
+    def along(self, foot: Float64s) -> Float64s:
+        """Cosine of the angle to the foot, of the half that runs less along it."""
+        return np.asarray(np.minimum((self.near * foot).sum(axis=1), (self.far * foot).sum(axis=1)), np.float64)
+
+    def apart(self, other: _Beside) -> Float64s:
+        """How far apart the lines of the edge on both sides are."""
+        mean, way = _unit(self.far + other.far), other.middle - self.middle
+        return np.asarray(np.abs(mean[:, 0] * way[:, 1] - mean[:, 1] * way[:, 0]), np.float64)
+
+
+def _deepest(ring: Ring, pitch_px: float) -> NarrowFeature | None:
+    lengths = RingLengths.of(ring)
+    count = max(16, int(lengths.length / (_SPACING * pitch_px)))
+    places = lengths.at(np.linspace(0.0, lengths.length, count, endpoint=False, dtype=np.float64))
+    spacing = lengths.length / count
+    half = max(1, round(0.5 * _BESIDE * pitch_px / spacing))
+    before, after = _Beside.of(places, -1, half), _Beside.of(places, 1, half)
+    aligned = float(np.cos(np.radians(_ANGLE_DEG)))
+    best: NarrowFeature | None = None
+    for steps in range(2, min(int(_LONGEST * pitch_px / spacing), count // 2)):
+        foot = np.roll(places, -steps, axis=0) - places
+        width = np.hypot(*foot.T)
+        along = foot / np.maximum(width, 1e-9)[:, None]
+        other = after.rolled(steps)
+        chosen = (width < _WIDTH * pitch_px) & (np.minimum(before.along(along), other.along(along)) > aligned)
+        starts = np.flatnonzero(chosen)
+        if len(starts):
+            least = np.maximum(np.maximum(_DEPTH * pitch_px, _SLOPE * width), _STEP * before.apart(other))
+            best = _deeper(best, places, (starts, steps), (along, width, least), pitch_px)
+    return best
+
+
+def _deeper(
+    best: NarrowFeature | None,
+    places: Float64s,
+    run: tuple[Indices, int],
+    foot: tuple[Float64s, Float64s, Float64s],
+    pitch_px: float,
+) -> NarrowFeature | None:
+    """The deepest of those that begin at `run`'s places and are its steps long, or `best` where none is deeper."""
+    starts, steps = run
+    along, width, least = (part[starts] for part in foot)
+    path = places[(starts[:, None] + np.arange(steps + 1)) % len(places)] - places[starts][:, None, :]
+    off = path[:, :, 0] * along[:, 1:] - path[:, :, 1] * along[:, :1]
+    farthest = np.abs(off).argmax(axis=1)
+    row = np.arange(len(starts))
+    depth = np.abs(off[row, farthest])
+    depth = np.where(depth > least, depth, 0.0)
+    one = int(depth.argmax())
+    if depth[one] <= ((best.depth_pitches + _DEEPER) * pitch_px if best else 0.0):
+        return best
+    x, y = places[(starts[one] + farthest[one]) % len(places)].tolist()
+    # Contours in pixels have the block on their left as seen with y down: what lies on the right is out.
+    outwards = bool(off[one].mean() < 0)
+    return NarrowFeature(float(depth[one]) / pitch_px, float(width[one]) / pitch_px, (x, y), outwards)
+
+
+def _unit(vectors: Float64s) -> Float64s:
+    return np.asarray(vectors / np.maximum(np.hypot(*vectors.T)[:, None], 1e-9), np.float64)

@@ -1,0 +1,143 @@
+"""Where filled cells end: potting compound, adhesive and crushed cells, cut with the walls around them.
+
+What lies over the edge sticks out of it. What was cut with the block ends on the line of the edges on its two sides, or
+inside of both where these meet in a corner.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from contour.edge.flanks import out_of_flanks
+from contour.edge.ring_places import runs_of
+from contour.edge.table_look import TableLook
+from contour.geometry.arrays import Bools, Bytes, Float64s, Indices
+from contour.geometry.rings import Ring
+from contour.image.pixel_grid import pixels_of, samples_of
+from contour.image.pixel_sampling import sample_at
+from contour.walls.wall_evidence import RingEvidence
+
+# How near to its border on the map the material's edge lies, and how far beyond the table may begin: in between is the
+# block's shadow.
+_EDGE_PITCHES = 0.5
+_TABLE_PITCHES = (0.5, 0.75, 1.0, 1.25)
+# Ends of walls that belong to a thing lie this near to it.
+_TOUCHES_PITCHES = 1.0
+# What sticks out of the edge by more than this was not cut with it; so much of a border must be cut.
+_FLUSH_PITCHES = 0.18
+_CUT_SHARE = 0.8
+_STEP_PX = 0.5
+_LEAST_CONTRAST = 6.0
+
+
+@dataclass(frozen=True)
+class CutMaterial:
+    """Ends of filled cells along an edge: points and outward normals (K, 2), pixels, and where along the coarse ring
+    they belong (K,), pixels.
+    """
+
+    points: Float64s
+    normal: Float64s
+    position: Float64s
+
+
+def cut_material(picture: Bytes, clear: RingEvidence, distrusted: Float64s, look: TableLook) -> list[CutMaterial]:
+    """The edges of what fills cells up to the edge, in a picture, grey (H, W) or BGR (H, W, 3), uint8.
+
+    `clear`: the ring's witnesses that lie at nothing foreign. `distrusted`: ends of walls at something foreign, (N, 2).
+    """
+    found = []
+    for ring in _with_things(clear, distrusted, look):
+        at_thing = look.foreign_at(ring) < _EDGE_PITCHES * look.pitch_px + look.step
+        if at_thing.all() or not at_thing.any():
+            continue
+        normal = _normals(ring, max(1, round(0.5 * look.pitch_px / look.step)))
+        for run in runs_of(at_thing):
+            one = _cut(picture, clear, (ring, normal), run, look)
+            if one is not None:
+                found.append(one)
+    return found
+
+
+def _cut(
+    picture: Bytes, clear: RingEvidence, border: tuple[Ring, Float64s], run: Indices, look: TableLook
+) -> CutMaterial | None:
+    """The run of a border where it is cut material, flush with the edges on its two sides; None where it is not."""
+    place, normal = border[0][run], border[1][run]
+    pitch_px = look.pitch_px
+    off, sure = _steps(picture, place, normal, _EDGE_PITCHES * pitch_px)
+    ends = place + off[:, None] * normal
+    beyond = np.any([look.table_at(place + reach * pitch_px * normal) for reach in _TABLE_PITCHES], axis=0)
+    arc = _arc(clear.coarse)
+    first, last = (float(arc[((clear.coarse - place[end]) ** 2).sum(axis=1).argmin()]) for end in (0, -1))
+    out = out_of_flanks(clear, (first, last), ends, pitch_px)
+    if out is None:
+        return None
+    # What is darker than the table may as well be a shadow beside the block.
+    lit = look.lighter_at(place - _EDGE_PITCHES * pitch_px * normal)
+    cut = sure & beyond & lit & (out < _FLUSH_PITCHES * pitch_px)
+    if np.count_nonzero(cut) < _CUT_SHARE * len(run):
+        return None
+    share = np.linspace(0.0, 1.0, len(run))[cut]
+    position = (first + share * ((last - first) % arc[-1])) % arc[-1]
+    return CutMaterial(ends[cut], normal[cut], position)
+
+
+def _arc(coarse: Ring) -> Float64s:
+    """Arc length at each vertex of a ring and, last, the whole, shape (M + 1,)."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T))])
+
+
+def _with_things(clear: RingEvidence, distrusted: Float64s, look: TableLook) -> list[Ring]:
+    """Borders of the coarse block together with the things that its walls end at, pixels, positive shoelace."""
+    count, parts = cv2.connectedComponents(look.foreign.astype(np.uint8), connectivity=8)
+    touching = np.zeros(count, np.bool_)
+    grid = np.rint(samples_of(distrusted, look.step)).astype(int)
+    reach = round(_TOUCHES_PITCHES * look.pitch_px / look.step)
+    for x, y in grid:
+        near = parts[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1]
+        touching[np.unique(near)] = True
+    touching[0] = False
+    union = touching[parts].astype(np.uint8)
+    cv2.fillPoly(union, [np.rint(samples_of(clear.coarse, look.step)).astype(np.int32)], 1)
+    size = 2 * round(0.5 * look.pitch_px / look.step) + 1
+    union = np.asarray(
+        cv2.morphologyEx(union, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))), np.uint8
+    )
+    chains, _ = cv2.findContours(union, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    chain = max(chains, key=len)[:, 0, :].astype(np.float64)
+    following = np.roll(chain, -1, axis=0)
+    if float((chain[:, 0] * following[:, 1] - following[:, 0] * chain[:, 1]).sum()) < 0:
+        chain = chain[::-1]
+    return [pixels_of(chain, look.step)]
+
+
+def _normals(ring: Ring, half: int) -> Float64s:
+    """Outward unit normals of a ring with positive shoelace, over `half` vertices to each side, shape (N, 2)."""
+    along = np.roll(ring, -half, axis=0) - np.roll(ring, half, axis=0)
+    along = along / np.maximum(np.hypot(*along.T)[:, None], 1e-9)
+    return np.stack([along[:, 1], -along[:, 0]], axis=1)
+
+
+def _steps(picture: Bytes, place: Float64s, normal: Float64s, reach: float) -> tuple[Float64s, Bools]:
+    """Distance from each place along its normal to the step in the picture there, shape (N,), pixels, and whether the
+    two sides of it differ.
+    """
+    along = np.arange(-reach, reach + _STEP_PX, _STEP_PX)
+    x, y = (place[:, axis, None] + along * normal[:, axis, None] for axis in (0, 1))
+    planes = [picture] if picture.ndim == 2 else list(cv2.split(picture))
+    profiles = np.stack([sample_at(np.asarray(plane, np.uint8), x, y) for plane in planes])
+    count = np.arange(1, len(along))
+    total = np.cumsum(profiles, axis=2)
+    low = total[:, :, :-1] / count
+    high = (total[:, :, -1:] - total[:, :, :-1]) / count[::-1]
+    # The split that leaves the least variance has the most between its sides.
+    between = (high - low) ** 2 * (count * count[::-1])
+    best = between.max(axis=2).argmax(axis=0)
+    row = np.arange(len(place))
+    split = between[best, row].argmax(axis=1)
+    one, other = low[best, row, split], high[best, row, split]
+    return along[split] + 0.5 * _STEP_PX, np.abs(one - other) > _LEAST_CONTRAST

@@ -1,0 +1,88 @@
+"""What each stretch of a fitted ring rests on: on ends seen, or on a line carried across what hides them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contour.edge.ring_places import nearest, places_along, runs_of
+from contour.edge.stretches import Hider, State, Stretch
+from contour.edge.table_look import TableLook
+from contour.edge.visible_edge import SPACING_PITCHES, VisibleRing
+from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.rectifier import Rectifier
+from contour.geometry.rings import Ring
+
+_SHORTEST_PITCHES = 1.0
+# A bridge joins two sides: walls seen over so much of each, and between them no more of a bend than this.
+_FLANK_PITCHES, _FLANK_WITNESSES = 6.0, 3
+_STRAIGHT_PITCHES, _STRAIGHT_PX = 0.02, 0.7
+_SMOOTH_DEG = 12.0
+# What an edge may bend unseen, of the length bridged.
+_BEND = 0.02
+
+
+def ring_evidence(
+    number: int, ring: Ring, visible: VisibleRing, look: TableLook, rectifier: Rectifier | None, bound_px: float
+) -> tuple[Stretch, ...]:
+    """The stretches of `ring`, pixels, in its own order; `number` is its place in the contour."""
+    pitch_px = look.pitch_px
+    places = places_along(ring, SPACING_PITCHES * pitch_px, rectifier)
+    if not len(visible.distrusted):
+        return (Stretch(number, 0.0, places.whole, "seen", None, bound_px),)
+    hidden = visible.hidden(places.points, look)
+    fills = visible.evidence.points[visible.filled & visible.fitted.inlier]
+    filled = ~hidden & (nearest(places.points, fills) < 2 * SPACING_PITCHES * pitch_px)
+    label = np.where(filled, -1, 0)
+    # Shorter ones are gaps between ends, as there are everywhere.
+    runs = [run for run in runs_of(hidden) if len(run) > _SHORTEST_PITCHES / SPACING_PITCHES]
+    for index, run in enumerate(runs):
+        label[run] = index + 1
+    states = [_run_state(run, places.points, visible.on_line, pitch_px) for run in runs]
+    starts = np.unique(np.concatenate([[0], np.flatnonzero(label != np.roll(label, 1))]))
+    stretches = []
+    for first, last in zip(starts, [*starts[1:], len(label)], strict=True):
+        begin, end = float(places.at[first]), float(places.at[last]) if last < len(label) else places.whole
+        kind = int(label[first])
+        if kind > 0:
+            state, straight, length = states[kind - 1]
+            stretches.append(Stretch(number, begin, end, state, "object", bound_px + _BEND * length, straight))
+        else:
+            by: Hider | None = "compound" if kind < 0 else None
+            stretches.append(Stretch(number, begin, end, "seen", by, bound_px))
+    return tuple(stretches)
+
+
+def _run_state(run: Indices, place: Float64s, on_line: Float64s, pitch_px: float) -> tuple[State, bool, float]:
+    """Whether a hidden run is bridged or covered, whether along a line, and its length, pixels."""
+    count = len(place)
+    path = place[run]
+    length = float(np.hypot(*np.diff(path, axis=0).T).sum())
+    if len(run) == count:
+        return "covered", False, length
+    before, after = _flank(place, run[0], -1), _flank(place, run[-1], 1)
+    support = [np.count_nonzero(nearest(on_line, side) < SPACING_PITCHES * pitch_px) for side in (before, after)]
+    if min(support) < _FLANK_WITNESSES:
+        return "covered", False, length
+    path = np.concatenate([before[:4][::-1], path, after[:4]])
+    chord = path[-1] - path[0]
+    chord = chord / max(float(np.hypot(*chord)), 1e-9)
+    off = np.abs((path - path[0]) @ np.array([-chord[1], chord[0]]))
+    if float(off.max()) < max(_STRAIGHT_PX, _STRAIGHT_PITCHES * pitch_px):
+        return "bridged", True, length
+    steps = np.diff(path[::2], axis=0)
+    turn = np.abs(np.angle(np.exp(1j * np.diff(np.arctan2(steps[:, 1], steps[:, 0])))))
+    if np.degrees(turn.max(initial=0.0)) < _SMOOTH_DEG:
+        return "bridged", False, length
+    return "covered", False, length
+
+
+def _flank(place: Float64s, end: int, way: int) -> Float64s:
+    """The outline before (-1) or behind (1) the end of a run, (N, 2), up to the next corner: an edge beyond it says
+    nothing of where this one lies.
+    """
+    count = max(3, round(_FLANK_PITCHES / SPACING_PITCHES))
+    path = place[(end + way * np.arange(1, count + 1)) % len(place)]
+    heading = np.angle(np.diff(path[:, 0] + 1j * path[:, 1]))
+    turn = np.abs(np.angle(np.exp(1j * np.diff(heading))))
+    corners = np.flatnonzero(np.degrees(turn) > _SMOOTH_DEG)
+    return path[: corners[0] + 2] if len(corners) else path

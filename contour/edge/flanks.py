@@ -1,0 +1,43 @@
+"""The lines of an edge on both sides of a run of it that is in doubt."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contour.geometry.arrays import Float64s
+from contour.walls.wall_evidence import RingEvidence
+
+_PITCHES, _FEWEST = 6.0, 4
+
+
+def out_of_flanks(
+    clear: RingEvidence, stops: tuple[float, float], points: Float64s, pitch_px: float
+) -> Float64s | None:
+    """How far points (N, 2), pixels, stand out of the edge that goes on straight from both sides of a run, up to the
+    corner where these meet, shape (N,), negative inside. None where too few witnesses on one side tell.
+
+    `clear`: the witnesses that are not in doubt; the run begins and ends at `stops` along the coarse ring.
+    """
+    coarse = clear.coarse
+    whole = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
+    lines = [_line(clear, stop, way, (whole, pitch_px)) for stop, way in zip(stops, (-1.0, 1.0), strict=True)]
+    out = [(points - line[0]) @ line[1] for line in lines if line is not None]
+    return np.asarray(np.maximum(*out), np.float64) if len(out) == 2 else None
+
+
+def _line(
+    clear: RingEvidence, stop: float, way: float, lengths: tuple[float, float]
+) -> tuple[Float64s, Float64s] | None:
+    """A point and the outward normal of the line through witnesses before (-1) or behind (1) `stop`."""
+    whole, pitch_px = lengths
+    beside = (way * (clear.position - stop)) % whole < _PITCHES * pitch_px
+    if np.count_nonzero(beside) < _FEWEST:
+        return None
+    points = clear.points[beside]
+    middle = np.median(points, axis=0)
+    spread = points - middle
+    _, vectors = np.linalg.eigh(spread.T @ spread)
+    normal = vectors[:, 0]
+    normal = normal if normal @ clear.normal[beside].mean(axis=0) >= 0 else -normal
+    # Broken walls lie inside: the line goes through the outer half.
+    return middle + float(np.median(spread @ normal)) * normal, normal

@@ -1,0 +1,59 @@
+"""Places along a ring, and runs of them that have something in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.geometry.arrays import Bools, Float64s, Indices
+from contour.geometry.rectifier import Rectifier
+from contour.geometry.rings import Ring
+
+
+@dataclass(frozen=True)
+class Places:
+    """Places along a ring, pixels (N, 2), their arc lengths along its chords from its first vertex on (N,), and its
+    whole length.
+    """
+
+    points: Float64s
+    at: Float64s
+    whole: float
+
+
+def places_along(ring: Ring, spacing: float, rectifier: Rectifier | None) -> Places:
+    """Places no more than `spacing` pixels apart, all vertices among them; straight where the ring is without the
+    lens.
+    """
+    following = np.roll(ring, -1, axis=0)
+    length = np.hypot(*(following - ring).T)
+    parts = np.maximum(np.ceil(length / spacing).astype(int), 1)
+    share = np.concatenate([np.arange(count) / count for count in parts])
+    owner = np.repeat(np.arange(len(ring)), parts)
+    start = np.concatenate([[0.0], np.cumsum(length)])
+    a, b = (ring, following) if rectifier is None else (rectifier.rectify(ring), rectifier.rectify(following))
+    points = a[owner] + share[:, None] * (b - a)[owner]
+    if rectifier is not None:
+        points = rectifier.unrectify(points)
+    return Places(points, start[owner] + share * length[owner], float(start[-1]))
+
+
+def nearest(points: Float64s, others: Float64s) -> Float64s:
+    """Distance of each of `points` (N, 2) from the nearest of `others` (M, 2), shape (N,); inf where there is none."""
+    if not len(others):
+        return np.full(len(points), np.inf)
+    parts = np.array_split(points, max(1, len(points) // 256))
+    square = [((part[:, None, :] - others[None, :, :]) ** 2).sum(axis=2).min(axis=1) for part in parts]
+    return np.asarray(np.sqrt(np.concatenate(square)), np.float64)
+
+
+def runs_of(chosen: Bools) -> list[Indices]:
+    """Indices of each run of chosen places around the ring, in its order."""
+    if chosen.all():
+        return [np.arange(len(chosen))]
+    shift = int(np.argmin(chosen))
+    turned = np.roll(chosen, -shift).astype(np.int8)
+    starts = np.flatnonzero(np.diff(turned, prepend=0) > 0)
+    stops = np.flatnonzero(np.diff(turned, append=0) < 0)
+    return [(np.arange(a, b + 1) + shift) % len(chosen) for a, b in zip(starts, stops, strict=True)]

@@ -1,0 +1,267 @@
+"""What is table, what is comb, and what is neither: flat things that lie on the block, on the table, or on both.
+
+Light on a table changes slowly: lamps, shadows and vignetting have soft borders. Whatever lies on it has a sharp one.
+So the table is what can be reached from most of it without crossing a sharp border, and every other flat part that is
+as light as the table around it. Comb is nowhere flat: no point of it is farther than half a cell from a wall.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s
+from contour.image.pixel_grid import samples_of, whole_averaged
+from contour.image.pixel_sampling import sample_at
+from contour.walls.wall_evidence import BlockEvidence, RingEvidence
+
+_SAMPLES_PER_PITCH, _FINEST_PX = 5.5, 2
+# Of the gradient's usual size on the picture's flat parts; and in eighths of a grey level a sample.
+_SHARP, _LEAST_SHARP = 3.5, 10.0
+# Of the gradient's usual size in comb: no border may be so much sharper than walls that comb itself looks flat.
+_OF_WALLS = 0.7
+# Shorter borders are specks, scratches and dust: no border of a thing that could hide an edge.
+_SPECK_PITCHES = 1.0
+# Cells have no room for a disc of this radius; and a border with gaps smaller than its diameter still holds.
+_CELL_ROOM, _GAP = 0.62, 0.2
+_LEVEL_PITCHES, _SHARE_KNOWN = 10.0, 0.02
+# Of the table's light: below that nothing is a shadow.
+_DEEPEST_SHADE = 0.2
+# Within this of a thing a shadow is that thing's own, and no more to be trusted.
+_CAST_PITCHES = 2.5
+# Apart from the table around by so many grey levels, and so many of its spreads.
+_APART, _APART_SPREADS = 4.0, 1.0
+_RIM = 1.5
+_ROUNDS, _FEW_SAMPLES = 4, 20.0
+_THIN = 1.5
+_NOWHERE_PX = 1e6
+_BESIDE_PITCHES = 0.6
+# Of the gradient's usual mean over a cell of comb.
+_QUIET = 0.45
+_MOST = 0.5
+# Shadows, sides of the block and its mirror image make a band beside it that has no room for a disc of this radius, or
+# for few here and there; where walls are lost in a cell or two, the cells are flat.
+_BAND, _LONG_PITCHES = 0.55, 2.0
+
+
+@dataclass(frozen=True)
+class TableLook:
+    """Maps on a grid of `step` pixels a sample, (h, w): `table`, and `foreign`, flat and not the table."""
+
+    table: Bools
+    foreign: Bools
+    things: Bools
+    """What is foreign, mirror images of the block's walls all around it included."""
+    step: int
+    pitch_px: float
+    lighter: Bools
+    """Where the picture is lighter than the table."""
+    shade: Bools
+    """Where it is darker in all channels, as a shadow makes a table."""
+    away: Float32s
+    """Distance of each sample from what is foreign, pixels."""
+
+    def foreign_at(self, points: Float64s) -> Float64s:
+        """Distance of points (N, 2), pixels, from the nearest foreign thing, shape (N,), pixels."""
+        grid = samples_of(points, self.step)
+        return sample_at(self.away, grid[:, 0], grid[:, 1])
+
+    def table_at(self, points: Float64s) -> Bools:
+        """Which points (N, 2), pixels, lie on the table, shape (N,)."""
+        grid = samples_of(points, self.step)
+        return sample_at(self.table.astype(np.uint8) * np.uint8(255), grid[:, 0], grid[:, 1]) > 127.0
+
+    def lighter_at(self, points: Float64s) -> Bools:
+        """Which points (N, 2), pixels, are lighter than the table, shape (N,)."""
+        grid = samples_of(points, self.step)
+        return sample_at(self.lighter.astype(np.uint8) * np.uint8(255), grid[:, 0], grid[:, 1]) > 127.0
+
+    def in_shade(self, points: Float64s) -> Bools:
+        """Which points (N, 2), pixels, at foreign things are at nothing but what may be a shadow, shape (N,)."""
+        grid = samples_of(points, self.step)
+        return sample_at(_away(self.lit, self.step), grid[:, 0], grid[:, 1]) > _CAST_PITCHES * self.pitch_px
+
+    @cached_property
+    def lit(self) -> Bools:
+        """Where something foreign is no shadow."""
+        return _opened(self.things & ~self.shade, _THIN)
+
+    def touches(self, seen: BlockEvidence) -> bool:
+        """Whether something foreign lies at the block's edge, or takes part in it."""
+        return bool(self.lit.any()) and any(
+            bool((self.foreign_at(ring.points) < beside(self)).any()) for ring in seen.rings
+        )
+
+    @property
+    def hiding(self) -> Bytes:
+        """The map of what is foreign and no shadow, with its own borders, uint8, 1 where it hides what lies beneath."""
+        return np.asarray(cv2.dilate(self.lit.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
+
+    def fills(self, hole: RingEvidence) -> bool:
+        """Whether a hole is none: most of it is foreign, and lighter than the table ever is in a block's shade."""
+        drawn = np.zeros(self.foreign.shape[:2], np.uint8)
+        cv2.fillPoly(drawn, [np.rint(samples_of(hole.coarse, self.step)).astype(np.int32)], 1)
+        inside = cv2.erode(drawn, np.ones((3, 3), np.uint8)) > 0
+        filled = self.foreign & self.lighter & inside
+        return bool(np.count_nonzero(filled) > _MOST * np.count_nonzero(inside))
+
+
+def beside(look: TableLook) -> float:
+    """Within how many pixels of something foreign a wall may end because it goes on beneath."""
+    return _BESIDE_PITCHES * look.pitch_px + look.step
+
+
+def table_look(picture: Bytes, seen: BlockEvidence) -> TableLook:
+    """What is table and what is neither table nor comb in a picture, grey (H, W) or BGR (H, W, 3), uint8."""
+    pitch_px = seen.pitch_px
+    step = max(_FINEST_PX, int(pitch_px / _SAMPLES_PER_PITCH))
+    small = whole_averaged(picture, step)
+    samples = pitch_px / step
+    block = _block(seen, small.shape[:2], step)
+    slope = _slope(small)
+    border = _borders(slope, block, samples)
+    room = np.asarray(cv2.distanceTransform(1 - border, cv2.DIST_L2, 3), np.float32)
+    inside = cv2.erode(block, np.ones((3, 3), np.uint8)) > 0
+    reach = np.where(inside, _CELL_ROOM * samples - _RIM, _GAP * samples)
+    _, numbered = cv2.connectedComponents((room > reach).astype(np.uint8), connectivity=4)
+    parts = np.asarray(numbered, np.int32)
+    area = np.bincount(parts[block == 0], minlength=int(parts.max()) + 1)
+    area[:1] = 0
+    main = int(np.argmax(area)) if area.any() else 0
+    table_parts = np.zeros(int(parts.max()) + 1, np.bool_)
+    table_parts[main] = main > 0
+    # Plates of a table lie side by side under one lamp: those told from the first tell what the next ones look like.
+    for _ in range(_ROUNDS):
+        level, spread = _table_level(small, table_parts[parts], samples)
+        off = np.asarray(cv2.blur(small, (3, 3)).reshape(level.shape) - level, np.float32)
+        known, table_parts = table_parts, _table_parts(off, spread, parts, main)
+        if (known == table_parts).all() or area[table_parts & ~known].sum() < _FEW_SAMPLES * samples**2:
+            break
+    table = _grown(table_parts[parts], reach)
+    # Small flat parts outside lie between walls that stick out, and between specks.
+    flat = _grown(_wide((parts > 0) & ~table_parts[parts], room, _CELL_ROOM * samples - _RIM), reach)
+    quiet = _quiet(slope, block, samples) & ~table
+    foreign = _opened((flat | quiet) & ~table_parts[parts], _CELL_ROOM * samples)
+    foreign = _long(foreign, _LONG_PITCHES * samples)
+    beside_block = _long(_opened((block == 0) & ~table, _BAND * samples + 0.5), _LONG_PITCHES * samples)
+    lighter = np.any(off > _APART + _APART_SPREADS * spread, axis=2)
+    shade = np.all((off < 0) & (off > (_DEEPEST_SHADE - 1.0) * level), axis=2)
+    every = foreign | beside_block
+    look = TableLook(table, every, every, step, pitch_px, np.asarray(lighter), np.asarray(shade), _away(every, step))
+    exterior = seen.rings[0].points
+    if np.count_nonzero(look.foreign_at(exterior) < beside(look)) > _MOST * len(exterior):
+        # All around the block: the table mirrors it, or is no plain one.
+        within = foreign & inside
+        look = replace(look, foreign=within, away=_away(within, step))
+    return look
+
+
+def _away(foreign: Bools, step: int) -> Float32s:
+    if not foreign.any():
+        return np.full(foreign.shape, _NOWHERE_PX, np.float32)
+    return np.asarray(cv2.distanceTransform((~foreign).astype(np.uint8), cv2.DIST_L2, 3) * step, np.float32)
+
+
+def _block(seen: BlockEvidence, shape: tuple[int, ...], step: int) -> Bytes:
+    block = np.zeros(shape[:2], np.uint8)
+    for ring in seen.rings:
+        cv2.fillPoly(block, [np.rint(samples_of(ring.coarse, step)).astype(np.int32)], 0 if ring.is_hole else 1)
+    return block
+
+
+def _slope(small: Bytes) -> NDArray[np.int16]:
+    """Size of the gradient in eighths of a grey level a sample, the largest of all channels, shape (h, w)."""
+    soft = cv2.GaussianBlur(small, (5, 5), 0)
+    size = np.abs(cv2.Sobel(soft, cv2.CV_16S, 1, 0)) + np.abs(cv2.Sobel(soft, cv2.CV_16S, 0, 1))
+    return np.asarray(size.max(axis=2) if size.ndim == 3 else size, np.int16)
+
+
+def _quiet(slope: NDArray[np.int16], block: Bytes, samples: float) -> Bools:
+    """Where light changes less over a cell than it does in comb."""
+    comb = slope[::2, ::2][block[::2, ::2] > 0]
+    if not len(comb):
+        return np.zeros(slope.shape, np.bool_)
+    size = 2 * round(0.5 * samples) + 1
+    busy = cv2.blur(np.minimum(slope, np.percentile(comb, 90)).astype(np.float32), (size, size))
+    usual = float(np.median(busy[::2, ::2][block[::2, ::2] > 0]))
+    return np.asarray(busy < _QUIET * usual, np.bool_)
+
+
+def _opened(part: Bools, radius: float) -> Bools:
+    """The part without what is too narrow for a disc of this radius."""
+    room = cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 3)
+    core = (room > radius).astype(np.uint8)
+    if not core.any():
+        return np.zeros(part.shape, np.bool_)
+    return np.asarray(part & (cv2.distanceTransform(1 - core, cv2.DIST_L2, 3) <= radius + 1), np.bool_)
+
+
+def _borders(slope: NDArray[np.int16], block: Bytes, samples: float) -> Bytes:
+    """1 where light changes sharply, along lines longer than specks."""
+    far, walls = (slope[::2, ::2][block[::2, ::2] == part] for part in (0, 1))
+    usual = float(np.median(far)) if len(far) else 0.0
+    level = max(_SHARP * usual, _LEAST_SHARP)
+    if len(walls):
+        level = min(level, _OF_WALLS * float(np.median(walls)))
+    sharp = slope > level
+    return _long(sharp, _SPECK_PITCHES * samples).astype(np.uint8)
+
+
+def _long(part: Bools, least: float) -> Bools:
+    """The pieces of a part that are longer than that, samples."""
+    _, pieces, stats, _ = cv2.connectedComponentsWithStats(part.astype(np.uint8), connectivity=8)
+    long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > least
+    long[0] = False
+    return np.asarray(long[pieces], np.bool_)
+
+
+def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, Float64s]:
+    """The light of the table around each sample, (h, w, channels), and its spread in each channel."""
+    channels = small.reshape(*main.shape, -1).astype(np.float32)
+    size = 2 * round(0.5 * _LEVEL_PITCHES * samples) + 1
+    share = cv2.blur(main.astype(np.float32), (size, size))
+    level = np.empty_like(channels)
+    spread = np.zeros(channels.shape[2])
+    for k in range(channels.shape[2]):
+        plane, some = channels[:, :, k], (slice(None, None, 3), slice(None, None, 3))
+        here = plane[some][main[some]]
+        lowest, highest = np.percentile(here, (2, 98)) if len(here) else (0.0, 0.0)
+        local = np.asarray(cv2.blur(plane * main, (size, size)), np.float32) / np.maximum(share, 1e-3)
+        # Far from any of it, in a hole, the table may be as light as it is anywhere.
+        level[:, :, k] = np.where(share > _SHARE_KNOWN, local, np.clip(plane, lowest, highest))
+        if len(here):
+            spread[k] = 1.4826 * float(np.median(np.abs(here - level[:, :, k][some][main[some]])))
+    return level, spread
+
+
+def _table_parts(off: Float32s, spread: Float64s, parts: Int32s, main: int) -> Bools:
+    """Which of the numbered flat parts are as light as the table around them; `off`: the picture less that light."""
+    count = int(parts.max()) + 1
+    number = parts.ravel()
+    size = np.maximum(np.bincount(number, minlength=count), 1)
+    table = np.ones(count, np.bool_)
+    for k in range(off.shape[2]):
+        mean = np.bincount(number, weights=off[:, :, k].ravel(), minlength=count) / size
+        table &= np.abs(mean) < _APART + _APART_SPREADS * spread[k]
+    table[0] = False
+    table[main] = main > 0
+    return table
+
+
+def _wide(flat: Bools, room: Float32s, radius: float) -> Bools:
+    """The parts of `flat` in which a disc of this radius has room."""
+    count, parts = cv2.connectedComponents(flat.astype(np.uint8), connectivity=4)
+    wide = np.zeros(count, np.bool_)
+    wide[parts[room > radius]] = True
+    wide[0] = False
+    return np.asarray(wide[parts], np.bool_)
+
+
+def _grown(part: Bools, reach: Float64s) -> Bools:
+    """A part that was seen through gaps of a border, up to that border."""
+    away = cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 3)
+    return np.asarray((away <= reach + _RIM), np.bool_)

@@ -1,0 +1,165 @@
+"""The outline through what is seen of an edge: witnesses at the border of a thing that hides the edge are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contour.edge.cut_material import CutMaterial, cut_material
+from contour.edge.flanks import out_of_flanks
+from contour.edge.ring_places import nearest, runs_of
+from contour.edge.table_look import TableLook, beside
+from contour.errors import NoBlockFound
+from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.rectifier import Rectifier
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import Ring
+from contour.geometry.signed_distance import depth_inside
+from contour.outline.fit import FittedRing
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
+
+SPACING_PITCHES = 0.25
+# Ends of walls beside a thing are the edge's own where they lie on the line of those that are seen well.
+_AGREE_PITCHES = 0.22
+_FEWEST, _FEW = 8, 3
+# A place of the outline is seen where a witness lies within this of it; else a thing within that hides it, or an end of
+# a wall at such a thing.
+_SUPPORT_PITCHES, _HIDES_PITCHES, _FOOT_PITCHES = 0.8, 0.5, 1.5
+_FILL_SIGMA_PX = 0.7
+# A shadow along less of the edge than this may be a dark thing over a corner; and turns of a dent come to more.
+_SHADOW_PITCHES, _DENT_DEG = 8.0, 110.0
+
+Fit = Callable[[RingEvidence], FittedRing]
+
+
+@dataclass(frozen=True)
+class VisibleRing:
+    """A fitted ring, the witnesses it went through, and the places (N, 2), pixels, where walls ended at something that
+    lies over the edge. `filled`: witnesses of the evidence that are ends of filled cells, not of walls, shape (N,).
+    """
+
+    evidence: RingEvidence
+    fitted: FittedRing
+    distrusted: Float64s
+    filled: Bools
+
+    def hidden(self, points: Float64s, look: TableLook) -> Bools:
+        """Which places on the ring (N, 2), pixels, something hides, shape (N,)."""
+        unseen = nearest(points, self.on_line) > _SUPPORT_PITCHES * look.pitch_px
+        at_thing = look.foreign_at(points) < _HIDES_PITCHES * look.pitch_px
+        return unseen & (at_thing | (nearest(points, self.distrusted) < _FOOT_PITCHES * look.pitch_px))
+
+    @property
+    def on_line(self) -> Float64s:
+        """The witnesses that lie on the ring, shape (N, 2), pixels."""
+        return self.evidence.points[self.fitted.inlier]
+
+
+def fit_visible(
+    evidence: RingEvidence, picture: Bytes, look: TableLook, rectifier: Rectifier | None, fit: Fit
+) -> VisibleRing:
+    """The ring fitted to those witnesses that do not lie at the border of something that is neither table nor comb, and
+    to the ends of filled cells where these continue the edge. Raises NoBlockFound as `fit` does.
+    """
+    near = _in_doubt(evidence, look, fit)
+    if not near.any():
+        return _plain(evidence, fit(evidence))
+    if np.count_nonzero(~near) < _FEWEST:
+        raise NoBlockFound(
+            f"no block found: {np.count_nonzero(near)} of {len(near)} wall ends along an edge lie at something that is "
+            "neither the table nor cells. Clear the table, and check the light"
+        )
+    clear = _without(evidence, near, look)
+    apart = np.abs(_depth(fit(clear).ring, evidence.points, rectifier))
+    for run in runs_of(near):
+        stops = float(evidence.position[run[0]]), float(evidence.position[run[-1]])
+        out = out_of_flanks(clear, stops, evidence.points[run], look.pitch_px)
+        if out is not None:
+            apart[run] = np.minimum(apart[run], np.abs(out))
+    distrusted = near & (apart > _AGREE_PITCHES * look.pitch_px)
+    if not distrusted.any():
+        return _plain(evidence, fit(evidence))
+    fills = cut_material(picture, clear, evidence.points[distrusted], look)
+    trusted, filled = _with_fills(_without(evidence, distrusted, look), fills)
+    return VisibleRing(trusted, fit(trusted), evidence.points[distrusted], filled)
+
+
+def _in_doubt(evidence: RingEvidence, look: TableLook, fit: Fit) -> Bools:
+    """Which witnesses lie at something foreign that is no shadow along an edge, shape (N,)."""
+    near = look.foreign_at(evidence.points) < beside(look)
+    shaded = near & look.in_shade(evidence.points)
+    if shaded.any():
+        ring = fit(evidence).ring
+        for run in runs_of(_without_gaps(shaded)):
+            if len(run) == len(near) or _is_own_edge(evidence.points[run], ring, look.pitch_px):
+                near[run] &= ~shaded[run]
+    return near
+
+
+def _without_gaps(chosen: Bools) -> Bools:
+    """The witnesses around a ring that are chosen, and those between two that are, a few at most."""
+    steps = range(-_FEW, _FEW + 1)
+    grown = np.any([np.roll(chosen, step) for step in steps], axis=0)
+    return np.asarray(np.all([np.roll(grown, step) for step in steps], axis=0))
+
+
+def _is_own_edge(points: Float64s, ring: Ring, pitch_px: float) -> bool:
+    """Whether an outline, at points in what may be a shadow, is long there and nowhere turns into the block: what lies
+    over an edge leaves a dent, or takes a corner off.
+    """
+    lengths = RingLengths.of(ring)
+    first, last = lengths.feet(points[[0, -1]]).tolist()
+    long = (last - first) % lengths.length
+    if long < _SHADOW_PITCHES * pitch_px:
+        return False
+    path = lengths.at(first + np.arange(0.0, long, pitch_px))
+    heading = np.angle(np.diff(path[:, 0] + 1j * path[:, 1]))
+    turn = np.angle(np.exp(1j * np.diff(heading)))
+    # With positive shoelace, material on the left, turns into it are negative.
+    return bool(-np.minimum(turn, 0.0).sum() < np.radians(_DENT_DEG))
+
+
+def _plain(evidence: RingEvidence, fitted: FittedRing) -> VisibleRing:
+    return VisibleRing(evidence, fitted, np.empty((0, 2)), np.zeros(len(evidence.points), np.bool_))
+
+
+def _without(evidence: RingEvidence, dropped: Bools, look: TableLook) -> RingEvidence:
+    """The evidence without these witnesses, and without walls at the border of things."""
+    kept = ~dropped
+    return replace(
+        evidence,
+        points=evidence.points[kept],
+        position=evidence.position[kept],
+        normal=evidence.normal[kept],
+        sigma=evidence.sigma[kept],
+        kind=evidence.kind[kept],
+        walls=evidence.walls.take(look.foreign_at(evidence.walls.points) >= beside(look)),
+        beside=evidence.beside[look.foreign_at(evidence.beside) >= beside(look)],
+    )
+
+
+def _depth(ring: Ring, points: Float64s, rectifier: Rectifier | None) -> Float64s:
+    if rectifier is not None:
+        ring, points = rectifier.rectify(ring), rectifier.rectify(points)
+    return depth_inside(ring, points)
+
+
+def _with_fills(evidence: RingEvidence, fills: list[CutMaterial]) -> tuple[RingEvidence, Bools]:
+    """The evidence with ends of filled cells among its witnesses, and which those are."""
+    own = len(evidence.points)
+    if not fills:
+        return evidence, np.zeros(own, np.bool_)
+    points = np.concatenate([fill.points for fill in fills])
+    position = np.concatenate([evidence.position, *(fill.position for fill in fills)])
+    order = np.argsort(position, kind="stable")
+    more = replace(
+        evidence,
+        points=np.concatenate([evidence.points, points])[order],
+        position=position[order],
+        normal=np.concatenate([evidence.normal, *(fill.normal for fill in fills)])[order],
+        sigma=np.concatenate([evidence.sigma, np.full(len(points), _FILL_SIGMA_PX)])[order],
+        kind=np.concatenate([evidence.kind, np.full(len(points), WitnessKind.BLUNT, np.int8)])[order],
+    )
+    return more, order >= own

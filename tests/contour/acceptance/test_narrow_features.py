@@ -1,0 +1,131 @@
+"""Bumps and dents no wider than a chip are found; corners, arms and curves are none."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from contour.acceptance.narrow_features import NarrowFeature, narrow_feature
+from contour.geometry.rings import Contour
+from tests.support.pictures.rings import SQUARE
+
+PITCH = 20.0
+BLOCK = shapely.box(100, 100, 700, 500)
+
+
+def contour(shape: shapely.Geometry, turn_deg: float = 0.0) -> Contour:
+    """A polygon turned by so much, as contours in pixels run: exterior negative by the shoelace, holes positive."""
+    turned = shapely.affinity.rotate(shape, turn_deg)
+    oriented = shapely.geometry.polygon.orient(turned, -1.0)
+    exterior, *holes = (np.array(ring.coords)[:-1] for ring in (oriented.exterior, *oriented.interiors))
+    return Contour(exterior, tuple(holes))
+
+
+def found(shape: shapely.Geometry, turn_deg: float = 0.0) -> NarrowFeature | None:
+    return narrow_feature(contour(shape, turn_deg), PITCH)
+
+
+def chip(width: float, depth: float) -> shapely.Geometry:
+    """So many pitches wide and far out, at the middle of the block's lower edge (the larger y), with slanting sides."""
+    w, d = 0.5 * width * PITCH, depth * PITCH
+    return shapely.Polygon([(400 - w, 499), (400 + w, 499), (400 + 0.8 * w, 500 + d), (400 - 0.8 * w, 500 + d)])
+
+
+def dent(width: float, depth: float) -> shapely.Geometry:
+    return shapely.affinity.scale(chip(width, depth), yfact=-1, origin=(400, 500))
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 33.0, 90.0, 200.0])
+@pytest.mark.parametrize(("width", "depth"), [(1.5, 1.0), (3.0, 2.0), (2.0, 4.0), (4.0, 1.5)])
+def test_a_bump_as_wide_as_a_chip_is_found_where_it_is(width: float, depth: float, turn_deg: float) -> None:
+    one = found(BLOCK | chip(width, depth), turn_deg)
+    assert one is not None
+    assert one.outwards
+    assert one.depth_pitches == pytest.approx(depth, abs=0.35)
+    assert one.width_pitches == pytest.approx(width, abs=1.0)
+    bump = shapely.affinity.rotate(chip(width, depth), turn_deg, origin=(BLOCK | chip(width, depth)).envelope.centroid)
+    assert shapely.Point(one.place_px).distance(bump) < 0.5 * PITCH
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 70.0, 180.0])
+@pytest.mark.parametrize(("width", "depth"), [(1.5, 1.0), (3.0, 2.0), (2.0, 4.0)])
+def test_a_dent_as_narrow_is_found_and_goes_inwards(width: float, depth: float, turn_deg: float) -> None:
+    one = found(BLOCK - dent(width, depth), turn_deg)
+    assert one is not None
+    assert not one.outwards
+    assert one.depth_pitches == pytest.approx(depth, abs=0.35)
+
+
+def test_a_bump_into_a_hole_stands_out_of_the_block_too() -> None:
+    hole = shapely.box(200, 200, 600, 400) - shapely.box(380, 195, 420, 240)
+    one = found(BLOCK - hole)
+    assert one is not None
+    assert one.outwards
+    assert one.place_px == pytest.approx((400, 240), abs=1.2 * PITCH)
+
+
+def test_of_several_the_deepest_is_told() -> None:
+    shallow = shapely.affinity.translate(chip(2.0, 1.2), xoff=-200)
+    one = found(BLOCK | chip(2.0, 3.0) | shallow)
+    assert one is not None
+    assert one.place_px[0] == pytest.approx(400, abs=1.5 * PITCH)
+
+
+@pytest.mark.parametrize(("width", "depth"), [(7.0, 2.0), (10.0, 6.0), (3.0, 0.4)])
+def test_wider_and_shallower_ones_are_the_blocks_own(width: float, depth: float) -> None:
+    assert found(BLOCK | chip(width, depth)) is None
+    assert found(BLOCK - dent(width, depth)) is None
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 20.0, 45.0])
+@pytest.mark.parametrize("corner_deg", [15, 30, 45, 60, 75, 90, 105, 120, 135, 150, 165])
+def test_a_corner_of_any_angle_is_none(corner_deg: float, turn_deg: float) -> None:
+    half = math.radians(corner_deg) / 2
+    kite = [
+        (0, 0),
+        (600 * math.cos(half), 600 * math.sin(half)),
+        (900, 0),
+        (600 * math.cos(half), -600 * math.sin(half)),
+    ]
+    assert found(shapely.Polygon(kite), turn_deg) is None
+
+
+@pytest.mark.parametrize("arm", [5.5, 7.0, 12.0])
+def test_an_arm_is_none(arm: float) -> None:
+    """An L and a U whose arms are some cells wide, and a step between them."""
+    w = arm * PITCH
+    l_shaped = shapely.Polygon([(0, 0), (600, 0), (600, w), (w, w), (w, 500), (0, 500)])
+    u_shaped = shapely.box(0, 0, 700, 500) - shapely.box(w, w, 700 - w, 600)
+    assert found(l_shaped) is None
+    assert found(u_shaped) is None
+
+
+@pytest.mark.parametrize("slant", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("depth", [1.0, 1.5, 2.0, 3.0])
+def test_a_step_is_none(depth: float, slant: float) -> None:
+    """An edge that goes on in its own direction, but some cells farther out."""
+    out = depth * PITCH
+    step = [(0, 0), (600, 0), (600, 300), (300, 300), (300 - slant * out, 300 + out), (0, 300 + out)]
+    assert found(shapely.Polygon(step)) is None
+    assert found(shapely.Polygon(step), 25.0) is None
+
+
+def test_curves_are_none() -> None:
+    angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    for lobes, strength in ((2, 0.15), (3, 0.1), (5, 0.06)):
+        reach = 250 * (1 + strength * np.cos(lobes * angle))
+        blob = np.column_stack([np.cos(angle), np.sin(angle)]) * reach[:, None] + 300
+        assert found(shapely.Polygon(blob)) is None
+    assert found(BLOCK.buffer(0) - shapely.Point(400, 300).buffer(4 * PITCH)) is None
+
+
+def test_moved_moves_its_place() -> None:
+    one = NarrowFeature(1.0, 2.0, (30.0, 40.0), outwards=True)
+    assert one.moved(5.0, -7.0) == NarrowFeature(1.0, 2.0, (35.0, 33.0), outwards=True)
+
+
+def test_a_small_square_is_no_feature_of_itself() -> None:
+    assert narrow_feature(Contour(SQUARE[::-1] * 12.0), PITCH) is None

@@ -1,0 +1,89 @@
+"""What fills cells up to the cut ends flush with the edge; what lies over it does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from contour.edge.cut_material import CutMaterial, cut_material
+from contour.edge.table_look import TableLook
+from contour.geometry.rings import densified
+from tests.support.pictures.hand_looks import HEIGHT, WIDTH, look
+from tests.support.pictures.outline_scenes import PITCH, along, distances, rectangle, witnesses
+
+TABLE, FILL = 40, 150
+BLOCK = rectangle(700.0, 500.0)
+GAP = (250.0, 450.0)
+
+
+def thing(begin: float, end: float, out: float = 0.0) -> NDArray[np.float64]:
+    """What lies along the block's edge between two arc lengths, three pitches deep, up to so many pitches beyond."""
+    points, normal = along(BLOCK, np.array([begin, end]))
+    inner, outer = points - 3.0 * PITCH * normal, points + out * PITCH * normal
+    return np.array([inner[0], inner[1], outer[1], outer[0]])
+
+
+def picture(area: NDArray[np.float64], level: int = FILL, colour: bool = False) -> NDArray[np.uint8]:
+    """The thing alone on the table, its border to a fraction of a pixel."""
+    large = np.full((HEIGHT, WIDTH), TABLE, np.uint8)
+    cv2.fillPoly(large, [np.rint(area * 16).astype(np.int32)], level, cv2.LINE_AA, 4)
+    soft = np.asarray(cv2.GaussianBlur(large, (0, 0), 0.8), np.uint8)
+    if not colour:
+        return soft
+    return np.dstack([np.full_like(soft, TABLE), np.full_like(soft, TABLE), soft])
+
+
+def found(
+    area: NDArray[np.float64], image: NDArray[np.uint8], there: TableLook, gap: tuple[float, float] = GAP
+) -> list[CutMaterial]:
+    clear = replace(witnesses(BLOCK, seed=1, gaps=(gap,)), coarse=densified(BLOCK, 5.0))
+    return cut_material(image, clear, area[:2], there)
+
+
+@pytest.mark.parametrize("colour", [False, True])
+def test_its_end_is_the_edge_to_the_pixel(colour: bool) -> None:
+    area = thing(*GAP)
+    (one,) = found(area, picture(area, colour=colour), look(BLOCK, area))
+    assert len(one.points) > 20
+    assert distances(one.points, BLOCK).mean() < 0.7
+    on_edge = along(BLOCK, one.position)[0]
+    assert np.hypot(*(one.points - on_edge).T).max() < 1.5 * PITCH
+    assert ((one.position > GAP[0] - PITCH) & (one.position < GAP[1] + PITCH)).all()
+    outward = along(BLOCK, np.array([350.0]))[1][0]
+    assert (one.normal @ outward > 0.9).mean() > 0.8
+
+
+def test_what_ends_flush_around_a_corner_is_cut_too() -> None:
+    gap = (620.0, 780.0)
+    points, normal = along(BLOCK, np.array(gap))
+    area = np.array([points[0], BLOCK[1], points[1], points[1] - 80.0 * normal[1]])
+    (one,) = found(area, picture(area), look(BLOCK, area), gap)
+    assert distances(one.points, BLOCK).mean() < 0.05 * PITCH
+
+
+@pytest.mark.parametrize("out", [0.4, 1.0, 3.0])
+def test_what_sticks_out_is_none(out: float) -> None:
+    area = thing(*GAP, out)
+    assert found(area, picture(area), look(BLOCK, area)) == []
+
+
+def test_what_is_darker_than_the_table_is_none() -> None:
+    area = thing(*GAP)
+    assert found(area, picture(area, 10), look(BLOCK, area, lighter=False)) == []
+
+
+def test_nor_is_what_the_table_does_not_follow() -> None:
+    area, other = thing(*GAP), thing(*GAP, 3.0)
+    there = look(BLOCK, area)
+    hidden = TableLook(**{**vars(there), "table": there.table & ~look(BLOCK, other).foreign})
+    assert len(found(area, picture(area), there)) == 1
+    assert found(area, picture(area), hidden) == []
+
+
+def test_nor_is_a_border_that_nothing_shows() -> None:
+    area = thing(*GAP)
+    assert found(area, picture(area, TABLE + 3), look(BLOCK, area)) == []

@@ -1,0 +1,161 @@
+"""Which witnesses an outline is laid through where something lies at the edge."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from contour.edge.edge_evidence import ring_evidence
+from contour.edge.stretches import Stretch
+from contour.edge.table_look import TableLook
+from contour.edge.visible_edge import VisibleRing, fit_visible
+from contour.errors import NoBlockFound
+from contour.outline.fit import fit_ring
+from contour.walls.wall_evidence import RingEvidence
+from tests.support.pictures.hand_looks import HEIGHT, WIDTH, look
+from tests.support.pictures.outline_scenes import PITCH, along, blob, circle, distances, errors, rectangle, witnesses
+
+PICTURE = np.full((HEIGHT, WIDTH), 40, np.uint8)
+FIT = partial(fit_ring, pitch_px=PITCH, wall_px=2.0, rectifier=None)
+BLOCK = rectangle(700.0, 500.0)
+
+
+def patch(ring: NDArray[np.float64], place: float, deep: float, wide: float, out: float = 3.0) -> NDArray[np.float64]:
+    """A rectangle over a ring at an arc length: so many pitches into it, along it, and out of it."""
+    (point,), (normal,) = along(ring, np.array([place]))
+    side = np.array([-normal[1], normal[0]]) * 0.5 * wide * PITCH
+    inner, outer = point - deep * PITCH * normal, point + out * PITCH * normal
+    return np.array([inner - side, inner + side, outer + side, outer - side])
+
+
+def ending_at(
+    evidence: RingEvidence, ring: NDArray[np.float64], place: float, deep: float, wide: float
+) -> RingEvidence:
+    """The evidence with the ends of walls at the inner border of such a patch instead of at the edge beneath."""
+    beneath = np.abs(evidence.position - place) < 0.5 * wide * PITCH
+    points = evidence.points - np.where(beneath, deep * PITCH, 0.0)[:, None] * evidence.normal
+    return replace(evidence, points=points)
+
+
+def fitted(evidence: RingEvidence, there: TableLook) -> VisibleRing:
+    return fit_visible(evidence, PICTURE, there, None, FIT)
+
+
+def told(one: VisibleRing, there: TableLook) -> list[Stretch]:
+    """The stretches that are not plainly seen."""
+    stretches = ring_evidence(0, one.fitted.ring, one, there, None, 0.5)
+    return [stretch for stretch in stretches if stretch.state != "seen"]
+
+
+@pytest.mark.parametrize("wide", [8.0, 10.0, 12.0])
+def test_walls_that_end_at_a_thing_do_not_draw_the_outline_in(wide: float) -> None:
+    tape = patch(BLOCK, 350.0, 1.5, wide)
+    evidence, there = ending_at(witnesses(BLOCK, seed=1), BLOCK, 350.0, 1.5, wide), look(BLOCK, tape)
+    assert errors(FIT(evidence).ring, BLOCK).max() > 0.5 * PITCH
+    one = fitted(evidence, there)
+    assert errors(one.fitted.ring, BLOCK).max() < 0.1 * PITCH
+    assert len(one.distrusted) >= wide - 2
+    (stretch,) = told(one, there)
+    assert (stretch.state, stretch.by, stretch.straight) == ("bridged", "object", True)
+
+
+def test_ends_on_the_line_of_the_others_are_taken_back() -> None:
+    """A thing that only touches the block."""
+    beside = patch(BLOCK, 350.0, 0.0, 8.0)
+    evidence, there = witnesses(BLOCK, seed=2), look(BLOCK, beside)
+    one = fitted(evidence, there)
+    assert len(one.distrusted) == 0
+    assert len(one.evidence.points) == len(evidence.points)
+    assert told(one, there) == []
+
+
+def test_with_nothing_foreign_near_all_are_fitted() -> None:
+    evidence = witnesses(BLOCK, seed=3)
+    one = fitted(evidence, look(BLOCK, np.array([[50.0, 50.0], [150.0, 50.0], [150.0, 150.0], [50.0, 150.0]])))
+    assert np.array_equal(one.fitted.ring, FIT(evidence).ring)
+    assert not one.filled.any()
+
+
+def test_a_curved_edge_in_a_long_shadow_is_its_own() -> None:
+    """Nothing could be bridged there, but the outline runs on past it and nowhere turns into the block."""
+    ring = blob(350.0)
+    points, normal = along(ring, np.arange(300.0, 720.0, 10.0))
+    shadow = np.concatenate([points - 0.3 * PITCH * normal, (points + PITCH * normal)[::-1]])
+    dark, bright = look(ring, shadow, lighter=False, shade=True), look(ring, shadow)
+    evidence = witnesses(ring, seed=4)
+    assert told(fitted(evidence, dark), dark) == []
+    assert told(fitted(evidence, bright), bright) != []
+
+
+def test_a_dark_thing_over_the_edge_is_none_of_its_shadows() -> None:
+    """As dark as a shadow, but the outline goes into the block around it."""
+    tape = patch(BLOCK, 350.0, 2.0, 10.0)
+    evidence = ending_at(witnesses(BLOCK, seed=5), BLOCK, 350.0, 2.0, 10.0)
+    dark = look(BLOCK, tape, lighter=False, shade=True)
+    one = fitted(evidence, dark)
+    assert errors(one.fitted.ring, BLOCK).max() < 0.1 * PITCH
+    assert [stretch.by for stretch in told(one, dark)] == ["object"]
+
+
+def test_where_nearly_all_ends_lie_at_something_foreign_there_is_no_block_to_be_seen() -> None:
+    everywhere = rectangle(1000.0, 800.0)
+    evidence = ending_at(witnesses(BLOCK, seed=6), BLOCK, 0.0, 1.0, 1000.0)
+    with pytest.raises(NoBlockFound, match="neither the table nor cells"):
+        fitted(evidence, look(BLOCK, everywhere))
+
+
+def test_over_an_arc_a_bridge_is_told_as_one() -> None:
+    ring = circle(350.0)
+    evidence = ending_at(witnesses(ring, seed=7), ring, 600.0, 1.5, 4.0)
+    there = look(ring, patch(ring, 600.0, 1.5, 4.0))
+    one = fitted(evidence, there)
+    assert errors(one.fitted.ring, ring).max() < 0.15 * PITCH
+    (stretch,) = told(one, there)
+    assert (stretch.state, stretch.straight) == ("bridged", False)
+
+
+@pytest.mark.parametrize("corner", [0.0, 700.0, 1200.0])
+def test_over_a_corner_it_is_covered(corner: float) -> None:
+    reach = BLOCK[[0, 1, 2][[0.0, 700.0, 1200.0].index(corner)]]
+    tape = reach + 3.0 * PITCH * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    evidence = witnesses(BLOCK, seed=8)
+    off = np.abs(evidence.points - reach).max(axis=1) < 3.0 * PITCH
+    evidence = replace(
+        evidence,
+        **{name: getattr(evidence, name)[~off] for name in ("points", "position", "normal", "sigma", "kind")},
+    )
+    # What ends at the tape's border, inside of the block.
+    inner = tape.mean(axis=0) + 1.3 * 3.0 * PITCH * (BLOCK.mean(axis=0) - reach) / np.hypot(
+        *(BLOCK.mean(axis=0) - reach)
+    )
+    k = int(np.searchsorted(evidence.position, corner)) % len(evidence.points)
+    points = evidence.points.copy()
+    points[k] = inner
+    there = look(BLOCK, tape)
+    states = {stretch.state for stretch in told(fitted(replace(evidence, points=points), there), there)}
+    assert states == {"covered"}
+
+
+def test_a_tape_from_corner_to_corner_bridges_nothing() -> None:
+    """Its border is a straight line as well, and next to its ends it is an edge like any."""
+    tape = patch(BLOCK, 350.0, 1.5, 26.0)
+    evidence = ending_at(witnesses(BLOCK, seed=9), BLOCK, 350.0, 1.5, 28.0)
+    there = look(BLOCK, tape)
+    hidden = told(fitted(evidence, there), there)
+    assert {stretch.state for stretch in hidden} == {"covered"}
+
+
+def test_hidden_places_are_those_far_from_all_ends_and_near_the_thing() -> None:
+    tape = patch(BLOCK, 350.0, 1.5, 8.0)
+    there = look(BLOCK, tape)
+    one = fitted(ending_at(witnesses(BLOCK, seed=10), BLOCK, 350.0, 1.5, 8.0), there)
+    places, _ = along(BLOCK, np.arange(0.0, 2400.0, 10.0))
+    hidden = one.hidden(places, there)
+    near = distances(places, tape) < 0.6 * PITCH
+    inside = np.abs(np.arange(0.0, 2400.0, 10.0) - 350.0) < 4.0 * PITCH
+    assert hidden[np.abs(np.arange(0.0, 2400.0, 10.0) - 350.0) < 2.5 * PITCH].all()
+    assert not hidden[~near & ~inside].any()

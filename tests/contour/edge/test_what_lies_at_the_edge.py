@@ -1,0 +1,133 @@
+"""What a traced outline rests on, with things over its edge, in it and beside it."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from contour.geometry.ring_lengths import RingLengths
+from tests.support.scenes.edge_scenes import COVERED, LONG, PITCH, at, edge_scene
+
+CLEAR = ("", "soft shadow", "hard shadow", "mirror", "tape far away", "tape in the middle", "hole", "wood")
+"""Scenes with nothing at the edge that hides it."""
+
+
+@pytest.mark.parametrize("name", ["bright tape", "compound", "hole"])
+def test_stretches_cover_each_ring_from_its_first_vertex_to_its_length_without_gaps(name: str) -> None:
+    traced = edge_scene(name).trace
+    assert traced.evidence is not None
+    for number, ring in enumerate(traced.contour.rings):
+        own = [stretch for stretch in traced.evidence if stretch.ring == number]
+        assert own[0].from_px == 0.0
+        assert own[-1].to_px == pytest.approx(RingLengths.of(ring).length)
+        assert all(one.to_px == other.from_px for one, other in itertools.pairwise(own))
+
+
+@pytest.mark.parametrize("name", CLEAR)
+def test_where_nothing_lies_over_the_edge_all_of_it_is_seen(name: str) -> None:
+    scene = edge_scene(name)
+    assert scene.hidden == []
+    assert scene.trace.evidence is not None
+    assert {stretch.by for stretch in scene.trace.evidence} == {None}
+    assert scene.off.mean() < 0.02 * PITCH
+    assert scene.off.max() < 0.1 * PITCH
+
+
+@pytest.mark.parametrize("name", COVERED)
+def test_what_lies_over_a_straight_edge_is_found_there_and_the_edge_goes_on_beneath(name: str) -> None:
+    scene = edge_scene(name)
+    (stretch,) = scene.hidden
+    assert (stretch.state, stretch.by, stretch.straight) == ("bridged", "object", True)
+    place = scene.pixel(at(COVERED[name][0], 0.0))
+    assert np.hypot(*(scene.middle(stretch) - place)) < PITCH
+    assert scene.off[scene.rendered.visible[0]].max() < 0.1 * PITCH
+    assert scene.off.max() < 0.15 * PITCH
+
+
+@pytest.mark.parametrize("name", COVERED)
+def test_a_bridge_is_less_sure_than_what_is_seen_and_its_bound_holds(name: str) -> None:
+    scene = edge_scene(name)
+    (stretch,) = scene.hidden
+    assert scene.trace.evidence is not None
+    assert stretch.bound_px > max(one.bound_px for one in scene.trace.evidence if one.state == "seen")
+    assert scene.off[~scene.rendered.visible[0]].max() < stretch.bound_px
+
+
+@pytest.mark.parametrize("name", COVERED)
+def test_no_more_than_the_nearest_cells_of_what_is_hidden_are_told_as_seen(name: str) -> None:
+    """And no more than those of what is seen as hidden."""
+    scene = edge_scene(name)
+    (stretch,) = scene.hidden
+    truth, seen = scene.rendered.truth_px.exterior, scene.rendered.visible[0]
+    hidden_px = np.count_nonzero(~seen) * RingLengths.of(truth).length / len(truth)
+    assert hidden_px - 2.2 * PITCH < stretch.to_px - stretch.from_px < hidden_px + 2.2 * PITCH
+
+
+def test_over_a_corner_nothing_is_bridged() -> None:
+    scene = edge_scene("tape on a corner")
+    assert {stretch.state for stretch in scene.hidden} == {"covered"}
+    corner = scene.pixel(at(0.5 * LONG, 0.0))
+    assert min(np.hypot(*(scene.middle(stretch) - corner)) for stretch in scene.hidden) < 2 * PITCH
+    assert scene.off[scene.rendered.visible[0]].max() < 0.1 * PITCH
+
+
+def test_over_an_edge_from_corner_to_corner_nothing_is_bridged() -> None:
+    scene = edge_scene("tape along an edge")
+    assert {stretch.state for stretch in scene.hidden} == {"covered"}
+    assert sum(stretch.to_px - stretch.from_px for stretch in scene.hidden) > 8 * PITCH
+
+
+def test_compound_flush_with_the_cut_is_seen_and_the_outline_runs_along_it() -> None:
+    scene = edge_scene("compound")
+    assert scene.hidden == []
+    assert scene.trace.evidence is not None
+    (stretch,) = (one for one in scene.trace.evidence if one.by is not None)
+    assert stretch.by == "compound"
+    assert np.hypot(*(scene.middle(stretch) - scene.pixel(at(10.0, 0.0)))) < 1.5 * PITCH
+    assert stretch.to_px - stretch.from_px == pytest.approx(7 * PITCH, abs=2 * PITCH)
+    assert scene.off.max() < 0.1 * PITCH
+
+
+def test_compound_at_a_corner_leaves_the_corner_where_it_was_cut() -> None:
+    scene = edge_scene("compound at a corner")
+    assert scene.hidden == []
+    assert scene.off.max() < 0.1 * PITCH
+
+
+def test_what_lies_far_from_the_block_changes_nothing() -> None:
+    far, plain = edge_scene("tape far away").trace, edge_scene().trace
+    assert far.look is not None
+    assert far.look.foreign.any()
+    assert np.abs(far.contour.exterior - plain.contour.exterior).max() < 0.05 * PITCH
+
+
+def test_a_hole_with_the_table_in_it_stays_and_a_filled_one_is_none() -> None:
+    assert len(edge_scene("hole").trace.contour.holes) == 1
+    assert edge_scene("filled hole").trace.contour.holes == ()
+
+
+@pytest.mark.parametrize("name", ["", "bright tape", "clamp", "compound at a corner"])
+def test_through_a_lens_it_is_the_same(name: str) -> None:
+    bent, straight = edge_scene(name, lens=True), edge_scene(name)
+    assert [(one.state, one.by) for one in bent.hidden] == [(one.state, one.by) for one in straight.hidden]
+    for stretch in bent.hidden:
+        assert np.hypot(*(bent.middle(stretch) - bent.pixel(at(COVERED[name][0], 0.0)))) < PITCH
+    assert bent.off.max() < 0.15 * PITCH
+
+
+def test_a_chip_that_clings_to_the_edge_is_found_as_a_narrow_bump() -> None:
+    scene = edge_scene("clinging chip")
+    narrow = scene.checked().narrow
+    assert narrow is not None
+    assert narrow.outwards
+    assert np.hypot(*(np.array(narrow.place_px) - scene.pixel(at(10.0, 25.0)))) < 1.5 * PITCH
+
+
+@pytest.mark.parametrize("name", ["", "bright tape", "compound", "hard shadow"])
+def test_nothing_else_makes_one_nor_a_disagreement(name: str) -> None:
+    checked = edge_scene(name).checked()
+    assert checked.narrow is None
+    assert checked.disagreement is not None
+    assert checked.disagreement.pitches < 1.2

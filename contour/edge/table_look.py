@@ -90,12 +90,6 @@ class TableLook:
         """Where something foreign is no shadow."""
         return _opened(self.things & ~self.shade, _THIN)
 
-    def touches(self, seen: BlockEvidence) -> bool:
-        """Whether something foreign lies at the block's edge, or takes part in it."""
-        return bool(self.lit.any()) and any(
-            bool((self.foreign_at(ring.points) < beside(self)).any()) for ring in seen.rings
-        )
-
     @property
     def hiding(self) -> Bytes:
         """The map of what is foreign and no shadow, with its own borders, uint8, 1 where it hides what lies beneath."""

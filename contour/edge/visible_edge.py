@@ -63,7 +63,7 @@ def fit_visible(
     """The ring fitted to those witnesses that do not lie at the border of something that is neither table nor comb, and
     to the ends of filled cells where these continue the edge. Raises NoBlockFound as `fit` does.
     """
-    near = _in_doubt(evidence, look, fit)
+    near = _unshaded(doubtful(evidence, look), evidence, look, fit)
     if not near.any():
         return _plain(evidence, fit(evidence))
     if np.count_nonzero(~near) < _FEWEST:
@@ -73,11 +73,6 @@ def fit_visible(
         )
     clear = _without(evidence, near, look)
     apart = np.abs(_depth(fit(clear).ring, evidence.points, rectifier))
-    for run in runs_of(near):
-        stops = float(evidence.position[run[0]]), float(evidence.position[run[-1]])
-        out = out_of_flanks(clear, stops, evidence.points[run], look.pitch_px)
-        if out is not None:
-            apart[run] = np.minimum(apart[run], np.abs(out))
     distrusted = near & (apart > _AGREE_PITCHES * look.pitch_px)
     if not distrusted.any():
         return _plain(evidence, fit(evidence))
@@ -86,16 +81,30 @@ def fit_visible(
     return VisibleRing(trusted, fit(trusted), evidence.points[distrusted], filled)
 
 
-def _in_doubt(evidence: RingEvidence, look: TableLook, fit: Fit) -> Bools:
-    """Which witnesses lie at something foreign that is no shadow along an edge, shape (N,)."""
+def doubtful(evidence: RingEvidence, look: TableLook) -> Bools:
+    """Which witnesses lie at something foreign, and not on the line of the edge on both sides of it, shape (N,)."""
     near = look.foreign_at(evidence.points) < beside(look)
-    shaded = near & look.in_shade(evidence.points)
-    if shaded.any():
-        ring = fit(evidence).ring
-        for run in runs_of(_without_gaps(shaded)):
-            if len(run) == len(near) or _is_own_edge(evidence.points[run], ring, look.pitch_px):
-                near[run] &= ~shaded[run]
+    if not near.any() or np.count_nonzero(~near) < _FEWEST:
+        return near
+    clear = _without(evidence, near, look)
+    for run in runs_of(near):
+        stops = float(evidence.position[run[0]]), float(evidence.position[run[-1]])
+        out = out_of_flanks(clear, stops, evidence.points[run], look.pitch_px)
+        if out is not None:
+            near[run] = np.abs(out) > _AGREE_PITCHES * look.pitch_px
     return near
+
+
+def _unshaded(near: Bools, evidence: RingEvidence, look: TableLook, fit: Fit) -> Bools:
+    """The witnesses of `near` that lie at no shadow along an edge, shape (N,)."""
+    shaded = look.in_shade(evidence.points) & (look.foreign_at(evidence.points) < beside(look))
+    if not (near & shaded).any():
+        return near
+    ring, kept = fit(evidence).ring, near.copy()
+    for run in runs_of(_without_gaps(shaded)):
+        if len(run) == len(near) or _is_own_edge(evidence.points[run], ring, look.pitch_px):
+            kept[run] &= ~shaded[run]
+    return kept
 
 
 def _without_gaps(chosen: Bools) -> Bools:

@@ -8,7 +8,7 @@ import numpy as np
 
 from contour.edge.edge_evidence import ring_evidence
 from contour.edge.table_look import table_look
-from contour.edge.visible_edge import fit_visible
+from contour.edge.visible_edge import doubtful, fit_visible
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
@@ -55,7 +55,7 @@ def wall_tips(
     seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"))
     look = table_look(picture, seen)
     for _ in range(_LOOKS):
-        if not look.touches(seen):
+        if not look.lit.any() or not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
             break
         seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=look.hiding)
         look = table_look(picture, seen)

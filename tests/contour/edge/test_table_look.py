@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from contour.edge.table_look import TableLook, table_look
+from contour.edge.visible_edge import doubtful
 from contour.walls.lightness import wall_light
 from contour.walls.see_block import see_block
 from contour.walls.wall_evidence import BlockEvidence
@@ -59,7 +60,7 @@ def test_an_undisturbed_block_has_table_around_it_and_nothing_foreign() -> None:
     assert look.table_at(corners).all()
     assert not look.table_at(block("rectangle").truth_px.exterior.mean(axis=0)[None]).any()
     assert (look.foreign_at(corners) > 1000.0).all()
-    assert not look.touches(plain()[1])
+    assert not doubtful(plain()[1].rings[0], look).any()
 
 
 @pytest.mark.parametrize("level", [0, 50, 120, 240])
@@ -71,7 +72,7 @@ def test_a_flat_thing_over_the_edge_is_foreign_wherever_it_lies(level: int) -> N
     assert not look.table_at(inside).any()
     assert look.foreign_at(place[None] - [0.0, 80.0]) > 30.0
     assert look.table_at(place[None] - [0.0, 80.0]).all()
-    assert look.touches(plain()[1])
+    assert doubtful(plain()[1].rings[0], look).any()
     assert look.lighter_at(place[None]).all() == (level > 40)
 
 

@@ -54,10 +54,14 @@ def wall_tips(
         return _closed_cells(picture, light, settings, on_stage)
     seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"))
     look = table_look(picture, seen)
+    hidden = np.zeros_like(look.hiding)
     for _ in range(_LOOKS):
-        if not look.lit.any() or not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
+        if not (look.hiding > hidden).any():
             break
-        seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=look.hiding)
+        if not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
+            break
+        hidden = look.hiding
+        seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=hidden)
         look = table_look(picture, seen)
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)

@@ -41,7 +41,7 @@ _THIN = 1.5
 _NOWHERE_PX = 1e6
 _BESIDE_PITCHES = 0.6
 # Of the gradient's usual mean over a cell of comb.
-_QUIET = 0.45
+_QUIET, _SMOOTH, _GOOD_SHARE = 0.45, 0.3, 0.3
 _MOST = 0.5
 # Shadows, sides of the block and its mirror image make a band beside it that has no room for a disc of this radius, or
 # for few here and there; where walls are lost in a cell or two, the cells are flat.
@@ -138,7 +138,8 @@ def table_look(picture: Bytes, seen: BlockEvidence) -> TableLook:
     table = _grown(table_parts[parts], reach)
     # Small flat parts outside lie between walls that stick out, and between specks.
     flat = _grown(_wide((parts > 0) & ~table_parts[parts], room, _CELL_ROOM * samples - _RIM), reach)
-    quiet = _quiet(slope, block, samples) & ~table
+    busy = _busy(slope, block, samples)
+    quiet = (busy < _QUIET) & ~table
     foreign = _opened((flat | quiet) & ~table_parts[parts], _CELL_ROOM * samples)
     foreign = _long(foreign, _LONG_PITCHES * samples)
     beside_block = _long(_opened((block == 0) & ~table, _BAND * samples + 0.5), _LONG_PITCHES * samples)
@@ -148,10 +149,19 @@ def table_look(picture: Bytes, seen: BlockEvidence) -> TableLook:
     look = TableLook(table, every, every, step, pitch_px, np.asarray(lighter), np.asarray(shade), _away(every, step))
     exterior = seen.rings[0].points
     if np.count_nonzero(look.foreign_at(exterior) < beside(look)) > _MOST * len(exterior):
-        # All around the block: the table mirrors it, or is no plain one.
-        within = foreign & inside
+        # All around the block: the table mirrors it, or is no plain one. Neither is smooth.
+        within = (foreign & inside) | _mostly(beside_block, busy < _SMOOTH)
         look = replace(look, foreign=within, away=_away(within, step))
     return look
+
+
+def _mostly(part: Bools, kind: Bools) -> Bools:
+    """The pieces of a part that are of that kind to a good share."""
+    count, pieces = cv2.connectedComponents(part.astype(np.uint8), connectivity=8)
+    size = np.maximum(np.bincount(pieces.ravel(), minlength=count), 1)
+    kept = np.bincount(pieces[kind], minlength=count) > _GOOD_SHARE * size
+    kept[0] = False
+    return np.asarray(kept[pieces], np.bool_)
 
 
 def _away(foreign: Bools, step: int) -> Float32s:
@@ -174,15 +184,15 @@ def _slope(small: Bytes) -> NDArray[np.int16]:
     return np.asarray(size.max(axis=2) if size.ndim == 3 else size, np.int16)
 
 
-def _quiet(slope: NDArray[np.int16], block: Bytes, samples: float) -> Bools:
-    """Where light changes less over a cell than it does in comb."""
+def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
+    """How much light changes over a cell, of what it usually does in comb."""
     comb = slope[::2, ::2][block[::2, ::2] > 0]
     if not len(comb):
-        return np.zeros(slope.shape, np.bool_)
+        return np.ones(slope.shape, np.float32)
     size = 2 * round(0.5 * samples) + 1
     busy = cv2.blur(np.minimum(slope, np.percentile(comb, 90)).astype(np.float32), (size, size))
     usual = float(np.median(busy[::2, ::2][block[::2, ::2] > 0]))
-    return np.asarray(busy < _QUIET * usual, np.bool_)
+    return np.asarray(busy / max(usual, 1e-3), np.float32)
 
 
 def _opened(part: Bools, radius: float) -> Bools:

@@ -29,7 +29,7 @@ _FEWEST, _FEW = 8, 3
 _SUPPORT_PITCHES, _HIDES_PITCHES, _FOOT_PITCHES = 0.8, 0.5, 1.5
 _FILL_SIGMA_PX = 0.7
 # A shadow along less of the edge than this may be a dark thing over a corner; and turns of a dent come to more.
-_SHADOW_PITCHES, _DENT_DEG = 8.0, 110.0
+_SHADOW_PITCHES, _DENT_DEG = 8.0, 60.0
 
 Fit = Callable[[RingEvidence], FittedRing]
 

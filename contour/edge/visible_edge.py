@@ -28,8 +28,9 @@ _FEWEST, _FEW = 8, 3
 # a wall at such a thing.
 _SUPPORT_PITCHES, _HIDES_PITCHES, _FOOT_PITCHES = 0.8, 0.5, 1.5
 _FILL_SIGMA_PX = 0.7
-# A shadow along less of the edge than this may be a dark thing over a corner; and turns of a dent come to more.
-_SHADOW_PITCHES, _DENT_DEG = 8.0, 60.0
+# A shadow along less of the edge than this may be a dark thing over a corner; and a dent that a thing leaves turns in by
+# more than this, and out before and after, no farther from there.
+_SHADOW_PITCHES, _DENT_DEG, _OUT_DEG = 8.0, 60.0, 30.0
 
 Fit = Callable[[RingEvidence], FittedRing]
 
@@ -123,11 +124,18 @@ def _is_own_edge(points: Float64s, ring: Ring, pitch_px: float) -> bool:
     long = (last - first) % lengths.length
     if long < _SHADOW_PITCHES * pitch_px:
         return False
-    path = lengths.at(first + np.arange(0.0, long, pitch_px))
+    reach = _SHADOW_PITCHES * pitch_px
+    path = lengths.at(first + np.arange(-reach, long + reach, pitch_px))
     heading = np.angle(np.diff(path[:, 0] + 1j * path[:, 1]))
-    turn = np.angle(np.exp(1j * np.diff(heading)))
     # With positive shoelace, material on the left, turns into it are negative.
-    return bool(-np.minimum(turn, 0.0).sum() < np.radians(_DENT_DEG))
+    turn = np.degrees(np.angle(np.exp(1j * np.diff(heading))))
+    ends = round(_SHADOW_PITCHES)
+    out, into = np.maximum(turn, 0.0), np.maximum(-turn, 0.0)
+    for k in np.flatnonzero(into[ends:-ends]) + ends:
+        around = slice(k - ends, k), slice(k, k + ends + 1)
+        if into[k - ends : k + ends + 1].sum() > _DENT_DEG and min(out[part].sum() for part in around) > _OUT_DEG:
+            return False
+    return True
 
 
 def _plain(evidence: RingEvidence, fitted: FittedRing) -> VisibleRing:

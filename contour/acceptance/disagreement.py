@@ -70,12 +70,10 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float, flat: Bytes 
     small_pitch_px = pitch_px / shrink
     busy = _without_small_gaps(_busy(small, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
     ours = _drawn(contour, busy.shape[:2], shrink)
-    filled = np.zeros_like(busy)
     if flat is not None and flat.any():
         there = cv2.resize(flat, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
-        filled = np.asarray(cv2.dilate(there * np.uint8(255), _disc(_BLUR_PITCHES * small_pitch_px * 2)), np.uint8)
-    busy = np.asarray(cv2.bitwise_or(busy, cv2.bitwise_and(filled, ours)), np.uint8)
-    busy = np.asarray(cv2.bitwise_and(busy, cv2.bitwise_not(_but(filled, ours))), np.uint8)
+        filled = cv2.dilate(there, _disc(_BLUR_PITCHES * small_pitch_px * 2)) > 0
+        busy = np.asarray(np.where(filled, ours, busy), np.uint8)
     around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * small_pitch_px)), np.uint8)
     level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)

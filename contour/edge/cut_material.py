@@ -6,8 +6,6 @@ inside of both where these meet in a corner.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 
@@ -15,10 +13,11 @@ from contour.edge.flanks import out_of_flanks
 from contour.edge.ring_places import runs_of
 from contour.edge.table_look import TableLook
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices
-from contour.geometry.rings import Ring
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import Ring, oriented
 from contour.image.pixel_grid import pixels_of, samples_of
 from contour.image.pixel_sampling import sample_at
-from contour.walls.wall_evidence import RingEvidence
+from contour.walls.wall_evidence import EdgePoints, RingEvidence
 
 # How near to its border on the map the material's edge lies, and how far beyond the table may begin: in between is the
 # block's shadow.
@@ -33,66 +32,51 @@ _STEP_PX = 0.5
 _LEAST_CONTRAST = 6.0
 
 
-@dataclass(frozen=True)
-class CutMaterial:
-    """Ends of filled cells along an edge: points and outward normals (K, 2), pixels, and where along the coarse ring
-    they belong (K,), pixels.
-    """
-
-    points: Float64s
-    normal: Float64s
-    position: Float64s
-
-
-def cut_material(picture: Bytes, clear: RingEvidence, distrusted: Float64s, look: TableLook) -> list[CutMaterial]:
-    """The edges of what fills cells up to the edge, in a picture, grey (H, W) or BGR (H, W, 3), uint8.
+def cut_material(picture: Bytes, clear: RingEvidence, distrusted: Float64s, look: TableLook) -> EdgePoints:
+    """The ends of what fills cells up to the edge, in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
     `clear`: the ring's witnesses that lie at nothing foreign. `distrusted`: ends of walls at something foreign, (N, 2).
     """
-    found = []
-    for ring in _with_things(clear, distrusted, look):
-        at_thing = look.foreign_at(ring) < _EDGE_PITCHES * look.pitch_px + look.step
-        if at_thing.all() or not at_thing.any():
-            continue
-        normal = _normals(ring, max(1, round(0.5 * look.pitch_px / look.step)))
-        for run in runs_of(at_thing):
-            one = _cut(picture, clear, (ring, normal), run, look)
-            if one is not None:
-                found.append(one)
-    return found
+    ring = _with_things(clear, distrusted, look)
+    at_thing = look.foreign_at(ring) < _EDGE_PITCHES * look.pitch_px + look.step
+    if at_thing.all() or not at_thing.any():
+        return EdgePoints()
+    border = ring, _normals(ring, max(1, round(0.5 * look.pitch_px / look.step)))
+    found = [_cut(picture, clear, border, run, look) for run in runs_of(at_thing)]
+    return EdgePoints(
+        np.concatenate([one.points for one in found]),
+        np.concatenate([one.position for one in found]),
+        np.concatenate([one.normal for one in found]),
+    )
 
 
 def _cut(
     picture: Bytes, clear: RingEvidence, border: tuple[Ring, Float64s], run: Indices, look: TableLook
-) -> CutMaterial | None:
-    """The run of a border where it is cut material, flush with the edges on its two sides; None where it is not."""
+) -> EdgePoints:
+    """The run of a border where it is cut material, flush with the edges on its two sides; none of it where not."""
     place, normal = border[0][run], border[1][run]
     pitch_px = look.pitch_px
     off, sure = _steps(picture, place, normal, _EDGE_PITCHES * pitch_px)
     ends = place + off[:, None] * normal
     beyond = np.any([look.table_at(place + reach * pitch_px * normal) for reach in _TABLE_PITCHES], axis=0)
-    arc = _arc(clear.coarse)
-    first, last = (float(arc[((clear.coarse - place[end]) ** 2).sum(axis=1).argmin()]) for end in (0, -1))
+    lengths = RingLengths.of(clear.coarse)
+    nearest = [int(((clear.coarse - place[end]) ** 2).sum(axis=1).argmin()) for end in (0, -1)]
+    first, last = lengths.starts[nearest].tolist()
     out = out_of_flanks(clear, (first, last), ends, pitch_px)
     if out is None:
-        return None
+        return EdgePoints()
     # What is darker than the table may as well be a shadow beside the block.
     lit = look.lighter_at(place - _EDGE_PITCHES * pitch_px * normal)
     cut = sure & beyond & lit & (out < _FLUSH_PITCHES * pitch_px)
     if np.count_nonzero(cut) < _CUT_SHARE * len(run):
-        return None
+        return EdgePoints()
     share = np.linspace(0.0, 1.0, len(run))[cut]
-    position = (first + share * ((last - first) % arc[-1])) % arc[-1]
-    return CutMaterial(ends[cut], normal[cut], position)
+    position = (first + share * ((last - first) % lengths.length)) % lengths.length
+    return EdgePoints(ends[cut], position, normal[cut])
 
 
-def _arc(coarse: Ring) -> Float64s:
-    """Arc length at each vertex of a ring and, last, the whole, shape (M + 1,)."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T))])
-
-
-def _with_things(clear: RingEvidence, distrusted: Float64s, look: TableLook) -> list[Ring]:
-    """Borders of the coarse block together with the things that its walls end at, pixels, positive shoelace."""
+def _with_things(clear: RingEvidence, distrusted: Float64s, look: TableLook) -> Ring:
+    """The border of the coarse block together with the things that its walls end at, pixels, positive shoelace."""
     count, parts = cv2.connectedComponents(look.foreign.astype(np.uint8), connectivity=8)
     touching = np.zeros(count, np.bool_)
     grid = np.rint(samples_of(distrusted, look.step)).astype(int)
@@ -109,10 +93,7 @@ def _with_things(clear: RingEvidence, distrusted: Float64s, look: TableLook) -> 
     )
     chains, _ = cv2.findContours(union, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     chain = max(chains, key=len)[:, 0, :].astype(np.float64)
-    following = np.roll(chain, -1, axis=0)
-    if float((chain[:, 0] * following[:, 1] - following[:, 0] * chain[:, 1]).sum()) < 0:
-        chain = chain[::-1]
-    return [pixels_of(chain, look.step)]
+    return pixels_of(oriented(chain, counter_clockwise=True), look.step)
 
 
 def _normals(ring: Ring, half: int) -> Float64s:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.edge.ring_places import nearest, places_along, runs_of
+from contour.edge.ring_places import places_along, runs_of, turns
 from contour.edge.stretches import Hider, State, Stretch
 from contour.edge.table_look import TableLook
 from contour.edge.visible_edge import SPACING_PITCHES, VisibleRing
 from contour.geometry.arrays import Float64s, Indices
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
+from contour.geometry.signed_distance import nearest
 
 _SHORTEST_PITCHES = 1.0
 # A bridge joins two sides: walls seen over so much of each, and between them no more of a bend than this.
@@ -69,9 +70,7 @@ def _run_state(run: Indices, place: Float64s, on_line: Float64s, pitch_px: float
     off = np.abs((path - path[0]) @ np.array([-chord[1], chord[0]]))
     if float(off.max()) < max(_STRAIGHT_PX, _STRAIGHT_PITCHES * pitch_px):
         return "bridged", True, length
-    steps = np.diff(path[::2], axis=0)
-    turn = np.abs(np.angle(np.exp(1j * np.diff(np.arctan2(steps[:, 1], steps[:, 0])))))
-    if np.degrees(turn.max(initial=0.0)) < _SMOOTH_DEG:
+    if np.abs(turns(path[::2])).max(initial=0.0) < _SMOOTH_DEG:
         return "bridged", False, length
     return "covered", False, length
 
@@ -82,7 +81,5 @@ def _flank(place: Float64s, end: int, way: int) -> Float64s:
     """
     count = max(3, round(_FLANK_PITCHES / SPACING_PITCHES))
     path = place[(end + way * np.arange(1, count + 1)) % len(place)]
-    heading = np.angle(np.diff(path[:, 0] + 1j * path[:, 1]))
-    turn = np.abs(np.angle(np.exp(1j * np.diff(heading))))
-    corners = np.flatnonzero(np.degrees(turn) > _SMOOTH_DEG)
+    corners = np.flatnonzero(np.abs(turns(path)) > _SMOOTH_DEG)
     return path[: corners[0] + 2] if len(corners) else path

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contour.geometry.arrays import Float64s
+from contour.geometry.rings import perimeter
 from contour.walls.wall_evidence import RingEvidence
 
 _PITCHES, _FEWEST = 6.0, 4
@@ -18,8 +19,7 @@ def out_of_flanks(
 
     `clear`: the witnesses that are not in doubt; the run begins and ends at `stops` along the coarse ring.
     """
-    coarse = clear.coarse
-    whole = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
+    whole = perimeter(clear.coarse)
     lines = [_line(clear, stop, way, (whole, pitch_px)) for stop, way in zip(stops, (-1.0, 1.0), strict=True)]
     out = [(points - line[0]) @ line[1] for line in lines if line is not None]
     return np.asarray(np.maximum(*out), np.float64) if len(out) == 2 else None

@@ -39,13 +39,10 @@ def places_along(ring: Ring, spacing: float, rectifier: Rectifier | None) -> Pla
     return Places(points, start[owner] + share * length[owner], float(start[-1]))
 
 
-def nearest(points: Float64s, others: Float64s) -> Float64s:
-    """Distance of each of `points` (N, 2) from the nearest of `others` (M, 2), shape (N,); inf where there is none."""
-    if not len(others):
-        return np.full(len(points), np.inf)
-    parts = np.array_split(points, max(1, len(points) // 256))
-    square = [((part[:, None, :] - others[None, :, :]) ** 2).sum(axis=2).min(axis=1) for part in parts]
-    return np.asarray(np.sqrt(np.concatenate(square)), np.float64)
+def turns(path: Float64s) -> Float64s:
+    """By how much a path (N, 2) turns at each of its inner points, shape (N - 2,), degrees, -180 to 180."""
+    heading = np.angle(np.diff(path[:, 0] + 1j * path[:, 1]))
+    return np.degrees(np.angle(np.exp(1j * np.diff(heading))))
 
 
 def runs_of(chosen: Bools) -> list[Indices]:

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int32s
 from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
@@ -72,13 +72,15 @@ class TableLook:
 
     def table_at(self, points: Float64s) -> Bools:
         """Which points (N, 2), pixels, lie on the table, shape (N,)."""
-        grid = samples_of(points, self.step)
-        return sample_at(self.table.astype(np.uint8) * np.uint8(255), grid[:, 0], grid[:, 1]) > 127.0
+        return self._at(self.table, points)
 
     def lighter_at(self, points: Float64s) -> Bools:
         """Which points (N, 2), pixels, are lighter than the table, shape (N,)."""
+        return self._at(self.lighter, points)
+
+    def _at(self, part: Bools, points: Float64s) -> Bools:
         grid = samples_of(points, self.step)
-        return sample_at(self.lighter.astype(np.uint8) * np.uint8(255), grid[:, 0], grid[:, 1]) > 127.0
+        return sample_at(part.astype(np.uint8) * np.uint8(255), grid[:, 0], grid[:, 1]) > 127.0
 
     def in_shade(self, points: Float64s) -> Bools:
         """Which points (N, 2), pixels, at foreign things are at nothing but what may be a shadow, shape (N,)."""
@@ -90,7 +92,7 @@ class TableLook:
         """Where something foreign is no shadow."""
         return _opened(self.things & ~self.shade, _THIN)
 
-    @property
+    @cached_property
     def hiding(self) -> Bytes:
         """The map of what is foreign and no shadow, with its own borders, uint8, 1 where it hides what lies beneath."""
         return np.asarray(cv2.dilate(self.lit.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
@@ -125,22 +127,13 @@ def table_look(picture: Bytes, seen: BlockEvidence) -> TableLook:
     parts = np.asarray(numbered, np.int32)
     area = np.bincount(parts[block == 0], minlength=int(parts.max()) + 1)
     area[:1] = 0
-    main = int(np.argmax(area)) if area.any() else 0
-    table_parts = np.zeros(int(parts.max()) + 1, np.bool_)
-    table_parts[main] = main > 0
-    # Plates of a table lie side by side under one lamp: those told from the first tell what the next ones look like.
-    for _ in range(_ROUNDS):
-        level, spread = _table_level(small, table_parts[parts], samples)
-        off = np.asarray(cv2.blur(small, (3, 3)).reshape(level.shape) - level, np.float32)
-        known, table_parts = table_parts, _table_parts(off, spread, parts, main)
-        if (known == table_parts).all() or area[table_parts & ~known].sum() < _FEW_SAMPLES * samples**2:
-            break
-    table = _grown(table_parts[parts], reach)
+    table_part, off, level, spread = _told_from_table(small, parts, area, samples)
+    table = _grown(table_part, reach)
     # Small flat parts outside lie between walls that stick out, and between specks.
-    flat = _grown(_wide((parts > 0) & ~table_parts[parts], room, _CELL_ROOM * samples - _RIM), reach)
+    flat = _grown(_wide((parts > 0) & ~table_part, room, _CELL_ROOM * samples - _RIM), reach)
     busy = _busy(slope, block, samples)
     quiet = (busy < _QUIET) & ~table
-    foreign = _opened((flat | quiet) & ~table_parts[parts], _CELL_ROOM * samples)
+    foreign = _opened((flat | quiet) & ~table_part, _CELL_ROOM * samples)
     foreign = _long(foreign, _LONG_PITCHES * samples)
     beside_block = _long(_opened((block == 0) & ~table, _BAND * samples + 0.5), _LONG_PITCHES * samples)
     lighter = np.any(off > _APART + _APART_SPREADS * spread, axis=2)
@@ -221,6 +214,25 @@ def _long(part: Bools, least: float) -> Bools:
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > least
     long[0] = False
     return np.asarray(long[pieces], np.bool_)
+
+
+def _told_from_table(
+    small: Bytes, parts: Int32s, area: Indices, samples: float
+) -> tuple[Bools, Float32s, Float32s, Float64s]:
+    """Which samples lie on numbered flat parts that are the table, how far the picture is off its light, that light,
+    and its spread; `area`: of each part, outside the block.
+    """
+    main = int(np.argmax(area)) if area.any() else 0
+    table_parts = np.zeros(len(area), np.bool_)
+    table_parts[main] = main > 0
+    # Plates of a table lie side by side under one lamp: those told from the first tell what the next ones look like.
+    for _ in range(_ROUNDS):
+        level, spread = _table_level(small, table_parts[parts], samples)
+        off = np.asarray(cv2.blur(small, (3, 3)).reshape(level.shape) - level, np.float32)
+        known, table_parts = table_parts, _table_parts(off, spread, parts, main)
+        if (known == table_parts).all() or area[table_parts & ~known].sum() < _FEW_SAMPLES * samples**2:
+            break
+    return table_parts[parts], off, level, spread
 
 
 def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, Float64s]:

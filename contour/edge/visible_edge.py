@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.edge.cut_material import CutMaterial, cut_material
+from contour.edge.cut_material import cut_material
 from contour.edge.flanks import out_of_flanks
-from contour.edge.ring_places import nearest, runs_of
+from contour.edge.ring_places import runs_of, turns
 from contour.edge.table_look import TableLook, beside
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
-from contour.geometry.signed_distance import depth_inside
+from contour.geometry.signed_distance import depth_inside, nearest
 from contour.outline.fit import FittedRing
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
@@ -28,8 +28,8 @@ _FEWEST, _FEW = 8, 3
 # a wall at such a thing.
 _SUPPORT_PITCHES, _HIDES_PITCHES, _FOOT_PITCHES = 0.8, 0.5, 1.5
 _FILL_SIGMA_PX = 0.7
-# A shadow along less of the edge than this may be a dark thing over a corner; and a dent that a thing leaves turns in by
-# more than this, and out before and after, no farther from there.
+# A shadow along less of the edge than this may be a dark thing over a corner; and a dent that a thing leaves turns in
+# by more than this, and out before and after, no farther from there.
 _SHADOW_PITCHES, _DENT_DEG, _OUT_DEG = 8.0, 60.0, 30.0
 
 Fit = Callable[[RingEvidence], FittedRing]
@@ -73,13 +73,14 @@ def fit_visible(
             "neither the table nor cells. Clear the table, and check the light"
         )
     clear = _without(evidence, near, look)
-    apart = np.abs(_depth(fit(clear).ring, evidence.points, rectifier))
+    apart = np.abs(depth_inside(fit(clear).ring, evidence.points, rectifier))
     distrusted = near & (apart > _AGREE_PITCHES * look.pitch_px)
     if not distrusted.any():
         return _plain(evidence, fit(evidence))
     fills = cut_material(picture, clear, evidence.points[distrusted], look)
-    trusted, filled = _with_fills(_without(evidence, distrusted, look), fills)
-    return VisibleRing(trusted, fit(trusted), evidence.points[distrusted], filled)
+    walls = _without(evidence, distrusted, look)
+    trusted, order = walls.joined_by(fills, _FILL_SIGMA_PX, WitnessKind.BLUNT)
+    return VisibleRing(trusted, fit(trusted), evidence.points[distrusted], order >= len(walls.points))
 
 
 def doubtful(evidence: RingEvidence, look: TableLook) -> Bools:
@@ -98,6 +99,8 @@ def doubtful(evidence: RingEvidence, look: TableLook) -> Bools:
 
 def _unshaded(near: Bools, evidence: RingEvidence, look: TableLook, fit: Fit) -> Bools:
     """The witnesses of `near` that lie at no shadow along an edge, shape (N,)."""
+    if not near.any():
+        return near
     shaded = look.in_shade(evidence.points) & (look.foreign_at(evidence.points) < beside(look))
     if not (near & shaded).any():
         return near
@@ -126,11 +129,9 @@ def _is_own_edge(points: Float64s, ring: Ring, pitch_px: float) -> bool:
         return False
     reach = _SHADOW_PITCHES * pitch_px
     path = lengths.at(first + np.arange(-reach, long + reach, pitch_px))
-    heading = np.angle(np.diff(path[:, 0] + 1j * path[:, 1]))
     # With positive shoelace, material on the left, turns into it are negative.
-    turn = np.degrees(np.angle(np.exp(1j * np.diff(heading))))
+    out, into = (np.maximum(way * turns(path), 0.0) for way in (1.0, -1.0))
     ends = round(_SHADOW_PITCHES)
-    out, into = np.maximum(turn, 0.0), np.maximum(-turn, 0.0)
     for k in np.flatnonzero(into[ends:-ends]) + ends:
         around = slice(k - ends, k), slice(k, k + ends + 1)
         if into[k - ends : k + ends + 1].sum() > _DENT_DEG and min(out[part].sum() for part in around) > _OUT_DEG:
@@ -144,39 +145,8 @@ def _plain(evidence: RingEvidence, fitted: FittedRing) -> VisibleRing:
 
 def _without(evidence: RingEvidence, dropped: Bools, look: TableLook) -> RingEvidence:
     """The evidence without these witnesses, and without walls at the border of things."""
-    kept = ~dropped
     return replace(
-        evidence,
-        points=evidence.points[kept],
-        position=evidence.position[kept],
-        normal=evidence.normal[kept],
-        sigma=evidence.sigma[kept],
-        kind=evidence.kind[kept],
+        evidence.take(~dropped),
         walls=evidence.walls.take(look.foreign_at(evidence.walls.points) >= beside(look)),
         beside=evidence.beside[look.foreign_at(evidence.beside) >= beside(look)],
     )
-
-
-def _depth(ring: Ring, points: Float64s, rectifier: Rectifier | None) -> Float64s:
-    if rectifier is not None:
-        ring, points = rectifier.rectify(ring), rectifier.rectify(points)
-    return depth_inside(ring, points)
-
-
-def _with_fills(evidence: RingEvidence, fills: list[CutMaterial]) -> tuple[RingEvidence, Bools]:
-    """The evidence with ends of filled cells among its witnesses, and which those are."""
-    own = len(evidence.points)
-    if not fills:
-        return evidence, np.zeros(own, np.bool_)
-    points = np.concatenate([fill.points for fill in fills])
-    position = np.concatenate([evidence.position, *(fill.position for fill in fills)])
-    order = np.argsort(position, kind="stable")
-    more = replace(
-        evidence,
-        points=np.concatenate([evidence.points, points])[order],
-        position=position[order],
-        normal=np.concatenate([evidence.normal, *(fill.normal for fill in fills)])[order],
-        sigma=np.concatenate([evidence.sigma, np.full(len(points), _FILL_SIGMA_PX)])[order],
-        kind=np.concatenate([evidence.kind, np.full(len(points), WitnessKind.BLUNT, np.int8)])[order],
-    )
-    return more, order >= own

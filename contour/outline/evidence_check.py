@@ -24,10 +24,7 @@ def check_against_evidence(evidence: RingEvidence, ring: Ring, pitch_px: float, 
     picture a lens bends a long edge by more than a small cell.
     """
     ends = evidence.kind != WitnessKind.OUTERMOST
-    places = evidence.points
-    if rectifier is not None:
-        ring, places = rectifier.rectify(ring), rectifier.rectify(places)
-    depth = depth_inside(ring, places)
+    depth = depth_inside(ring, evidence.points, rectifier)
     # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
     inside, outside = depth / pitch_px, -depth[ends] / pitch_px
     for off, points, most, how_far in (

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from contour.geometry.arrays import Float64s, Indices
@@ -69,15 +67,5 @@ def _spaced(run: Indices, walls: Float64s, height: Float64s, pitch_px: float) ->
 
 def with_bounds(evidence: RingEvidence, bounds: Indices) -> tuple[RingEvidence, Indices]:
     """The evidence with its wall points at `bounds` among the witnesses, and where its own came to lie, shape (N,)."""
-    walls, own = evidence.walls.take(bounds), len(evidence.points)
-    position = np.concatenate([evidence.position, walls.position])
-    order = np.argsort(position, kind="stable")
-    more = replace(
-        evidence,
-        points=np.concatenate([evidence.points, walls.points])[order],
-        position=position[order],
-        normal=np.concatenate([evidence.normal, walls.normal])[order],
-        sigma=np.concatenate([evidence.sigma, np.ones(len(bounds))])[order],
-        kind=np.concatenate([evidence.kind, np.full(len(bounds), WitnessKind.BOUND, np.int8)])[order],
-    )
-    return more, np.argsort(order, kind="stable")[:own].astype(np.intp)
+    more, order = evidence.joined_by(evidence.walls.take(bounds), 1.0, WitnessKind.BOUND)
+    return more, np.argsort(order, kind="stable")[: len(evidence.points)].astype(np.intp)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from contour.edge.edge_evidence import ring_evidence
-from contour.edge.table_look import table_look
+from contour.edge.table_look import TableLook, table_look
 from contour.edge.visible_edge import doubtful, fit_visible
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
@@ -29,7 +29,7 @@ _LEAST_WITNESSES = 8
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
 # What of a thing lay inside the block as it was first seen shows once the rest of it is known.
-_LOOKS = 2
+_LOOKS = 3
 
 
 def wall_tips(
@@ -52,17 +52,7 @@ def wall_tips(
     light = wall_light(picture)
     if settings.edge == "cells":
         return _closed_cells(picture, light, settings, on_stage)
-    seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"))
-    look = table_look(picture, seen)
-    hidden = np.zeros_like(look.hiding)
-    for _ in range(_LOOKS):
-        if not (look.hiding > hidden).any():
-            break
-        if not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
-            break
-        hidden = look.hiding
-        seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=hidden)
-        look = table_look(picture, seen)
+    seen, look = _looked_at(picture, light, settings, on_stage)
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
     visible = [
@@ -96,6 +86,24 @@ def wall_tips(
         for stretch in ring_evidence(number, ring, one, look, rectifier, sure_px)
     )
     return replace(_trace(seen, contour, light, uncertainty_px=sure_px), evidence=evidence, look=look)
+
+
+def _looked_at(
+    picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage
+) -> tuple[BlockEvidence, TableLook]:
+    """What is seen of the block, and of what lies on it and around it: once more where that hides some of its edge."""
+    hidden: Bytes | None = None
+    for _ in range(_LOOKS):
+        seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=hidden)
+        look = table_look(picture, seen)
+        if not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
+            break
+        known = np.zeros_like(look.hiding) if hidden is None else hidden
+        hidden = look.hiding
+        # Where the pitch was told anew, so may be the maps' grid.
+        if hidden.shape == known.shape and not (hidden > known).any():
+            break
+    return seen, look
 
 
 def _cut_off(light: Bytes, seen: BlockEvidence, on_stage: OnStage) -> Trace:

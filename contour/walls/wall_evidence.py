@@ -4,7 +4,7 @@ fitting.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -26,18 +26,18 @@ class WitnessKind(IntEnum):
 
 
 @dataclass(frozen=True)
-class WallPoints:
-    """Boundary of the block's own walls along a ring, some eight points a pitch, each chain's in order: points and
-    outward normals at their feet on the coarse ring (K, 2), arc lengths of the feet (K,), pixels.
+class EdgePoints:
+    """Points along a ring's edge and the outward normals there (K, 2), arc lengths of their feet on the coarse ring
+    (K,), all in pixels.
     """
 
     points: Float64s = field(default_factory=lambda: np.empty((0, 2)))
     position: Float64s = field(default_factory=lambda: np.empty(0))
     normal: Float64s = field(default_factory=lambda: np.empty((0, 2)))
 
-    def take(self, index: Bools | Indices) -> WallPoints:
+    def take(self, index: Bools | Indices) -> EdgePoints:
         """The points at `index`."""
-        return WallPoints(self.points[index], self.position[index], self.normal[index])
+        return EdgePoints(self.points[index], self.position[index], self.normal[index])
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,9 @@ class RingEvidence:
     coarse: coarse ring, shape (M, 2), pixels. points: where the material ends, shape (N, 2), float64, pixels,
     sub-pixel. position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal:
     outward unit normal of the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected
-    standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind. walls: all
-    that was seen of walls near the edge, whether it witnesses the outline or not. beside: what may be
+    standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind. walls: the
+    boundary of all that was seen of walls near the edge, whether it witnesses the outline or not, some eight points a
+    pitch, each chain's in order. beside: what may be
     material as well, strands of wall that hang on nothing and the edge of dark material, shape (M, 2), pixels, some
     four points a pitch.
     """
@@ -62,8 +63,35 @@ class RingEvidence:
     normal: Float64s
     sigma: Float64s
     kind: NDArray[np.int8]
-    walls: WallPoints = field(default_factory=WallPoints)
+    walls: EdgePoints = field(default_factory=EdgePoints)
     beside: Float64s = field(default_factory=lambda: np.empty((0, 2)))
+
+    def take(self, index: Bools | Indices) -> RingEvidence:
+        """The evidence with its witnesses at `index` only."""
+        return replace(
+            self,
+            points=self.points[index],
+            position=self.position[index],
+            normal=self.normal[index],
+            sigma=self.sigma[index],
+            kind=self.kind[index],
+        )
+
+    def joined_by(self, more: EdgePoints, sigma_px: float, kind: WitnessKind) -> tuple[RingEvidence, Indices]:
+        """The evidence with more points among its witnesses, and which witness came to each place: of its own, the
+        new ones numbered on behind them.
+        """
+        new = len(more.points)
+        both = replace(
+            self,
+            points=np.concatenate([self.points, more.points]),
+            position=np.concatenate([self.position, more.position]),
+            normal=np.concatenate([self.normal, more.normal]),
+            sigma=np.concatenate([self.sigma, np.full(new, sigma_px)]),
+            kind=np.concatenate([self.kind, np.full(new, kind, np.int8)]),
+        )
+        order = np.argsort(both.position, kind="stable")
+        return both.take(order), order
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.signed_distance import nearest
 from contour.image.pixel_grid import pixels_of, samples_of
 from contour.walls.cell_scale import CellScale
 from contour.walls.coarse_rings import CoarseBlock
 from contour.walls.dark_material import dark_beyond
 from contour.walls.end_profile import EndModel, centred_axes, fit_ends, true_width
 from contour.walls.wall_ends import Chains, edge_chains, find_ends, outermost
-from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WallPoints, WitnessKind
+from contour.walls.wall_evidence import BlockEvidence, EdgePoints, RingEvidence, WitnessKind
 from contour.walls.wall_mask import WallMask
 from contour.walls.wall_parallax import Parallax, parallax
 
@@ -92,7 +93,7 @@ def block_evidence(
         least = np.where(faded, _ENDS_INSIDE_PITCHES * cells.pitch_px, np.inf)
         tips = _to_the_table(dark, tips, tips.points, normal, least)
     tips = replace(tips, points=_raised(tips.points, coarse.feet(samples_of(tips.points, scale))[2], depth))
-    outer = outer[_nearest(outer, samples_of(tips.points, scale)) > _LONELY_PITCHES * pitch_px]
+    outer = outer[nearest(outer, samples_of(tips.points, scale)) > _LONELY_PITCHES * pitch_px]
     normal, place = coarse.feet(outer)[2], pixels_of(outer, scale)
     sides = _sides(light, place, normal, depth.width or cells.wall_px, model)
     if dark is not None:
@@ -188,14 +189,6 @@ def _raised(points: Float64s, normal: Float64s, depth: Parallax) -> Float64s:
     )
 
 
-def _nearest(points: Float64s, others: Float64s) -> Float64s:
-    """Distance from each of `points` (N, 2) to the nearest of `others` (M, 2), shape (N,); inf where there is none."""
-    if not len(others) or not len(points):
-        return np.full(len(points), np.inf)
-    square = ((points[:, None, :] - others[None, :, :]) ** 2).sum(axis=2)
-    return np.asarray(np.sqrt(square.min(axis=1)), np.float64)
-
-
 def _walls(chains: Chains, coarse: CoarseBlock, pitch_px: float) -> Float64s:
     """Points of the walls' boundary near the coarse edge, shape (K, 2), mask pixels."""
     points = chains.points[:: max(1, round(pitch_px / _WALL_POINTS_PER_PITCH))]
@@ -210,7 +203,7 @@ def _rings(
     kind, sigma = np.concatenate([tips.kind, sides.kind]), np.concatenate([tips.sigma, sides.sigma])
     ring, arc, normal = coarse.feet(samples_of(points, scale))
     beside, foot, across = coarse.feet(walls)
-    wall_points = WallPoints(_raised(pixels_of(walls, scale), across, depth), foot * scale, across)
+    wall_points = EdgePoints(_raised(pixels_of(walls, scale), across, depth), foot * scale, across)
     evidence = []
     for number, one in enumerate(coarse.rings):
         mine = np.flatnonzero(ring == number)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contour.edge.cut_material import CutMaterial, cut_material
+from contour.edge.cut_material import cut_material
 from contour.edge.table_look import TableLook
 from contour.geometry.rings import densified
+from contour.walls.wall_evidence import EdgePoints
 from tests.support.pictures.hand_looks import HEIGHT, WIDTH, look
 from tests.support.pictures.outline_scenes import PITCH, along, distances, rectangle, witnesses
 
@@ -39,7 +40,7 @@ def picture(area: NDArray[np.float64], level: int = FILL, colour: bool = False) 
 
 def found(
     area: NDArray[np.float64], image: NDArray[np.uint8], there: TableLook, gap: tuple[float, float] = GAP
-) -> list[CutMaterial]:
+) -> EdgePoints:
     clear = replace(witnesses(BLOCK, seed=1, gaps=(gap,)), coarse=densified(BLOCK, 5.0))
     return cut_material(image, clear, area[:2], there)
 
@@ -47,7 +48,7 @@ def found(
 @pytest.mark.parametrize("colour", [False, True])
 def test_its_end_is_the_edge_to_the_pixel(colour: bool) -> None:
     area = thing(*GAP)
-    (one,) = found(area, picture(area, colour=colour), look(BLOCK, area))
+    one = found(area, picture(area, colour=colour), look(BLOCK, area))
     assert len(one.points) > 20
     assert distances(one.points, BLOCK).mean() < 0.7
     on_edge = along(BLOCK, one.position)[0]
@@ -61,29 +62,29 @@ def test_what_ends_flush_around_a_corner_is_cut_too() -> None:
     gap = (620.0, 780.0)
     points, normal = along(BLOCK, np.array(gap))
     area = np.array([points[0], BLOCK[1], points[1], points[1] - 80.0 * normal[1]])
-    (one,) = found(area, picture(area), look(BLOCK, area), gap)
+    one = found(area, picture(area), look(BLOCK, area), gap)
     assert distances(one.points, BLOCK).mean() < 0.05 * PITCH
 
 
 @pytest.mark.parametrize("out", [0.4, 1.0, 3.0])
 def test_what_sticks_out_is_none(out: float) -> None:
     area = thing(*GAP, out)
-    assert found(area, picture(area), look(BLOCK, area)) == []
+    assert not len(found(area, picture(area), look(BLOCK, area)).points)
 
 
 def test_what_is_darker_than_the_table_is_none() -> None:
     area = thing(*GAP)
-    assert found(area, picture(area, 10), look(BLOCK, area, lighter=False)) == []
+    assert not len(found(area, picture(area, 10), look(BLOCK, area, lighter=False)).points)
 
 
 def test_nor_is_what_the_table_does_not_follow() -> None:
     area, other = thing(*GAP), thing(*GAP, 3.0)
     there = look(BLOCK, area)
     hidden = TableLook(**{**vars(there), "table": there.table & ~look(BLOCK, other).foreign})
-    assert len(found(area, picture(area), there)) == 1
-    assert found(area, picture(area), hidden) == []
+    assert len(found(area, picture(area), there).points)
+    assert not len(found(area, picture(area), hidden).points)
 
 
 def test_nor_is_a_border_that_nothing_shows() -> None:
     area = thing(*GAP)
-    assert found(area, picture(area, TABLE + 3), look(BLOCK, area)) == []
+    assert not len(found(area, picture(area, TABLE + 3), look(BLOCK, area)).points)

@@ -1,10 +1,11 @@
-"""Places along a ring, their nearest neighbours, and runs around it."""
+"""Places along a ring, runs around it, and turns of a path."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from contour.edge.ring_places import nearest, places_along, runs_of
+from contour.edge.ring_places import places_along, runs_of, turns
+from contour.geometry.signed_distance import nearest
 from tests.support.pictures.rings import SQUARE
 
 
@@ -37,14 +38,14 @@ def test_with_a_lens_they_lie_on_its_curves_and_their_lengths_on_the_chords() ->
     assert places.whole == 40.0
 
 
-def test_the_nearest_of_none_is_infinitely_far() -> None:
-    assert np.isinf(nearest(np.zeros((3, 2)), np.empty((0, 2)))).all()
-    many = np.column_stack([np.arange(1000.0), np.zeros(1000)])
-    assert np.allclose(nearest(many, many[::2]), np.arange(1000) % 2)
-
-
 def test_runs_go_on_across_the_rings_first_place() -> None:
     chosen = np.array([True, True, False, True, False, False, True])
     assert [run.tolist() for run in runs_of(chosen)] == [[3], [6, 0, 1]]
     assert runs_of(np.zeros(4, bool)) == []
     assert [run.tolist() for run in runs_of(np.ones(3, bool))] == [[0, 1, 2]]
+
+
+def test_a_path_turns_by_degrees_with_their_sign() -> None:
+    path = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0]])
+    assert np.allclose(turns(path), [0.0, 90.0, 90.0, -90.0])
+    assert len(turns(path[:2])) == 0

@@ -101,6 +101,31 @@ def test_a_dark_thing_over_the_edge_is_none_of_its_shadows() -> None:
     assert [stretch.by for stretch in told(one, dark)] == ["object"]
 
 
+def test_a_dark_thing_over_a_corner_is_none_either() -> None:
+    """The outline turns into the block once, and out of it on both sides."""
+    corner = BLOCK[1]
+    one_way, other = ((BLOCK[k] - corner) / np.hypot(*(BLOCK[k] - corner)) * 6.0 * PITCH for k in (0, 2))
+    thing = np.array(
+        [corner + one_way + other, corner - one_way + other, corner - one_way - other, corner + one_way - other]
+    )
+    left = np.array([BLOCK[0], corner + one_way, thing[0], corner + other, BLOCK[2], BLOCK[3]])
+    dark = look(BLOCK, thing, lighter=False, shade=True)
+    states = {stretch.state for stretch in told(fitted(witnesses(left, seed=11), dark), dark)}
+    assert states == {"covered"}
+
+
+def test_a_corner_that_points_into_the_block_may_lie_in_a_shadow() -> None:
+    """The edges beside it are longer than a thing over a corner is wide."""
+    ring = rectangle(700.0, 500.0, angle=0.0)
+    slot = np.array([[525.0, 250.0], [525.0, 550.0], [875.0, 550.0], [875.0, 250.0]])
+    ring = np.concatenate([ring[:1], slot, ring[1:]])
+    shadow = np.array([[518.0, 300.0], [550.0, 300.0], [550.0, 525.0], [800.0, 525.0], [800.0, 557.0], [518.0, 557.0]])
+    dark = look(ring, shadow, lighter=False, shade=True)
+    evidence = witnesses(ring, seed=12, sigma=2.0)
+    assert told(fitted(evidence, dark), dark) == []
+    assert not fitted(evidence, dark).distrusted.any()
+
+
 def test_where_nearly_all_ends_lie_at_something_foreign_there_is_no_block_to_be_seen() -> None:
     everywhere = rectangle(1000.0, 800.0)
     evidence = ending_at(witnesses(BLOCK, seed=6), BLOCK, 0.0, 1.0, 1000.0)

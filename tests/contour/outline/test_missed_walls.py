@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contour.errors import NoBlockFound
 from contour.outline.fit import fit_ring
 from contour.outline.missed_walls import overlooked, with_bounds
-from contour.walls.wall_evidence import RingEvidence, WallPoints, WitnessKind
+from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, along, circle, errors, perimeter, rectangle, witnesses
 
 BLOCK = rectangle(900.0, 600.0, angle=0.0)
@@ -26,7 +26,7 @@ def with_walls(evidence: RingEvidence, *chains: NDArray[np.float64]) -> RingEvid
     places = np.arange(0.0, total, 1.0)
     feet, normals = along(evidence.coarse, places)
     nearest = ((points[:, None] - feet[None]) ** 2).sum(axis=2).argmin(axis=1)
-    return replace(evidence, walls=WallPoints(points, places[nearest], normals[nearest]))
+    return replace(evidence, walls=EdgePoints(points, places[nearest], normals[nearest]))
 
 
 def dense(chain: NDArray[np.float64]) -> NDArray[np.float64]:

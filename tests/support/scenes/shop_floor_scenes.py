@@ -36,13 +36,14 @@ KINDS: dict[str, light.Drawn] = {
     "shadow": light.shadow,
     "crushed": cells.crushed,
     "fading": light.fading,
+    "light_table": light.light_table,
     "wood": light.structured("wood"),
     "brushed": light.structured("brushed"),
     "slots": light.structured("slots"),
     "old_cuts": light.structured("old-cuts"),
 }
 
-_LIGHT = {"gamma", "blown_out", "dim", "coloured", "wood", "brushed", "slots", "old_cuts"}
+_LIGHT = {"gamma", "blown_out", "dim", "coloured", "light_table", "wood", "brushed", "slots", "old_cuts"}
 """Kinds that change in what light and on what table other things are seen: they come first, for levels to be drawn."""
 
 
@@ -76,6 +77,6 @@ def _alike(kind: str) -> set[str]:
     groups = (
         {"dim", "blown_out", "gamma"},
         {"motion", "motion_far", "defocus"},
-        {"wood", "brushed", "slots", "old_cuts", "mirror"},
+        {"light_table", "wood", "brushed", "slots", "old_cuts", "mirror"},
     )
     return {"undisturbed", kind}.union(*(group for group in groups if kind in group))

@@ -66,6 +66,12 @@ def dust(rng: np.random.Generator, scene: Scene) -> Scene:
     return replace(scene, clutter=clutter)
 
 
+def light_table(rng: np.random.Generator, scene: Scene) -> Scene:
+    """A plain table about as light as the block's walls: at a cut their ends show by their shadows alone."""
+    level = float(scene.material.top * rng.uniform(0.6, 1.3))
+    return replace(scene, table=replace(scene.table, level=min(level, 1.0)))
+
+
 def structured(kind: Literal["wood", "brushed", "slots", "old-cuts"]) -> Drawn:
     """A table of this kind, about as bright as the walls (brighter than dark ones)."""
 

@@ -16,8 +16,8 @@ from contour.walls.pieces import Piece
 # Of what contour and busy region may be apart in one place, the share that they may be apart everywhere. Of 500
 # traceable scenes none lies farther outside than 0.19 pitches; outlines a cell too fat lie 0.33 or more in 98 of 100.
 _EVERYWHERE = 0.125
-# Cell pitches. As much as contour and busy part of the picture may be apart.
-_SURE_WITHIN_PITCHES = 2.0
+# Cell pitches: what is 95 % sure within a quarter of a cell is hardly anywhere off by half a one.
+_SURE_WITHIN_PITCHES = 0.25
 # Of two blocks whose areas differ by less than this the larger one is a matter of chance.
 _EQUAL_SHARE = 0.8
 
@@ -155,7 +155,7 @@ def vague(traced: Trace | None) -> Finding | None:
         return None
     return Finding(
         Refusal.UNCERTAINTY_TOO_LARGE,
-        f"The contour is sure within {traced.uncertainty_px:.1f} px only, {cells:.1f} cells, {_SURE_WITHIN_PITCHES:g} "
+        f"The contour is sure within {traced.uncertainty_px:.1f} px only, {cells:.2g} cells, {_SURE_WITHIN_PITCHES:g} "
         "are allowed: walls end far away from it. Look at the overlay; check light and table, and that no straight "
         "light lines or cables lie in view.",
     )

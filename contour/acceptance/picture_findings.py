@@ -8,13 +8,28 @@ from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.arrays import Bytes
 from contour.image.taught_table import TableLimits, TableLook
 
+# An edge is carried across as much where ends of walls are lost.
+MOST_ALIKE_PITCHES = 4.0
+
 
 def badly_seen(traced: CheckedTrace | None, limits: QualityLimits) -> list[Finding]:
     """What is too bad about how the block's walls are seen, all in one finding."""
-    if traced is None or traced.quality is None:
+    if traced is None:
         return []
-    faults = quality_faults(traced.quality, limits)
+    faults = (*(() if traced.quality is None else quality_faults(traced.quality, limits)), *_alike(traced))
     return [_bad_picture(". Besides, ".join(faults))] if faults else []
+
+
+def _alike(traced: CheckedTrace) -> tuple[str, ...]:
+    alike = traced.alike
+    if alike is None or alike.length_pitches <= MOST_ALIKE_PITCHES:
+        return ()
+    x, y = alike.place_px
+    return (
+        f"along {alike.length_pitches:.0f} cells of the edge, near ({x:.0f}, {y:.0f}) px, what lies beside the block "
+        f"is as light as its walls, so that their ends do not show; {MOST_ALIKE_PITCHES:g} cells are allowed. Use a "
+        "table that is darker or of another colour, and light that leaves it dark",
+    )
 
 
 def useless_picture(picture: Bytes | None) -> list[Finding]:

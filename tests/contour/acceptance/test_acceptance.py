@@ -160,11 +160,11 @@ def traced(quality: Quality | None = None, **changes: object) -> CheckedTrace:
     )
 
 
-def test_a_contour_that_is_not_sure_within_two_cells_is_refused_whatever_the_recipe_allows() -> None:
-    assert judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=48.0)) == ()
-    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=51.0))
+def test_a_contour_that_is_not_sure_within_a_quarter_of_a_cell_is_refused_whatever_the_recipe_allows() -> None:
+    assert judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=6.0)) == ()
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=7.2))
     assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
-    assert "sure within 51.0 px only, 2.1 cells, 2 are allowed" in finding.text
+    assert "sure within 7.2 px only, 0.3 cells, 0.25 are allowed" in finding.text
 
 
 def test_the_ring_that_the_polygon_was_made_of_must_keep_off_the_frame_too() -> None:

@@ -1,0 +1,85 @@
+"""Where along an outline the table is as light as the block's walls: there it does not show where these end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from contour.edge.ring_places import runs_of
+from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import Contour, Ring, signed_area
+from contour.image.pixel_sampling import sample_at
+
+# Cell pitches: along the outline, out of it, and into the block.
+_SPACING = 0.25
+_OUT = np.array([0.4, 0.6, 0.8, 1.0])
+_IN = np.array([0.6, 1.0, 1.4, 1.8])
+_OVER = 2.0
+# Of what is inside, in per cent: cells, and walls.
+_CELLS, _WALLS = 10.0, 97.0
+# What table and walls differ by, of what walls and cells do.
+_ALIKE = 0.3
+
+
+@dataclass(frozen=True)
+class AlikeEdge:
+    """The longest part of an outline along which table and walls are alike: its length, cell pitches, and its middle,
+    pixels (x, y).
+    """
+
+    length_pitches: float
+    place_px: tuple[float, float]
+
+    def moved(self, x: float, y: float) -> AlikeEdge:
+        """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
+        return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
+
+
+def alike_edge(picture: Bytes, contour: Contour, pitch_px: float, *, dark: bool) -> AlikeEdge | None:
+    """Where table and walls are alike, in all channels of a picture, grey (H, W) or BGR (H, W, 3), uint8; None where
+    they are nowhere.
+
+    The contour's holes run the other way around than its exterior. `dark`: walls are darker than their cells. A shadow
+    beside the block parts the two as well as a table does.
+    """
+    planes = [picture] if picture.ndim == 2 else [np.asarray(plane, np.uint8) for plane in cv2.split(picture)]
+    side = float(np.sign(signed_area(contour.exterior)))
+    found = [one for ring in contour.rings for one in [_longest(planes, ring, side * pitch_px, dark=dark)] if one]
+    return max(found, key=lambda one: one.length_pitches) if found else None
+
+
+def _longest(planes: list[Bytes], ring: Ring, out_px: float, *, dark: bool) -> AlikeEdge | None:
+    """On one ring; `out_px`: the cell pitch, negative where its material lies to the right of its direction."""
+    lengths = RingLengths.of(ring)
+    at = np.arange(0.0, lengths.length, _SPACING * abs(out_px))
+    alike = _alike(planes, lengths, at, out_px, dark=dark)
+    if not alike.any():
+        return None
+    run = max(runs_of(alike), key=len)
+    x, y = lengths.at(at[run[len(run) // 2 :][:1]])[0].tolist()
+    return AlikeEdge(_SPACING * len(run), (x, y))
+
+
+def _alike(planes: list[Bytes], lengths: RingLengths, at: Float64s, out_px: float, *, dark: bool) -> Bools:
+    """At which lengths along a ring what lies beyond is nowhere told from the walls, shape (N,)."""
+    place, reach = lengths.at(at), _SPACING * abs(out_px)
+    along = lengths.at(at + reach) - lengths.at(at - reach)
+    along *= out_px / np.maximum(np.hypot(*along.T)[:, None], 1e-9)
+    outward = np.column_stack([along[:, 1], -along[:, 0]])
+    tails = [100.0 - _CELLS, 100.0 - _WALLS] if dark else [_CELLS, _WALLS]
+    size = round(_OVER / _SPACING)
+    apart, contrast = np.zeros((len(_OUT), len(at))), 1.0
+    for plane in planes:
+        beyond, within = (
+            sample_at(plane, *(place[:, axis] + pitches[:, None] * outward[:, axis] for axis in (0, 1)))
+            for pitches in (_OUT, -_IN)
+        )
+        cells, walls = np.percentile(within, tails)
+        contrast = max(contrast, abs(float(walls - cells)))
+        around = np.concatenate([beyond[:, -size:], beyond, beyond[:, :size]], axis=1)
+        level = np.asarray(cv2.blur(around, (2 * (size // 2) + 1, 1)))[:, size:-size]
+        apart = np.maximum(apart, np.abs(walls - level))
+    return np.asarray(apart.min(axis=0) < _ALIKE * contrast)

@@ -17,7 +17,7 @@ from contour.acceptance.block_findings import (
 from contour.acceptance.edge_findings import edge_covered
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.findings import Finding, Limits, Refusal
-from contour.acceptance.picture_findings import badly_seen, useless_picture
+from contour.acceptance.picture_findings import alike_table, badly_seen, useless_picture
 from contour.acceptance.polygon_findings import (
     area_out_of_limits,
     not_cuttable,
@@ -66,15 +66,15 @@ def judge(
     covered = edge_covered(trace, to_mm, limits)
     findings = [
         *badly_seen(traced, limits.quality),
+        alike_table(traced),
         *useless_picture(view.picture if nothing else None),
         *nothing,
         touches_region(outlines, view.region, limits.border_px),
         touches_border(outlines, view.size, limits.border_px),
         reaches_frame(trace),
         area_out_of_limits(polygon.area_mm2, limits),
-        # Where something lies over the edge, that is why the picture says otherwise there.
-        None if covered else disagrees(traced, limits.max_disagreement_pitches),
-        vague(trace),
+        # Where something lies over the edge, that is why the picture says otherwise there, and where the edge is vague.
+        *(() if covered else (disagrees(traced, limits.max_disagreement_pitches), vague(trace))),
         too_unsure(polygon.millimetres, budget, limits.max_uncertainty_mm),
         outside_work_area(polygon.millimetres, limits.work_area_mm),
         outside_calibration(polygon.pixels, limits.sure),

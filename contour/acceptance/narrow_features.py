@@ -1,4 +1,6 @@
-"""Bumps and dents of an outline too narrow to be told from a chip that clings to the block, or from cells lost."""
+"""Bumps and dents of an outline too narrow to be told from a chip that clings to the block, or from cells lost; and
+wider bumps that stand upright on an edge, as a strip of cells does that was cut off, or a printed label.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +14,16 @@ from contour.geometry.rings import Contour, Ring
 
 # All in cell pitches. Narrower than this at its foot, farther out than that.
 _WIDTH, _DEPTH = 5.0, 0.75
+# A wider bump is a strip or a label where it fills so much of the rectangle over its foot: an arm's end fills half,
+# and what stands farther out is an arm.
+_WIDE, _UPRIGHT, _HIGH = 10.0, 0.6, 4.5
 # Beside its foot the outline runs along it over so much, but for this angle; a corner between two such edges stands
 # out by half its width times the tangent.
 _BESIDE, _ANGLE_DEG = 2.0, 22.0
 _SLOPE = 0.5 * float(np.tan(np.radians(_ANGLE_DEG)))
 # What stands out by no more than this times what the edges on its two sides are apart is a step from one to the other.
 _STEP = 1.5
-_SPACING, _LONGEST = 0.25, 16.0
+_SPACING, _LONGEST = 0.25, 20.0
 # From foot to foot the narrowest is told: a wider one, farther out on the same edge, is no deeper by this.
 _DEEPER = 0.05
 
@@ -92,10 +97,12 @@ def _deepest(ring: Ring, pitch_px: float) -> NarrowFeature | None:
         width = np.hypot(*foot.T)
         along = foot / np.maximum(width, 1e-9)[:, None]
         other = after.rolled(steps)
-        chosen = (width < _WIDTH * pitch_px) & (np.minimum(before.along(along), other.along(along)) > aligned)
+        least = np.maximum(np.maximum(_DEPTH * pitch_px, _SLOPE * width), _STEP * before.apart(other))
+        # A path so long reaches no farther out of its foot than half of it would, bent in its middle.
+        chosen = (width < _WIDE * pitch_px) & ((steps * spacing) ** 2 - width**2 > (2.0 * least) ** 2)
+        chosen &= np.minimum(before.along(along), other.along(along)) > aligned
         starts = np.flatnonzero(chosen)
         if len(starts):
-            least = np.maximum(np.maximum(_DEPTH * pitch_px, _SLOPE * width), _STEP * before.apart(other))
             best = _deeper(best, places, (starts, steps), (along, width, least), pitch_px)
     return best
 
@@ -115,14 +122,21 @@ def _deeper(
     farthest = np.abs(off).argmax(axis=1)
     row = np.arange(len(starts))
     depth = np.abs(off[row, farthest])
-    depth = np.where(depth > least, depth, 0.0)
+    # Contours in pixels have the block on their left as seen with y down: what lies on the right is out.
+    out = off.mean(axis=1) < 0
+    upright = out & (depth < _HIGH * pitch_px) & (np.abs(_areas(path)) > _UPRIGHT * width * depth)
+    depth = np.where((depth > least) & (upright | (width < _WIDTH * pitch_px)), depth, 0.0)
     one = int(depth.argmax())
     if depth[one] <= ((best.depth_pitches + _DEEPER) * pitch_px if best else 0.0):
         return best
     x, y = places[(starts[one] + farthest[one]) % len(places)].tolist()
-    # Contours in pixels have the block on their left as seen with y down: what lies on the right is out.
-    outwards = bool(off[one].mean() < 0)
-    return NarrowFeature(float(depth[one]) / pitch_px, float(width[one]) / pitch_px, (x, y), outwards)
+    return NarrowFeature(float(depth[one]) / pitch_px, float(width[one]) / pitch_px, (x, y), bool(out[one]))
+
+
+def _areas(path: Float64s) -> Float64s:
+    """Areas between paths (N, M, 2) and their feet, signed, shape (N,)."""
+    following = path[:, 1:] - path[:, :-1]
+    return np.asarray(0.5 * (path[:, :-1, 0] * following[:, :, 1] - path[:, :-1, 1] * following[:, :, 0]).sum(axis=1))
 
 
 def _unit(vectors: Float64s) -> Float64s:

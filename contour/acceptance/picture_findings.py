@@ -9,26 +9,30 @@ from contour.geometry.arrays import Bytes
 from contour.image.taught_table import TableLimits, TableLook
 
 # An edge is carried across as much where ends of walls are lost.
-MOST_ALIKE_PITCHES = 4.0
+_MOST_ALIKE_PITCHES = 4.0
 
 
 def badly_seen(traced: CheckedTrace | None, limits: QualityLimits) -> list[Finding]:
     """What is too bad about how the block's walls are seen, all in one finding."""
-    if traced is None:
+    if traced is None or traced.quality is None:
         return []
-    faults = (*(() if traced.quality is None else quality_faults(traced.quality, limits)), *_alike(traced))
+    faults = quality_faults(traced.quality, limits)
     return [_bad_picture(". Besides, ".join(faults))] if faults else []
 
 
-def _alike(traced: CheckedTrace) -> tuple[str, ...]:
-    alike = traced.alike
-    if alike is None or alike.length_pitches <= MOST_ALIKE_PITCHES:
-        return ()
+def alike_table(traced: CheckedTrace | None) -> Finding | None:
+    """An edge beside which the table is as light as walls, along more than what things hide of it."""
+    if traced is None or traced.alike is None or traced.trace.pitch_px is None:
+        return None
+    alike, stretches = traced.alike, traced.trace.evidence or ()
+    hidden_px = sum(stretch.to_px - stretch.from_px for stretch in stretches if stretch.state != "seen")
+    if alike.length_pitches <= max(_MOST_ALIKE_PITCHES, hidden_px / traced.trace.pitch_px):
+        return None
     x, y = alike.place_px
-    return (
+    return _bad_picture(
         f"along {alike.length_pitches:.0f} cells of the edge, near ({x:.0f}, {y:.0f}) px, what lies beside the block "
-        f"is as light as its walls, so that their ends do not show; {MOST_ALIKE_PITCHES:g} cells are allowed. Use a "
-        "table that is darker or of another colour, and light that leaves it dark",
+        f"is as light as its walls, so that their ends do not show; {_MOST_ALIKE_PITCHES:g} cells are allowed. Use a "
+        "table that is darker or of another colour, and light that leaves it dark"
     )
 
 

@@ -25,8 +25,9 @@ _EDGE_PITCHES = 0.5
 _TABLE_PITCHES = (0.5, 0.75, 1.0, 1.25)
 # Ends of walls that belong to a thing lie this near to it.
 _TOUCHES_PITCHES = 1.0
-# What sticks out of the edge by more than this was not cut with it; so much of a border must be cut.
-_FLUSH_PITCHES = 0.18
+# What sticks out of the edge by more than this was not cut with it, nor was what ends so far inside of its two sides'
+# lines, as on a curve. So much of a border must be cut.
+_FLUSH_PITCHES, _SUNK_PITCHES = 0.18, 0.5
 _CUT_SHARE = 0.8
 _STEP_PX = 0.5
 _LEAST_CONTRAST = 6.0
@@ -67,7 +68,7 @@ def _cut(
         return EdgePoints()
     # What is darker than the table may as well be a shadow beside the block.
     lit = look.lighter_at(place - _EDGE_PITCHES * pitch_px * normal)
-    cut = sure & beyond & lit & (out < _FLUSH_PITCHES * pitch_px)
+    cut = sure & beyond & lit & (out < _FLUSH_PITCHES * pitch_px) & (out > -_SUNK_PITCHES * pitch_px)
     if np.count_nonzero(cut) < _CUT_SHARE * len(run):
         return EdgePoints()
     share = np.linspace(0.0, 1.0, len(run))[cut]

@@ -31,6 +31,8 @@ _FILL_SIGMA_PX = 0.7
 # A shadow along less of the edge than this may be a dark thing over a corner; and a dent that a thing leaves turns in
 # by more than this, and out before and after, no farther from there.
 _SHADOW_PITCHES, _DENT_DEG, _OUT_DEG = 8.0, 60.0, 30.0
+# At half a pitch a round outline of five pitches across turns by less.
+_CORNER_DEG = 15.0
 
 Fit = Callable[[RingEvidence], FittedRing]
 
@@ -73,8 +75,9 @@ def fit_visible(
             "neither the table nor cells. Clear the table, and check the light"
         )
     clear = _without(evidence, near, look)
-    apart = np.abs(depth_inside(fit(clear).ring, evidence.points, rectifier))
-    distrusted = near & (apart > _AGREE_PITCHES * look.pitch_px)
+    ring = fit(clear).ring
+    apart = np.abs(depth_inside(ring, evidence.points, rectifier))
+    distrusted = near & ((apart > _AGREE_PITCHES * look.pitch_px) | _at_corners(near, evidence, ring, look.pitch_px))
     if not distrusted.any():
         return _plain(evidence, fit(evidence))
     fills = cut_material(picture, clear, evidence.points[distrusted], look)
@@ -95,6 +98,20 @@ def doubtful(evidence: RingEvidence, look: TableLook) -> Bools:
         if out is not None:
             near[run] = np.abs(out) > _AGREE_PITCHES * look.pitch_px
     return near
+
+
+def _at_corners(near: Bools, evidence: RingEvidence, ring: Ring, pitch_px: float) -> Bools:
+    """The witnesses of `near` in runs along which a ring that was laid through the others turns a corner, shape (N,):
+    where it went past none it closes a gap, and that ends of walls lie on it there is chance.
+    """
+    lengths, found = RingLengths.of(ring), np.zeros(len(near), np.bool_)
+    for run in runs_of(near):
+        beside = (run[0] - 1) % len(near), (run[-1] + 1) % len(near)
+        first, last = lengths.feet(evidence.points[list(beside)]).tolist()
+        long = (last - first) % lengths.length
+        path = lengths.at(first + np.arange(-_FOOT_PITCHES * pitch_px, long + _FOOT_PITCHES * pitch_px, pitch_px / 2))
+        found[run] = np.abs(turns(path)).max(initial=0.0) > _CORNER_DEG
+    return found
 
 
 def _unshaded(near: Bools, evidence: RingEvidence, look: TableLook, fit: Fit) -> Bools:

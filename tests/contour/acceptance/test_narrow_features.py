@@ -74,10 +74,28 @@ def test_of_several_the_deepest_is_told() -> None:
     assert one.place_px[0] == pytest.approx(400, abs=1.5 * PITCH)
 
 
-@pytest.mark.parametrize(("width", "depth"), [(7.0, 2.0), (10.0, 6.0), (3.0, 0.4)])
+@pytest.mark.parametrize(("width", "depth"), [(11.0, 2.0), (9.0, 6.0), (3.0, 0.4)])
 def test_wider_and_shallower_ones_are_the_blocks_own(width: float, depth: float) -> None:
     assert found(BLOCK | chip(width, depth)) is None
     assert found(BLOCK - dent(width, depth)) is None
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 30.0])
+@pytest.mark.parametrize(("width", "depth"), [(6.0, 1.5), (7.0, 2.0), (9.0, 3.5)])
+def test_a_strip_or_a_label_on_an_edge_is_found_and_a_dent_as_wide_is_the_blocks_own(
+    width: float, depth: float, turn_deg: float
+) -> None:
+    one = found(BLOCK | chip(width, depth), turn_deg)
+    assert one is not None
+    assert one.outwards
+    assert one.depth_pitches == pytest.approx(depth, abs=0.35)
+    assert found(BLOCK - dent(width, depth), turn_deg) is None
+
+
+def test_a_wide_bump_that_rises_to_a_point_is_the_end_of_an_arm() -> None:
+    left, right = BLOCK.bounds[0] + 200.0, BLOCK.bounds[0] + 200.0 + 9.0 * PITCH
+    top = BLOCK.bounds[3]
+    assert found(BLOCK | shapely.Polygon([(left, top), (right, top), ((left + right) / 2, top + 4.0 * PITCH)])) is None
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 20.0, 45.0])

@@ -124,8 +124,8 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
         return Finding(
             Refusal.METHODS_DISAGREE,
             f"The contour {what} by {narrow.depth_pitches:.1f} cells over {narrow.width_pitches:.1f} cells near "
-            f"({x:.0f}, {y:.0f}) px: so narrow a part may be a chip, a strip or a label on the block, or cells lost. Look at "
-            "the overlay; take it away, or set max_disagreement_pitches: 0 for parts that narrow.",
+            f"({x:.0f}, {y:.0f}) px: so narrow a part may be a chip, a strip or a label on the block, or cells lost. "
+            "Look at the overlay; take it away, or set max_disagreement_pitches: 0 for parts that narrow.",
         )
     apart = traced.disagreement
     advice = "Look at the overlay; check light and table, and that nothing lies against the block."

@@ -104,14 +104,16 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
     ),
     Reason.IMAGE_QUALITY: (
         Explanation(
-            "The picture is too blurred, too dark, too bright or too flat, or the light is not as it was taught.",
-            "Clean the lens, check focus, exposure and lamp; after a lasting change of light teach the table again.",
+            "The picture is too blurred, too dark, too bright or too flat, the table is as light as the block's walls, "
+            "or the light is not as it was taught.",
+            "Clean the lens, check focus, exposure, lamp and table; after a lasting change of light teach the table "
+            "again.",
         ),
         Explanation(
-            "Снимок нерезкий, слишком тёмный, засвеченный или малоконтрастный, либо свет не тот, при котором снимали "
-            "пустой стол.",
-            "Протрите объектив, проверьте фокус, выдержку и лампу; если свет изменили насовсем, снимите пустой стол "
-            "заново (teach-table).",
+            "Снимок нерезкий, слишком тёмный, засвеченный или малоконтрастный, стол такой же светлый, как стенки сот, "
+            "либо свет не тот, при котором снимали пустой стол.",
+            "Протрите объектив, проверьте фокус, выдержку, лампу и стол; если свет изменили насовсем, снимите пустой "
+            "стол заново (teach-table).",
         ),
     ),
     Reason.SCENE_MOVED: (
@@ -164,8 +166,14 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
         ),
     ),
     Reason.UNCERTAINTY_TOO_LARGE: (
-        Explanation("The contour is less certain than the recipe allows.", "Check light, focus and the block's edge."),
-        Explanation("Погрешность контура больше, чем допускает рецепт.", "Проверьте свет, фокус и кромку заготовки."),
+        Explanation(
+            "The contour is less certain than a quarter of a cell, or than the recipe allows.",
+            "Check light, focus and the block's edge.",
+        ),
+        Explanation(
+            "Погрешность контура больше четверти ячейки или больше, чем допускает рецепт.",
+            "Проверьте свет, фокус и кромку заготовки.",
+        ),
     ),
     Reason.OUTSIDE_WORK_AREA: (
         Explanation(

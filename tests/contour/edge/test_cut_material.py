@@ -14,7 +14,7 @@ from contour.edge.table_look import TableLook
 from contour.geometry.rings import densified
 from contour.walls.wall_evidence import EdgePoints
 from tests.support.pictures.hand_looks import HEIGHT, WIDTH, look
-from tests.support.pictures.outline_scenes import PITCH, along, distances, rectangle, witnesses
+from tests.support.pictures.outline_scenes import PITCH, along, circle, distances, rectangle, witnesses
 
 TABLE, FILL = 40, 150
 BLOCK = rectangle(700.0, 500.0)
@@ -64,6 +64,18 @@ def test_what_ends_flush_around_a_corner_is_cut_too() -> None:
     area = np.array([points[0], BLOCK[1], points[1], points[1] - 80.0 * normal[1]])
     one = found(area, picture(area), look(BLOCK, area), gap)
     assert distances(one.points, BLOCK).mean() < 0.05 * PITCH
+
+
+def test_a_label_over_a_small_round_block_is_none() -> None:
+    """It ends inside of the lines of the edge on both sides, which meet far out; but not on either of them."""
+    round_block = circle(5.0 * PITCH)
+    (point,), (normal,) = along(round_block, np.array([200.0]))
+    side = np.array([-normal[1], normal[0]]) * 2.6 * PITCH
+    inner, outer = point - 1.5 * PITCH * normal, point + 0.8 * PITCH * normal
+    label = np.array([inner - side, inner + side, outer + side, outer - side])
+    gap = (200.0 - 3.0 * PITCH, 200.0 + 3.0 * PITCH)
+    clear = replace(witnesses(round_block, seed=1, gaps=(gap,)), coarse=densified(round_block, 5.0))
+    assert not len(cut_material(picture(label), clear, label[:2], look(round_block, label)).points)
 
 
 @pytest.mark.parametrize("out", [0.4, 1.0, 3.0])

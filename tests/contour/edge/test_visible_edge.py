@@ -114,6 +114,20 @@ def test_a_dark_thing_over_a_corner_is_none_either() -> None:
     assert states == {"covered"}
 
 
+@pytest.mark.parametrize("reach", [2.5, 3.5])
+def test_ends_along_the_border_of_a_thing_across_a_corner_are_not_taken_for_its_bevel(reach: float) -> None:
+    """What closes the gap between the edges on both sides is just that line."""
+    corner = BLOCK[1]
+    one_way, other = ((BLOCK[k] - corner) / np.hypot(*(BLOCK[k] - corner)) * reach * PITCH for k in (0, 2))
+    ends = np.array([corner + one_way, corner + other])
+    beyond = ends + ends - ends[::-1]
+    thing = np.array([*beyond, corner - 2 * (one_way + other)])
+    bevelled = np.array([BLOCK[0], *ends, BLOCK[2], BLOCK[3]])
+    there = look(BLOCK, thing)
+    hidden = told(fitted(witnesses(bevelled, seed=13), there), there)
+    assert {stretch.state for stretch in hidden} == {"covered"}
+
+
 def test_a_corner_that_points_into_the_block_may_lie_in_a_shadow() -> None:
     """The edges beside it are longer than a thing over a corner is wide."""
     ring = rectangle(700.0, 500.0, angle=0.0)

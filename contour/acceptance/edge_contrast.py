@@ -17,7 +17,9 @@ from contour.image.pixel_sampling import sample_at
 _SPACING = 0.25
 _OUT = np.array([0.4, 0.6, 0.8, 1.0])
 _IN = np.array([0.6, 1.0, 1.4, 1.8])
-_OVER = 2.0
+# Over how much of the edge the table's light is taken together, and that of cells and walls besides the whole: a shadow
+# makes a table as dark as dark walls elsewhere, and here and there walls are faint.
+_TABLE_OVER, _BLOCK_OVER = 2.0, 6.0
 # Of what is inside, in per cent: cells, and walls.
 _CELLS, _WALLS = 10.0, 97.0
 # What table and walls differ by, of what walls and cells do.
@@ -70,16 +72,23 @@ def _alike(planes: list[Bytes], lengths: RingLengths, at: Float64s, out_px: floa
     along *= out_px / np.maximum(np.hypot(*along.T)[:, None], 1e-9)
     outward = np.column_stack([along[:, 1], -along[:, 0]])
     tails = [100.0 - _CELLS, 100.0 - _WALLS] if dark else [_CELLS, _WALLS]
-    size = round(_OVER / _SPACING)
-    apart, contrast = np.zeros((len(_OUT), len(at))), 1.0
+    # By walls and cells nearby, and by those of the whole ring.
+    apart, contrast = np.zeros((2, len(_OUT), len(at))), np.ones((2, len(at)))
     for plane in planes:
         beyond, within = (
             sample_at(plane, *(place[:, axis] + pitches[:, None] * outward[:, axis] for axis in (0, 1)))
             for pitches in (_OUT, -_IN)
         )
-        cells, walls = np.percentile(within, tails)
-        contrast = max(contrast, abs(float(walls - cells)))
-        around = np.concatenate([beyond[:, -size:], beyond, beyond[:, :size]], axis=1)
-        level = np.asarray(cv2.blur(around, (2 * (size // 2) + 1, 1)))[:, size:-size]
-        apart = np.maximum(apart, np.abs(walls - level))
-    return np.asarray(apart.min(axis=0) < _ALIKE * contrast)
+        nearby = np.percentile(_around(within, _BLOCK_OVER), tails, axis=(0, 2))
+        whole = np.percentile(within, tails)[:, None]
+        cells, walls = (np.stack(np.broadcast_arrays(nearby[k], whole[k])) for k in (0, 1))
+        contrast = np.maximum(contrast, np.abs(walls - cells))
+        apart = np.maximum(apart, np.abs(walls[:, None] - _around(beyond, _TABLE_OVER).mean(axis=2)))
+    return np.asarray((apart.min(axis=1) < _ALIKE * contrast).all(axis=0))
+
+
+def _around(values: Float64s, pitches: float) -> Float64s:
+    """Values at places around a ring, (K, N), with those on both sides of each, so many pitches in all, (K, N, M)."""
+    half = round(0.5 * pitches / _SPACING)
+    turned = np.take(values, np.arange(-half, values.shape[1] + half), axis=1, mode="wrap")
+    return np.lib.stride_tricks.sliding_window_view(turned, 2 * half + 1, axis=1)

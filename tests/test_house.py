@@ -50,7 +50,7 @@ def test_no_test_is_imported_by_another() -> None:
     assert [(file, name) for part in PARTS for file, name in imports(part) if ".test_" in name] == []
 
 
-@pytest.mark.parametrize("part", ["tests", "benchmarks"])
+@pytest.mark.parametrize("part", PARTS)
 def test_no_room_has_more_files_than_can_be_overlooked(part: str) -> None:
     files = Counter(file.parent for file in (ROOT / part).rglob("*.py") if file.name != "__init__.py")
     assert {folder: count for folder, count in files.items() if count > MOST_FILES} == {}

@@ -13,10 +13,10 @@ from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
-from contour.outline.evidence_check import check_against_evidence
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import material_edge
+from contour.tracing.evidence_check import check_against_evidence
 from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import probe
 from contour.walls.lightness import wall_light

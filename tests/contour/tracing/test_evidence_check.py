@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
-from contour.outline.evidence_check import check_against_evidence
+from contour.tracing.evidence_check import check_against_evidence
 from tests.support.pictures.outline_scenes import PITCH, rectangle, witnesses
 
 BLOCK = rectangle(900.0, 600.0)

@@ -26,6 +26,7 @@ CONNECTION, READING, WRITING, NUMBERS, TRANSFER_TERMS = (
 IN_CLOCK, IN_DOUBT = "tests/service/link/test_controller_clock.py", "tests/service/link/test_transfer_in_doubt.py"
 TRIGGERS, IN_ANSWERS = "service/jobs/triggers.py", "tests/service/jobs/test_serial_answers.py"
 IN_RESTART = "tests/service/jobs/test_executor_after_restart.py"
+IN_BESIDE = "tests/service/link/test_link_beside_another.py"
 IN_TRANSFER, IN_PAGES, IN_LINK, IN_EXECUTOR, IN_CYCLE, IN_RESUMING, IN_OWNERSHIP, IN_JOURNAL, IN_RECOVERY = (
     f"tests/service/{room}/test_{name}.py"
     for room, name in (

@@ -52,7 +52,7 @@ def test_on_a_disk_that_fills_evidence_gives_way_then_triggers_are_refused_and_a
     cell.journal = small_disk / "journal.sqlite"
     try:
         cell.goes_on(2)
-        until(lambda: list(small_disk.glob("archive/*/*.json")), what="evidence")
+        until(lambda: documents(small_disk), what="evidence")
         theirs = fill(small_disk, 6 * MEGABYTE)
         until(lambda: not documents(small_disk), what="room for the rest")
         cell.goes_on(1)  # no evidence any more, and jobs all the same

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from contour.edge.ring_places import runs_of
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, signed_area
-from contour.image.pixel_sampling import sample_at
+from contour.image.pixel_sampling import planes_of, sample_at
 
 # Cell pitches: along the outline, out of it, and into the block.
 _SPACING = 0.25
@@ -47,7 +47,7 @@ def alike_edge(picture: Bytes, contour: Contour, pitch_px: float, *, dark: bool)
     The contour's holes run the other way around than its exterior. `dark`: walls are darker than their cells. A shadow
     beside the block parts the two as well as a table does.
     """
-    planes = [picture] if picture.ndim == 2 else [np.asarray(plane, np.uint8) for plane in cv2.split(picture)]
+    planes = planes_of(picture)
     side = float(np.sign(signed_area(contour.exterior)))
     found = [one for ring in contour.rings for one in [_longest(planes, ring, side * pitch_px, dark=dark)] if one]
     return max(found, key=lambda one: one.length_pitches) if found else None
@@ -72,19 +72,29 @@ def _alike(planes: list[Bytes], lengths: RingLengths, at: Float64s, out_px: floa
     along *= out_px / np.maximum(np.hypot(*along.T)[:, None], 1e-9)
     outward = np.column_stack([along[:, 1], -along[:, 0]])
     tails = [100.0 - _CELLS, 100.0 - _WALLS] if dark else [_CELLS, _WALLS]
-    # By walls and cells nearby, and by those of the whole ring.
-    apart, contrast = np.zeros((2, len(_OUT), len(at))), np.ones((2, len(at)))
-    for plane in planes:
-        beyond, within = (
+    sampled = [
+        [
             sample_at(plane, *(place[:, axis] + pitches[:, None] * outward[:, axis] for axis in (0, 1)))
             for pitches in (_OUT, -_IN)
-        )
-        nearby = np.percentile(_around(within, _BLOCK_OVER), tails, axis=(0, 2))
-        whole = np.percentile(within, tails)[:, None]
-        cells, walls = (np.stack(np.broadcast_arrays(nearby[k], whole[k])) for k in (0, 1))
+        ]
+        for plane in planes
+    ]
+    by_all = _like_walls(sampled, lambda within: np.percentile(within, tails)[:, None])
+    if not by_all.any():
+        return by_all
+    return by_all & _like_walls(sampled, lambda within: np.percentile(_around(within, _BLOCK_OVER), tails, axis=(0, 2)))
+
+
+def _like_walls(sampled: list[list[Float64s]], levels: Callable[[Float64s], Float64s]) -> Bools:
+    """Where what lies beyond an edge is somewhere as light as walls, shape (N,), by light sampled beyond it and within
+    the block, (K, N) each in each channel; `levels` tells from the latter that of cells and of walls, (2, N) or (2, 1).
+    """
+    apart, contrast = np.zeros_like(sampled[0][0]), np.ones(1)
+    for beyond, within in sampled:
+        cells, walls = levels(within)
         contrast = np.maximum(contrast, np.abs(walls - cells))
-        apart = np.maximum(apart, np.abs(walls[:, None] - _around(beyond, _TABLE_OVER).mean(axis=2)))
-    return np.asarray((apart.min(axis=1) < _ALIKE * contrast).all(axis=0))
+        apart = np.maximum(apart, np.abs(walls - _around(beyond, _TABLE_OVER).mean(axis=2)))
+    return np.asarray(apart.min(axis=0) < _ALIKE * contrast)
 
 
 def _around(values: Float64s, pitches: float) -> Float64s:

@@ -16,7 +16,7 @@ from contour.geometry.arrays import Bools, Bytes, Float64s, Indices
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring, oriented
 from contour.image.pixel_grid import pixels_of, samples_of
-from contour.image.pixel_sampling import sample_at
+from contour.image.pixel_sampling import planes_of, sample_at
 from contour.walls.wall_evidence import EdgePoints, RingEvidence
 
 # How near to its border on the map the material's edge lies, and how far beyond the table may begin: in between is the
@@ -110,8 +110,7 @@ def _steps(picture: Bytes, place: Float64s, normal: Float64s, reach: float) -> t
     """
     along = np.arange(-reach, reach + _STEP_PX, _STEP_PX)
     x, y = (place[:, axis, None] + along * normal[:, axis, None] for axis in (0, 1))
-    planes = [picture] if picture.ndim == 2 else list(cv2.split(picture))
-    profiles = np.stack([sample_at(np.asarray(plane, np.uint8), x, y) for plane in planes])
+    profiles = np.stack([sample_at(plane, x, y) for plane in planes_of(picture)])
     count = np.arange(1, len(along))
     total = np.cumsum(profiles, axis=2)
     low = total[:, :, :-1] / count

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.edge.ring_places import places_along, runs_of, turns
+from contour.edge.ring_places import places_along, runs_of, turns_deg
 from contour.edge.stretches import Hider, State, Stretch
 from contour.edge.table_look import TableLook
 from contour.edge.visible_edge import SPACING_PITCHES, VisibleRing
@@ -70,7 +70,7 @@ def _run_state(run: Indices, place: Float64s, on_line: Float64s, pitch_px: float
     off = np.abs((path - path[0]) @ np.array([-chord[1], chord[0]]))
     if float(off.max()) < max(_STRAIGHT_PX, _STRAIGHT_PITCHES * pitch_px):
         return "bridged", True, length
-    if np.abs(turns(path[::2])).max(initial=0.0) < _SMOOTH_DEG:
+    if np.abs(turns_deg(path[::2])).max(initial=0.0) < _SMOOTH_DEG:
         return "bridged", False, length
     return "covered", False, length
 
@@ -81,5 +81,5 @@ def _flank(place: Float64s, end: int, way: int) -> Float64s:
     """
     count = max(3, round(_FLANK_PITCHES / SPACING_PITCHES))
     path = place[(end + way * np.arange(1, count + 1)) % len(place)]
-    corners = np.flatnonzero(np.abs(turns(path)) > _SMOOTH_DEG)
+    corners = np.flatnonzero(np.abs(turns_deg(path)) > _SMOOTH_DEG)
     return path[: corners[0] + 2] if len(corners) else path

@@ -39,7 +39,7 @@ def places_along(ring: Ring, spacing: float, rectifier: Rectifier | None) -> Pla
     return Places(points, start[owner] + share * length[owner], float(start[-1]))
 
 
-def turns(path: Float64s) -> Float64s:
+def turns_deg(path: Float64s) -> Float64s:
     """By how much a path (N, 2) turns at each of its inner points, shape (N - 2,), degrees, -180 to 180."""
     heading = np.angle(np.diff(path[:, 0] + 1j * path[:, 1]))
     return np.degrees(np.angle(np.exp(1j * np.diff(heading))))

@@ -9,7 +9,7 @@ import numpy as np
 
 from contour.edge.cut_material import cut_material
 from contour.edge.flanks import out_of_flanks
-from contour.edge.ring_places import runs_of, turns
+from contour.edge.ring_places import runs_of, turns_deg
 from contour.edge.table_look import TableLook, beside
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s
@@ -107,11 +107,16 @@ def _at_corners(near: Bools, evidence: RingEvidence, ring: Ring, pitch_px: float
     lengths, found = RingLengths.of(ring), np.zeros(len(near), np.bool_)
     for run in runs_of(near):
         beside = (run[0] - 1) % len(near), (run[-1] + 1) % len(near)
-        first, last = lengths.feet(evidence.points[list(beside)]).tolist()
-        long = (last - first) % lengths.length
+        first, long = _between(lengths, evidence.points[list(beside)])
         path = lengths.at(first + np.arange(-_FOOT_PITCHES * pitch_px, long + _FOOT_PITCHES * pitch_px, pitch_px / 2))
-        found[run] = np.abs(turns(path)).max(initial=0.0) > _CORNER_DEG
+        found[run] = np.abs(turns_deg(path)).max(initial=0.0) > _CORNER_DEG
     return found
+
+
+def _between(lengths: RingLengths, points: Float64s) -> tuple[float, float]:
+    """Where on a ring the foot of the first of two points (2, 2) lies, and how far on from there that of the second."""
+    first, last = lengths.feet(points).tolist()
+    return first, (last - first) % lengths.length
 
 
 def _unshaded(near: Bools, evidence: RingEvidence, look: TableLook, fit: Fit) -> Bools:
@@ -140,14 +145,13 @@ def _is_own_edge(points: Float64s, ring: Ring, pitch_px: float) -> bool:
     over an edge leaves a dent, or takes a corner off.
     """
     lengths = RingLengths.of(ring)
-    first, last = lengths.feet(points[[0, -1]]).tolist()
-    long = (last - first) % lengths.length
+    first, long = _between(lengths, points[[0, -1]])
     if long < _SHADOW_PITCHES * pitch_px:
         return False
     reach = _SHADOW_PITCHES * pitch_px
     path = lengths.at(first + np.arange(-reach, long + reach, pitch_px))
     # With positive shoelace, material on the left, turns into it are negative.
-    out, into = (np.maximum(way * turns(path), 0.0) for way in (1.0, -1.0))
+    out, into = (np.maximum(way * turns_deg(path), 0.0) for way in (1.0, -1.0))
     ends = round(_SHADOW_PITCHES)
     for k in np.flatnonzero(into[ends:-ends]) + ends:
         around = slice(k - ends, k), slice(k, k + ends + 1)

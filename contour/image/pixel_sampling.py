@@ -10,6 +10,11 @@ from contour.geometry.arrays import Bytes, Float32s, Float64s
 _ROW = 1024
 
 
+def planes_of(picture: Bytes) -> list[Bytes]:
+    """The channels of a picture, grey (H, W) or BGR (H, W, 3), each (H, W), as `sample_at` takes them."""
+    return [picture] if picture.ndim == 2 else [np.asarray(plane, np.uint8) for plane in cv2.split(picture)]
+
+
 def sample_at(image: Bytes | Float32s, x: Float64s, y: Float64s) -> Float64s:
     """Bilinear values of `image` (H, W) at (x, y), in the shape of x and y; the border goes on outside."""
     # cv2.remap takes no more than 32767 rows or columns: rows of 1024, the last one filled up.

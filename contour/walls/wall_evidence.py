@@ -46,14 +46,13 @@ class RingEvidence:
     in the y-down picture coordinates' own shoelace sense given by `is_hole` (exterior: positive shoelace in pixels;
     hole: negative).
 
-    coarse: coarse ring, shape (M, 2), pixels. points: where the material ends, shape (N, 2), float64, pixels,
-    sub-pixel. position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal:
-    outward unit normal of the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected
-    standard deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind. walls: the
-    boundary of all that was seen of walls near the edge, whether it witnesses the outline or not, some eight points a
-    pitch, each chain's in order. beside: what may be
-    material as well, strands of wall that hang on nothing and the edge of dark material, shape (M, 2), pixels, some
-    four points a pitch.
+    coarse: coarse ring, shape (M, 2), pixels. points: where the material ends, shape (N, 2), float64, pixels, sub-
+    pixel. position: arc length of each witness's foot on the coarse ring, shape (N,), pixels, rising. normal: outward
+    unit normal of the material at the foot, smoothed over about two pitches, shape (N, 2). sigma: expected standard
+    deviation of the witness across the outline, shape (N,), pixels. kind: shape (N,), WitnessKind. walls: the boundary
+    of all that was seen of walls near the edge, whether it witnesses the outline or not, some eight points a pitch,
+    each chain's in order. beside: what may be material as well, strands of wall that hang on nothing and the edge of
+    dark material, shape (M, 2), pixels, some four points a pitch.
     """
 
     coarse: Ring

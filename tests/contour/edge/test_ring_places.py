@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.edge.ring_places import places_along, runs_of, turns
+from contour.edge.ring_places import places_along, runs_of, turns_deg
 from contour.geometry.signed_distance import nearest
 from tests.support.pictures.rings import SQUARE
 
@@ -47,5 +47,5 @@ def test_runs_go_on_across_the_rings_first_place() -> None:
 
 def test_a_path_turns_by_degrees_with_their_sign() -> None:
     path = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0]])
-    assert np.allclose(turns(path), [0.0, 90.0, 90.0, -90.0])
-    assert len(turns(path[:2])) == 0
+    assert np.allclose(turns_deg(path), [0.0, 90.0, 90.0, -90.0])
+    assert len(turns_deg(path[:2])) == 0

@@ -54,7 +54,7 @@ accuracy: install
 methods: install
 	$(BIN)/python -m benchmarks.methods
 
-# Each rule of the protocol taken out of a copy of the code: its test must fail then. Four minutes on two cores.
+# Each rule of the protocol taken out of a copy of the code: its test must fail then. A quarter of an hour on two cores.
 rules: install
 	$(BIN)/python -m tests.rules.mutate
 

@@ -22,6 +22,7 @@ import pytest
 
 from drivers.trigger.pulses import SerialSignal
 from tests.support.camera.daemon import Daemon
+from tests.support.camera.vivid import PATIENT_S
 
 UART, CABLE = "/dev/ttyS3", "/dev/ttyS2"
 TIOCM_LOOP = 0x8000  # asm-generic/termios.h; Python's termios does not name it
@@ -68,7 +69,7 @@ def contact() -> Iterator[Contact]:
 
 def next_pulse(port: SerialSignal) -> bool:
     """Whether a pulse comes within a few waits."""
-    return any(port.wait(0.1) for _ in range(50))
+    return any(port.wait(0.1) for _ in range(600))
 
 
 @pytest.mark.parametrize("signal", ["cts", "dsr"])
@@ -104,11 +105,11 @@ def test_a_pedal_at_a_uart_begins_a_job_of_the_daemon(tmp_path: Path, contact: C
     daemon = Daemon(tmp_path, CONFIG % f"port: {UART}, mode: signal, signal: cts, edge: falling")
     try:
         daemon.wait_for("-> Ready")
-        time.sleep(0.5)  # the level at the opening has been seen
+        time.sleep(2)  # the level at the opening has been seen
         contact.open_contact("cts")
         daemon.wait_for(r"job 1 (refused|written).* trigger=signal")
         contact.close_contact("cts")
-        time.sleep(0.5)
+        time.sleep(2)
         contact.open_contact("cts")
         daemon.wait_for(r"job 2 (refused|written).* trigger=signal")
     finally:
@@ -131,7 +132,7 @@ class Adapter:
             if path.read_text().strip() == "0403"
         )
 
-    def port(self, bound_s: float = 30.0) -> Path:
+    def port(self, bound_s: float = PATIENT_S) -> Path:
         """Its device, once it is there; the number may change from one time to the next."""
         give_up_at = time.monotonic() + bound_s
         while not (found := list(Path("/dev").glob("ttyUSB*"))):
@@ -158,7 +159,7 @@ class FarEnd:
     def type(self, text: bytes) -> None:
         os.write(self._port, text)
 
-    def hear(self, pattern: bytes, bound_s: float = 60.0) -> None:
+    def hear(self, pattern: bytes, bound_s: float = PATIENT_S) -> None:
         """Wait for it."""
         give_up_at = time.monotonic() + bound_s
         while not re.search(pattern, self._heard):

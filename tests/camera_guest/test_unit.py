@@ -1,7 +1,8 @@
 """The unit as `install-service` writes it, under a systemd that runs it: all that it closes, and what it leaves open.
 
 systemd is the first process of a namespace of its own in the guest. A drop-in changes of the unit what this machine
-needs: where Python and sources lie, a shorter watchdog, no waiting for the parts of a whole machine's start.
+needs: where Python and sources lie, a shorter watchdog, time for a slow start, and no waiting for the parts of a whole
+machine's start.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ DefaultDependencies=no
 Environment=PYTHONPATH={SOURCES}
 ProtectHome=read-only
 WatchdogSec=45
+TimeoutStartSec=300
 StandardOutput=append:{LOG}
 StandardError=append:{LOG}
 """

@@ -12,7 +12,7 @@ import pytest
 from drivers.camera import CameraTimeout, CameraUnavailable
 from drivers.camera.v4l2.listing import list_cameras
 from tests.support.camera.usb_webcam import HEIGHT, SERIAL, WIDTH, Webcam
-from tests.support.camera.vivid import ctl, opened
+from tests.support.camera.vivid import PATIENT_S, ctl, opened
 from tests.support.camera.webcam_scene import Scene, camera_on, node_of_the_webcam
 
 
@@ -35,14 +35,14 @@ def plugged(scene):
         gone(webcam.node)
 
 
-def gone(node, within_s=60.0):
+def gone(node, within_s=PATIENT_S):
     began = time.monotonic()
     while Path(node).exists():
         assert time.monotonic() - began < within_s
         time.sleep(0.02)
 
 
-def grabbed(camera, timeout_s=5.0):
+def grabbed(camera, timeout_s=PATIENT_S):
     return camera.grab(time.monotonic(), timeout_s)
 
 
@@ -66,7 +66,7 @@ def test_no_frame_is_taken_that_began_to_be_exposed_before_the_trigger(plugged, 
         for number in range(8):
             time.sleep(0.02 + 0.61 * number % 1 / rate)
             plugged.late_s, asked = 0.0, time.monotonic()
-            frame = camera.grab(asked, 5.0)
+            frame = camera.grab(asked, PATIENT_S)
             began = scene.exposure_of(frame.pixels)
             assert began >= asked - plugged.late_s
             assert frame.exposed_at_s <= began + plugged.late_s + 0.002  # the picture is not called newer than it is
@@ -79,7 +79,7 @@ def test_a_camera_that_keeps_its_frames_back_is_only_waited_for_if_that_is_told(
     with opened(camera_on(plugged.node, latency_s=latency_s)) as camera:
         for _ in range(6):
             asked = time.monotonic()
-            late += scene.exposure_of(camera.grab(asked, 5.0).pixels) < asked
+            late += scene.exposure_of(camera.grab(asked, PATIENT_S).pixels) < asked
     assert (late > 0) == (latency_s == 0)
 
 

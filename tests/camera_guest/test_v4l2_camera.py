@@ -21,6 +21,7 @@ from tests.support.camera.vivid import (
     BIND,
     CAPTURE,
     OUTPUT,
+    PATIENT_S,
     UNBIND,
     ctl,
     hdmi,
@@ -50,7 +51,7 @@ def grab_on(camera, frames):
         grabbed_now(camera)
 
 
-def grabbed_now(camera, timeout_s=5.0):
+def grabbed_now(camera, timeout_s=PATIENT_S):
     asked = time.monotonic()
     frame = camera.grab(asked, timeout_s)
     return frame, frame.exposed_at_s - asked
@@ -112,7 +113,7 @@ def test_a_rendered_block_comes_through_the_camera_pixel_by_pixel_and_is_traced_
     sample = cv2.imread(str(next(SAMPLES.glob("*.jpg"))))
     block = cv2.resize(sample, (1280, 720), interpolation=cv2.INTER_AREA)
     with shown_on_the_hdmi_input(block, tmp_path), opened(hdmi()) as camera:
-        frame, _ = grabbed_now(camera, 10.0)
+        frame, _ = grabbed_now(camera)
     np.testing.assert_array_equal(frame.pixels, block)
     settings = TraceSettings()
     seen, expected = trace(frame.pixels, settings), trace(block, settings)
@@ -125,7 +126,7 @@ def test_frames_flagged_as_damaged_are_skipped_and_counted():
         for _ in range(3):
             set_control("inject_v4l2_buf_flag_error", 1)
             asked = time.monotonic() - 1.0  # so that the damaged one, which is on its way, would do by its time
-            assert camera.grab(asked, 5.0).exposed_at_s >= asked
+            assert camera.grab(asked, PATIENT_S).exposed_at_s >= asked
             grabbed_now(camera)
         assert camera.counts.bad >= 1
 
@@ -140,7 +141,7 @@ def test_a_silent_camera_is_a_timeout_that_holds_and_comes_back():
         began = time.monotonic()
         with pytest.raises(CameraTimeout, match=r"silent|too early"):
             grabbed_now(camera, 1.0)
-        assert 1.0 <= time.monotonic() - began < 3.0
+        assert 1.0 <= time.monotonic() - began < 20.0
         set_control("percentage_of_dropped_buffers", 0)
         assert grabbed_now(camera)[1] >= 0
 
@@ -178,7 +179,7 @@ def test_a_camera_whose_driver_is_unbound_is_gone_and_comes_back_with_it():
         unbinding.start()
         with pytest.raises(CameraUnavailable):
             grab_on(camera, 50)
-        unbinding.join(60)
+        unbinding.join(PATIENT_S)
         with pytest.raises(CameraUnavailable, match="No such file"):
             camera.open()
         BIND.write_text("vivid.0")
@@ -188,7 +189,7 @@ def test_a_camera_whose_driver_is_unbound_is_gone_and_comes_back_with_it():
                 camera.open()
                 break
             except CameraUnavailable:
-                assert time.monotonic() - began < 10
+                assert time.monotonic() - began < PATIENT_S
                 time.sleep(0.05)
         assert grabbed_now(camera)[1] >= 0
 
@@ -291,10 +292,10 @@ def test_thousands_of_frames_leave_memory_and_descriptors_as_they_were():
     frames = int(os.environ.get("COMBTRACE_CAMERA_FRAMES", "1500"))
     with opened(webcam(width=320, height=180, frame_rate=None)) as camera:
         for _ in range(100):
-            camera.grab(0.0, 5.0)
+            camera.grab(0.0, PATIENT_S)
         began = resident_bytes(), len(os.listdir("/proc/self/fd"))
         for _ in range(frames):
-            camera.grab(0.0, 5.0)
+            camera.grab(0.0, PATIENT_S)
         assert len(os.listdir("/proc/self/fd")) == began[1]
         assert resident_bytes() - began[0] < 4_000_000
 

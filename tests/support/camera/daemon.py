@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-from tests.support.camera.vivid import CAPTURE
+from tests.support.camera.vivid import CAPTURE, PATIENT_S
 
 CONFIG = f"""
 camera: {{kind: v4l2, device: {CAPTURE}, width: 640, height: 360, frame_rate: 30, exposure_ms: 0, timeout_s: 2}}
@@ -31,7 +31,7 @@ class Daemon:
     def said(self) -> str:
         return self._log.read_text(errors="replace")
 
-    def wait_for(self, pattern: str, *, after: int = 0, bound_s: float = 60.0) -> re.Match[str]:
+    def wait_for(self, pattern: str, *, after: int = 0, bound_s: float = PATIENT_S) -> re.Match[str]:
         """The first match of the pattern behind the character `after`."""
         give_up_at = time.monotonic() + bound_s
         while time.monotonic() < give_up_at:
@@ -43,5 +43,10 @@ class Daemon:
         raise AssertionError(f"no {pattern!r} within {bound_s} s in:\n{self.said()}")
 
     def stop(self) -> None:
+        """SIGTERM, on which it must end by itself."""
         self._process.terminate()
-        self._process.wait(30)
+        try:
+            self._process.wait(PATIENT_S)
+        finally:
+            self._process.kill()
+            self._process.wait()

@@ -12,6 +12,7 @@ import numpy as np
 
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 
+PATIENT_S = 300.0  # bounds a wait that ends by itself: the guest is emulated, on a machine that may be slow
 WEBCAM, HDMI = 0, 1
 CAPTURE, OUTPUT = "/dev/video0", "/dev/video1"
 UNBIND = Path("/sys/bus/platform/drivers/vivid/unbind")
@@ -68,12 +69,14 @@ def shown_on_the_hdmi_input(picture: np.ndarray, folder: Path) -> Iterator[None]
     player = subprocess.Popen(
         ["v4l2-ctl", "-d", OUTPUT, "--stream-out-mmap", "--stream-loop", f"--stream-from={raw}"],
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
     )
     try:
+        assert player.stderr is not None
+        player.stderr.read(1)  # it has sent one: a sign for each
         time.sleep(0.5)
         yield
     finally:
-        player.terminate()
-        player.wait()
+        player.kill()
+        player.communicate()
         set_control("loop_video", 0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from tests.support.camera.usb_webcam import HEIGHT, MJPG, WIDTH
+from tests.support.camera.vivid import PATIENT_S
 
 GREYS = 25  # frames that can be told apart by their grey
 
@@ -42,7 +43,7 @@ class Scene:
         return next(self.exposed_at_s[n] for n in recent if n % GREYS == number)
 
 
-def node_of_the_webcam(within_s=60.0):
+def node_of_the_webcam(within_s=PATIENT_S):
     began = time.monotonic()
     while time.monotonic() - began < within_s:
         for name in sorted(Path("/sys/class/video4linux").glob("video*")):

@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 
 from contour.calibration.calibration import Alignment, SimpleCalibration
 from contour.errors import CalibrationError, ParameterError
-from contour.geometry.rings import Contour, contour_defect, densified, hausdorff, signed_area
+from contour.geometry.rings import Contour, contour_defect, densified, signed_area
 from contour.polygon.polygon import PIXEL_TOLERANCE, Finish, Polygon, cutting_polygon
 from tests.support.pictures.cameras import camera
-from tests.support.pictures.rings import SQUARE, blobs, simple_rings
+from tests.support.pictures.rings import SQUARE, alike, blobs, simple_rings
 
 SIMPLE = SimpleCalibration(1600, 1200, 0.375, (100.0, 1100.0), alignment=Alignment(25.0, (500.0, -300.0)))
 OUTLINE = densified(SQUARE * [40, 30] + [300, 400], 1.0)
@@ -80,14 +80,14 @@ def test_the_tolerance_is_kept_in_millimetres(ring: np.ndarray, tolerance: float
     polygon = converted(Contour(ring), tolerance_mm=tolerance)
     assert polygon.millimetres is not None
     full = SIMPLE.to_machine(SIMPLE.to_work(ring, 0.0))
-    assert hausdorff(full, polygon.millimetres.exterior, tolerance / 4) <= tolerance * (1 + 1e-9) + 1e-9
+    assert alike(full, polygon.millimetres.exterior, tolerance)
 
 
 @given(blobs)
 def test_without_a_calibration_a_quarter_pixel_is_kept_and_no_millimetres_are_given(ring: np.ndarray) -> None:
     polygon = cutting_polygon(Contour(ring), None, height_mm=20.0, tolerance_mm=50.0)
     assert (polygon.millimetres, polygon.area_mm2, polygon.mm_per_px) == (None, None, None)
-    assert hausdorff(ring, polygon.pixels.exterior, 0.05) <= PIXEL_TOLERANCE + 1e-9
+    assert alike(ring, polygon.pixels.exterior, PIXEL_TOLERANCE)
 
 
 def test_a_hole_close_to_the_edge_stays_apart_from_it() -> None:

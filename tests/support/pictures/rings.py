@@ -64,5 +64,12 @@ def contours(draw: st.DrawFn) -> Contour:
     return contour
 
 
+def alike(ring: Ring, other: Ring, distance: float) -> bool:
+    """Whether no point of either curve is farther than that from the other, by a part in a thousand."""
+    curves = [shapely.LinearRing(ring), shapely.LinearRing(other)]
+    near = [curve.buffer(distance * 1.001 + 1e-6, quad_segs=32) for curve in curves]  # its arcs lie 3e-4 inside
+    return bool(near[0].covers(curves[1]) and near[1].covers(curves[0]))
+
+
 def solid(contour: Contour) -> shapely.Polygon:
     return shapely.Polygon(contour.exterior, contour.holes)

@@ -22,7 +22,7 @@ from benchmarks.daemon.figure import Figure
 from benchmarks.daemon.job import JobTimes, job_times
 from benchmarks.page_section import put_section
 from benchmarks.rest import SETTLES_S, medians_percent, share_percent
-from tests.support.processes.cell import Cell
+from tests.support.processes.cell import ON_SAMPLES, Cell
 from tests.support.processes.processes import resident_megabytes, until
 
 PAGE = Path(__file__).parents[2] / "docs" / "reports" / "daemon-speed.md"
@@ -44,7 +44,7 @@ def seconds_to_ready(cell: Cell) -> float:
 
 def measured(folder: Path, rest_s: float) -> list[Figure]:
     """All figures; a moment's other load on the machine counts against them."""
-    cell = Cell(folder, triggers="[{kind: controller}]", trigger_every_s=None)
+    cell = Cell(folder, camera=ON_SAMPLES, triggers="[{kind: controller}]", trigger_every_s=None)
     try:
         cell.ready()
         ready = [seconds_to_ready(cell) for _ in range(STARTS)]

@@ -30,7 +30,7 @@ from playwright.sync_api import Response, sync_playwright
 from benchmarks.daemon.figure import Figure
 from benchmarks.rest import processor_s
 from service.records.journal_reader import JobFilter, reading
-from tests.support.processes.cell import Cell
+from tests.support.processes.cell import ON_SAMPLES, Cell
 from tests.support.processes.page_client import Client
 from tests.support.processes.processes import free_port, until
 from tests.support.real_parts import need_program
@@ -209,7 +209,7 @@ def _jobs_each(folder: Path, every_s: float) -> Iterator[tuple[Cell, int]]:
     """A service with a page that has a trigger each `every_s`, and the page's port."""
     folder.mkdir()
     port = free_port()
-    cell = Cell(folder, trigger_every_s=every_s, more=f"page: {{port: {port}}}\n")
+    cell = Cell(folder, camera=ON_SAMPLES, trigger_every_s=every_s, more=f"page: {{port: {port}}}\n")
     try:
         cell.ready()
         cell.goes_on(2)

@@ -12,11 +12,11 @@ import pytest
 
 from service.cli.examples import EXAMPLES, examples_of
 from service.cli.main import COMMANDS, EPILOG, build_parser, main
-from tests.support.processes.processes import combtrace
+from tests.support.processes.processes import called, combtrace
 
 
 def test_help_reads_like_a_manual_page() -> None:
-    done = combtrace("--help")
+    done = called("--help")
     assert done.returncode == 0
     for heading in ("NAME", "DESCRIPTION", "COMMANDS", "FILES", "EXIT STATUS", "EXAMPLES"):
         assert f"\n{heading}" in f"\n{done.stdout}"
@@ -26,14 +26,14 @@ def test_help_reads_like_a_manual_page() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_command_has_its_own_help(command: str) -> None:
-    done = combtrace(command, "--help")
+    done = called(command, "--help")
     assert done.returncode == 0
     assert len(done.stdout) > 100
 
 
 def test_every_command_shows_examples_in_its_help() -> None:
     assert set(EXAMPLES) == set(COMMANDS)
-    help_text = combtrace("jobs", "--help").stdout
+    help_text = called("jobs", "--help").stdout
     assert f"\n{examples_of('jobs')}\n" in help_text
 
 
@@ -64,19 +64,19 @@ def test_help_loads_neither_numpy_nor_cv2_nor_pydantic_nor_pymodbus(arguments: l
 
 
 def test_without_a_command_help_is_shown_and_the_status_is_2() -> None:
-    done = combtrace()
+    done = called()
     assert done.returncode == 2
     assert "COMMANDS" in done.stdout
 
 
 def test_an_unknown_command_is_a_usage_error() -> None:
-    done = combtrace("tarce")
+    done = called("tarce")
     assert done.returncode == 2
     assert "tarce" in done.stderr
 
 
 def test_an_error_is_one_line_without_a_traceback(tmp_path: Path) -> None:
-    done = combtrace("run", "--config", tmp_path / "nowhere.yaml")
+    done = called("run", "--config", tmp_path / "nowhere.yaml")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "nowhere.yaml: cannot be read" in done.stderr
@@ -89,7 +89,7 @@ def test_debug_shows_the_traceback(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("address", ["5020", "127.0.0.1:", "127.0.0.1:99999", ":5020", "127.0.0.1:x"])
 def test_a_bad_address_is_a_usage_error(address: str) -> None:
-    done = combtrace("simulate-controller", "--tcp", address)
+    done = called("simulate-controller", "--tcp", address)
     assert done.returncode == 2
     assert "expected HOST:PORT" in done.stderr
 
@@ -119,14 +119,14 @@ def test_an_address_in_use_is_an_error_that_names_it() -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        done = combtrace("simulate-controller", "--tcp", f"127.0.0.1:{port}")
+        done = called("simulate-controller", "--tcp", f"127.0.0.1:{port}")
     assert done.returncode == 2
     assert str(port) in done.stderr
     assert done.stderr.count("\n") == 1
 
 
 def test_a_missing_serial_port_is_an_error_that_names_it() -> None:
-    done = combtrace("trigger", "--port", "/dev/nowhere")
+    done = called("trigger", "--port", "/dev/nowhere")
     assert done.returncode == 2
     assert "/dev/nowhere" in done.stderr
     assert done.stderr.count("\n") == 1

@@ -17,9 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import cv2
-import numpy as np
-
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.simulated.contour import AcceptedContour
 from drivers.controller.simulated.controller import SimulatedController
@@ -29,6 +26,7 @@ from drivers.controller.simulated.received import ReceivedRequest
 from tests.soak.cells.crossed_line import crossed_line
 from tests.soak.cells.faulted_cell import Transport
 from tests.soak.promises import Evidence, Findings, Rings, Taken, acks, judge, logged_contours, micrometres
+from tests.support.pictures.combs import write_combs
 from tests.support.processes.processes import Process, combtrace, free_port, jobs, lines
 
 STEPS = ("service", "owner", "clear", "page", "readback", "commit", "link")
@@ -96,19 +94,6 @@ class Sniper(SimulatedController):
         return None
 
 
-def honeycomb(columns: int, rows: int) -> np.ndarray:
-    """A small picture of a comb on a dark table: 320 x 240, uint8."""
-    picture = np.full((240, 320), 25, np.uint8)
-    side = 8.0
-    for row in range(rows):
-        for column in range(columns):
-            centre = (60 + (column + row % 2 / 2) * side * np.sqrt(3), 50 + row * side * 1.5)
-            angles = np.arange(6) * np.pi / 3
-            corners = np.stack([centre[0] + side * np.sin(angles), centre[1] + side * np.cos(angles)], axis=1)
-            cv2.polylines(picture, [np.round(corners * 16).astype(np.int32)], True, 220, 2, cv2.LINE_AA, shift=4)
-    return picture
-
-
 class KilledCell:
     """A folder with all that both sides leave behind."""
 
@@ -127,19 +112,13 @@ class KilledCell:
         self.taken: list[Taken] = []
         self.events: list[dict[str, Any]] = []
         self.said: list[str] = []  # on a serial line
-        (folder / "pictures").mkdir()
-        for number, (columns, rows) in enumerate([(10, 8), (12, 9), (8, 10)]):
-            cv2.imwrite(str(folder / "pictures" / f"{number}.png"), honeycomb(columns, rows))
-        (folder / "calibration.yaml").write_text(
-            "version: 1\nkind: simple\nimage_width: 320\nimage_height: 240\nmm_per_pixel: 0.5\nplane_height_mm: 0\n"
-            "origin_px: [0, 0]\nrotation_deg: 0\n"
-        )
+        self.combs = write_combs(folder / "combs")
 
     def write_config(self, port: int | str) -> None:
         killing = self.killing
         (self.folder / "config.yaml").write_text(
-            "camera: {kind: files, path: pictures, loop: true}\n"
-            "calibration: {file: calibration.yaml}\n"
+            "camera: {kind: files, path: combs, loop: true}\n"
+            "calibration: {file: combs/calibration.yaml}\n"
             f"controller: {{kind: modbus-{killing.transport}, port: {port}, timeout_s: 0.3,"
             f" poll_period_s: 0.01, ack_timeout_s: 1, word_order: {killing.word_order},"
             f" payload_capacity: {killing.payload_capacity}, valid_for_s: {self.valid_for_s}}}\n"
@@ -155,7 +134,7 @@ class KilledCell:
         return frozenset(KNOWN)
 
     def _traced(self) -> frozenset[Rings]:
-        pictures = sorted((self.folder / "pictures").iterdir())
+        pictures = sorted(self.combs.glob("*.png"))
         table = self.folder / "known.json"
         done = combtrace(
             "trace", *pictures, "--config", self.folder / "config.yaml", "--json", table, bound_s=PATIENT_S

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tests.support.pictures.combs import write_combs
 from tests.support.processes.processes import Process, free_port, jobs, lines, until
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"
+ON_SAMPLES = f"{{kind: files, path: {SAMPLES}, loop: true}}"  # a camera
 
 
 class Cell:
-    """A service and a controller, each of which may be killed and started again."""
+    """A service and a controller, each of which may be killed and started again.
+
+    camera, calibration: without either it sees drawn combs, small ones; where only the camera is told, the calibration
+    is that of the samples.
+    """
 
     def __init__(
         self,
         folder: Path,
         *,
         triggers: str = "[{kind: controller}]",
-        trigger_every_s: float | None = 0.05,
+        trigger_every_s: float | None = 0.2,
         camera: str = "",
         service: str = "{state_dir: state}",
-        calibration: Path = SAMPLES / "calibration.yaml",
+        calibration: Path | None = None,
         link: str = "",
         journal: str = "{path: journal.sqlite}",
         more: str = "",
@@ -29,7 +35,8 @@ class Cell:
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
         self._trigger_every += ("--recipe", str(recipe))
-        camera = camera or f"{{kind: files, path: {SAMPLES}, loop: true}}"
+        seen = SAMPLES if camera else write_combs(folder / "combs")
+        camera = camera or f"{{kind: files, path: {seen}, loop: true}}"
         self.folder = folder
         self.scenario = scenario  # the controller's, from its next start on
         self.port = free_port()
@@ -37,7 +44,7 @@ class Cell:
         self.accepted = folder / "accepted.jsonl"
         (folder / "config.yaml").write_text(
             f"camera: {camera}\n"
-            f"calibration: {{file: {calibration}}}\n"
+            f"calibration: {{file: {calibration or seen / 'calibration.yaml'}}}\n"
             f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: 0.5, ack_timeout_s: 1{link}}}\n"
             f"triggers: {triggers}\n"
             f"service: {service}\n"

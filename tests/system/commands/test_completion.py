@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from service.cli.main import COMMANDS
-from tests.support.processes.processes import combtrace
+from tests.support.processes.processes import called
 
 MARK = "@end@"
 DONE = "@done@"
@@ -33,7 +33,7 @@ def need(shell: str) -> None:
 def folder(tmp_path: Path) -> Path:
     """Where the shell stands: a picture, a configuration, and the scripts."""
     for shell in ("bash", "zsh", "fish"):
-        done = combtrace("completion", shell)
+        done = called("completion", shell)
         assert done.returncode == 0, done.stderr
         (tmp_path / f"combtrace.{shell}").write_text(done.stdout)
     (tmp_path / "block-7.png").write_text("")
@@ -150,5 +150,5 @@ def test_every_command_and_option_is_in_each_script(folder: Path) -> None:
 
 
 def test_another_shell_is_a_usage_error() -> None:
-    done = combtrace("completion", "csh")
+    done = called("completion", "csh")
     assert (done.returncode, "bash" in done.stderr) == (2, True)

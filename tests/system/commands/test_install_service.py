@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.support.processes.processes import combtrace
+from tests.support.processes.processes import called, combtrace
 from tests.support.real_parts import missing, need_program
 
 COMMAND = Path(sys.executable).parent / "combtrace"
@@ -19,7 +19,7 @@ def test_systemd_accepts_the_unit_and_finds_it_hardened(tmp_path: Path) -> None:
     for config in (Path("/etc/combtrace/config.yaml"), tmp_path / "two words 100%" / "config.yaml"):
         if config.is_relative_to(tmp_path):
             config.write_text("camera: {kind: files, path: .}\ncontroller: {kind: none}\ntriggers: []\n")
-        printed = combtrace("install-service", "--print", "--config", config)
+        printed = called("install-service", "--print", "--config", config)
         assert printed.returncode == 0, printed.stderr
         unit = tmp_path / "combtrace.service"
         unit.write_text(printed.stdout)
@@ -33,7 +33,7 @@ def test_systemd_refuses_a_unit_that_was_spoiled(tmp_path: Path) -> None:
     """So that the test above can fail."""
     analyze = need_program("systemd-analyze", "apt-get install systemd")
     unit = tmp_path / "combtrace.service"
-    unit.write_text(combtrace("install-service", "--print").stdout.replace("WatchdogSec=60", "WatchdogSeconds=60"))
+    unit.write_text(called("install-service", "--print").stdout.replace("WatchdogSec=60", "WatchdogSeconds=60"))
     done = subprocess.run([analyze, "verify", unit], capture_output=True, text=True, check=False)
     assert "WatchdogSeconds" in done.stderr
 
@@ -68,7 +68,7 @@ def udev_says(rules: Path) -> str:
 def test_udev_accepts_the_rules(tmp_path: Path) -> None:
     rules = tmp_path / "rules"
     rules.mkdir()
-    printed = combtrace("install-service", "--print", "udev")
+    printed = called("install-service", "--print", "udev")
     file = rules / "70-combtrace.rules"
     file.write_text(printed.stdout)
     assert udev_says(rules) == ""
@@ -78,7 +78,7 @@ def test_udev_accepts_the_rules(tmp_path: Path) -> None:
 
 def test_files_are_written_below_the_root_and_the_next_steps_are_told(tmp_path: Path) -> None:
     (tmp_path / "config.yaml").write_text("camera: {kind: files, path: .}\ncontroller: {kind: none}\ntriggers: []\n")
-    done = combtrace("install-service", "--root", tmp_path / "root", "--config", tmp_path / "config.yaml")
+    done = called("install-service", "--root", tmp_path / "root", "--config", tmp_path / "config.yaml")
     assert done.returncode == 0, done.stderr
     unit = (tmp_path / "root/etc/systemd/system/combtrace.service").read_text()
     assert f"ExecStart={COMMAND} run --config {tmp_path}/config.yaml" in unit
@@ -89,9 +89,9 @@ def test_files_are_written_below_the_root_and_the_next_steps_are_told(tmp_path: 
 
 def test_a_bad_configuration_or_user_is_told_and_nothing_is_written(tmp_path: Path) -> None:
     (tmp_path / "config.yaml").write_text("colour: red\n")
-    bad = combtrace("install-service", "--root", tmp_path / "root", "--config", tmp_path / "config.yaml")
+    bad = called("install-service", "--root", tmp_path / "root", "--config", tmp_path / "config.yaml")
     assert (bad.returncode, "colour: unknown key" in bad.stderr) == (2, True)
-    bad = combtrace("install-service", "--root", tmp_path / "root", "--user", "Anna Maria")
+    bad = called("install-service", "--root", tmp_path / "root", "--user", "Anna Maria")
     assert (bad.returncode, "expected a name" in bad.stderr) == (2, True)
     assert not (tmp_path / "root").exists()
 

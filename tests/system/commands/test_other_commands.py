@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import COMBTRACE, ENVIRONMENT, ROOT, combtrace, free_port, jobs, until
+from tests.support.processes.processes import COMBTRACE, ENVIRONMENT, ROOT, called, combtrace, free_port, jobs, until
 from tests.support.real_parts import need_program
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"
@@ -64,7 +64,7 @@ def test_demo_can_be_run_again_in_the_same_folder(tmp_path: Path) -> None:
 
 
 def test_schema_prints_the_schema_that_config_yaml_names() -> None:
-    done = combtrace("schema")
+    done = called("schema")
     assert json.loads(done.stdout) == json.loads((SAMPLES.parents[1] / "config.schema.json").read_text())
 
 
@@ -91,7 +91,7 @@ def test_an_interval_gives_job_after_job(cell: Cell) -> None:
 def test_check_says_that_all_is_well(cell: Cell) -> None:
     cell.ready()
     cell.service.stop()
-    done = combtrace("check", "--config", cell.folder / "config.yaml")
+    done = called("check", "--config", cell.folder / "config.yaml")
     assert done.returncode == 0, done.stdout
     assert [line.split()[:2] for line in done.stdout.splitlines()] == [
         ["ok", part]
@@ -102,7 +102,7 @@ def test_check_says_that_all_is_well(cell: Cell) -> None:
 def test_check_of_a_running_service_takes_nothing_from_it(cell: Cell) -> None:
     cell.goes_on(1)
     begun = len(cell.service.text)  # at its start it may have been there before its controller
-    done = combtrace("check", "--config", cell.folder / "config.yaml", "--json", "-")
+    done = called("check", "--config", cell.folder / "config.yaml", "--json", "-")
     assert done.returncode == 0, done.stderr
     told = {one["part"]: one["text"] for one in json.loads(done.stdout)["findings"]}
     assert told["service"] == f"runs as process {cell.service.process_id}"
@@ -112,13 +112,13 @@ def test_check_of_a_running_service_takes_nothing_from_it(cell: Cell) -> None:
     other = cell.folder / "other.yaml"
     text = (cell.folder / "config.yaml").read_text()
     other.write_text(text.replace("state_dir: state", "state_dir: other").replace("path: journal", "path: other"))
-    done = combtrace("check", "--config", other)
+    done = called("check", "--config", other)
     assert done.returncode == 0, done.stdout
     assert "in use by another combtrace on this machine" in done.stdout
-    assert combtrace("check", "--config", other, "--strict").returncode == 1
+    assert called("check", "--config", other, "--strict").returncode == 1
     cell.goes_on(1)
     assert "-> Error" not in cell.service.text[begun:]
-    assert json.loads(combtrace("check", "--config", other, "--json", "-").stdout)["status"] == "warning"
+    assert json.loads(called("check", "--config", other, "--json", "-").stdout)["status"] == "warning"
 
 
 def test_check_names_each_thing_that_is_wrong(tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ def test_check_names_each_thing_that_is_wrong(tmp_path: Path) -> None:
         "camera: {kind: files, path: nowhere}\ncalibration: {file: nowhere.yaml}\n"
         f"controller: {{kind: modbus-tcp, port: {free_port()}}}\ntriggers: [{{kind: serial, port: /dev/nowhere}}]\n"
     )
-    done = combtrace("check", "--config", tmp_path / "config.yaml")
+    done = called("check", "--config", tmp_path / "config.yaml")
     assert done.returncode == 1
     faults = [line.split()[1] for line in done.stdout.splitlines() if line.startswith("FAULT")]
     assert faults == ["calibration", "camera", "controller", "serial"]
@@ -137,14 +137,14 @@ def test_check_without_devices_opens_none(tmp_path: Path) -> None:
         f"camera: {{kind: files, path: nowhere}}\ncalibration: {{file: {SAMPLES / 'calibration.yaml'}}}\n"
         f"controller: {{kind: modbus-tcp, port: {free_port()}}}\n"
     )
-    done = combtrace("check", "--config", tmp_path / "config.yaml", "--no-devices")
+    done = called("check", "--config", tmp_path / "config.yaml", "--no-devices")
     assert done.returncode == 0
     assert "camera" not in done.stdout
 
 
 def test_check_of_a_bad_configuration_has_status_2(tmp_path: Path) -> None:
     (tmp_path / "config.yaml").write_text("camra: 1\n")
-    done = combtrace("check", "--config", tmp_path / "config.yaml")
+    done = called("check", "--config", tmp_path / "config.yaml")
     assert done.returncode == 2
     assert "camra: unknown key; did you mean camera?" in done.stdout
 

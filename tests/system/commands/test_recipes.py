@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.support.processes.cell import SAMPLES, Cell
-from tests.support.processes.processes import Process, combtrace, jobs, lines, until
+from tests.support.processes.processes import Process, called, jobs, lines, until
 
 PICTURE = SAMPLES / "1-rectangle.jpg"
 PLAIN = "{number: 1, name: plain, thickness_mm: 20}"
@@ -75,7 +75,7 @@ def test_a_running_job_keeps_its_recipe_and_the_next_has_the_new_one_or_the_old_
     text = bench.service.text
     assert "recipes[1].tolerance_mm" in text
     assert all(f"colour{number}: unknown key" in text for number in range(8))
-    status = combtrace("status", "--config", bench.folder / "config.yaml")
+    status = called("status", "--config", bench.folder / "config.yaml")
     assert "warning   configuration: not reloaded: " in status.stdout, "though the file is bad"
     assert "(and 8 more)" in status.stdout
     assert bench.hand_over()["reason"] == 112
@@ -96,7 +96,7 @@ def test_a_running_job_keeps_its_recipe_and_the_next_has_the_new_one_or_the_old_
     bench.reload("from the job after 6 on: recipes (1)")
     assert bench.hand_over()["reason"] == 112, "it was waiting for its picture"
     assert bench.hand_over()["outcome"] == "written"
-    assert "warning" not in combtrace("status", "--config", bench.folder / "config.yaml").stdout
+    assert "warning" not in called("status", "--config", bench.folder / "config.yaml").stdout
     assert "Traceback" not in bench.service.text
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import Process, combtrace, lines, until
+from tests.support.processes.processes import Process, called, lines, until
 
 SCENARIOS = Path(__file__).parents[3] / "docs" / "reference" / "scenarios"
 
 
 def simulate(*arguments: str | Path):
-    return combtrace("simulate-controller", "--tcp", "127.0.0.1:0", *arguments)
+    return called("simulate-controller", "--tcp", "127.0.0.1:0", *arguments)
 
 
 def test_a_service_keeps_the_protocol_while_commits_are_in_doubt(tmp_path: Path) -> None:
@@ -64,6 +64,6 @@ def test_the_verdict_is_there_from_the_start_and_survives_a_kill(tmp_path: Path)
 
 
 def test_the_schema_of_a_scenario_is_printed() -> None:
-    done = combtrace("schema", "--scenario")
+    done = called("schema", "--scenario")
     assert done.returncode == 0
     assert set(json.loads(done.stdout)["properties"]) == {"seed", "machine", "events", "faults"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import struct
 import zlib
 from pathlib import Path
@@ -13,7 +14,8 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.support.processes.processes import combtrace
+from tests.support.pictures.combs import write_combs
+from tests.support.processes.processes import called, combtrace
 
 ROOT = Path(__file__).parents[3]
 SAMPLES = ROOT / "service" / "samples"
@@ -26,9 +28,15 @@ KEYS = {
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def comb(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small picture, for what is the same with any."""
+    return write_combs(tmp_path_factory.mktemp("small") / "combs") / "0.png"
+
+
 def traced(*arguments: str | Path, status: int = 0) -> list[dict[str, Any]]:
     """The JSON Lines on standard output."""
-    done = combtrace("trace", *arguments, "--json", "-")
+    done = called("trace", *arguments, "--json", "-")
     assert done.returncode == status, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()]
 
@@ -94,12 +102,12 @@ def test_parameters_of_the_command_line_reach_the_method() -> None:
     assert coarse["area_px2"] > fine["area_px2"]
 
 
-def test_a_step_above_twice_the_core_is_told_once_and_traced_nevertheless() -> None:
+def test_a_step_above_twice_the_core_is_told_once_and_traced_nevertheless(comb: Path) -> None:
     sizes = ("--method", "sliding-matrix", "--core-px", "10", "--step-px")
-    done = combtrace("trace", RECTANGLE, RECTANGLE, *sizes, "21", "--json", "-")
+    done = combtrace("trace", comb, comb, *sizes, "21", "--json", "-")
     assert len(done.stdout.splitlines()) == 2
     assert done.stderr.count("step_px is 21, expected up to 20, twice core_px") == 1
-    assert "step_px is" not in combtrace("trace", RECTANGLE, *sizes, "20").stderr
+    assert "step_px is" not in called("trace", comb, *sizes, "20").stderr
 
 
 def test_a_core_by_hand_is_accepted_like_the_one_that_follows() -> None:
@@ -117,7 +125,7 @@ def test_the_thickness_moves_the_plane() -> None:
 
 
 def test_an_overlay_is_written_for_each_picture_and_text_names_it(tmp_path: Path) -> None:
-    done = combtrace("trace", RECTANGLE, L_SHAPE, "--overlay", tmp_path / "seen")
+    done = called("trace", RECTANGLE, L_SHAPE, "--overlay", tmp_path / "seen")
     assert done.returncode == 0
     names = sorted(path.name for path in (tmp_path / "seen").iterdir())
     assert names == ["1-rectangle-contour.png", "2-l-shape-contour.png"]
@@ -131,35 +139,35 @@ def test_an_overlay_is_written_for_each_picture_and_text_names_it(tmp_path: Path
 def test_an_overlay_never_replaces_the_picture_it_is_of(tmp_path: Path) -> None:
     picture = tmp_path / "block.jpg"
     picture.write_bytes(RECTANGLE.read_bytes())
-    done = combtrace("trace", picture, "--overlay", picture)
+    done = called("trace", picture, "--overlay", picture)
     assert done.returncode == 2
     assert "is a picture that is read" in done.stderr
     assert picture.read_bytes() == RECTANGLE.read_bytes()
 
 
-def test_pictures_of_one_name_from_several_folders_get_an_overlay_each(tmp_path: Path) -> None:
+def test_pictures_of_one_name_from_several_folders_get_an_overlay_each(tmp_path: Path, comb: Path) -> None:
     pictures = [tmp_path / side / name for side, name in (("left", "a.jpg"), ("right", "a.jpg"), ("right", "b.jpg"))]
-    for picture, source in zip(pictures, (RECTANGLE, L_SHAPE, RECTANGLE), strict=True):
+    for picture, source in zip(pictures, (comb, L_SHAPE, comb), strict=True):
         picture.parent.mkdir(exist_ok=True)
         picture.write_bytes(source.read_bytes())
-    done = combtrace("trace", *pictures, "--overlay", tmp_path / "seen", "--thickness-mm", "20")
+    done = called("trace", *pictures, "--overlay", tmp_path / "seen", "--thickness-mm", "20")
     assert done.returncode == 0, done.stderr
     names = sorted(path.name for path in (tmp_path / "seen").iterdir())
     assert names == ["b-contour.png", "left-a-contour.png", "right-a-contour.png"]
     assert "--thickness-mm 20 has no effect: without a calibration" in done.stderr
     # An overlay's name may be that of another picture of the same run.
-    (tmp_path / "left" / "b-contour.png").write_bytes(RECTANGLE.read_bytes())
-    done = combtrace("trace", pictures[2], tmp_path / "left" / "b-contour.png", "--overlay", tmp_path / "left")
+    (tmp_path / "left" / "b-contour.png").write_bytes(comb.read_bytes())
+    done = called("trace", pictures[2], tmp_path / "left" / "b-contour.png", "--overlay", tmp_path / "left")
     assert done.returncode == 2
     assert "is a picture that is read" in done.stderr
 
 
-def test_a_json_file_stays_as_it_was_where_the_command_cannot_go_on(tmp_path: Path) -> None:
+def test_a_json_file_stays_as_it_was_where_the_command_cannot_go_on(tmp_path: Path, comb: Path) -> None:
     out = tmp_path / "out.jsonl"
     out.write_text("old\n")
     (tmp_path / "seen").mkdir()
     (tmp_path / "seen" / f"{L_SHAPE.stem}-contour.png").mkdir()
-    done = combtrace("trace", RECTANGLE, L_SHAPE, "--overlay", tmp_path / "seen", "--json", out)
+    done = called("trace", comb, L_SHAPE, "--overlay", tmp_path / "seen", "--json", out)
     assert done.returncode == 2
     assert out.read_text() == "old\n"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.jsonl", "seen"]
@@ -176,78 +184,79 @@ def test_a_json_file_stays_as_it_was_where_the_command_cannot_go_on(tmp_path: Pa
     ],
 )
 def test_no_output_takes_the_place_of_a_picture_or_of_another_output(
-    tmp_path: Path, arguments: list[str | Path], told: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str | Path], told: str
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     for name in ("a.jpg", "b.jpg"):
         (tmp_path / name).write_bytes(RECTANGLE.read_bytes())
     (tmp_path / "link.svg").symlink_to("a.jpg")
-    done = combtrace("trace", *arguments, cwd=tmp_path)
+    done = called("trace", *arguments)
     assert done.returncode == 2
     assert told in done.stderr
     assert (tmp_path / "a.jpg").read_bytes() == (tmp_path / "b.jpg").read_bytes() == RECTANGLE.read_bytes()
 
 
-def test_a_name_that_ends_in_a_slash_is_a_folder_of_one_picture_too(tmp_path: Path) -> None:
-    done = combtrace(
-        "trace", RECTANGLE, "--calibration", CALIBRATION, "--overlay", f"{tmp_path}/seen/", "--svg", f"{tmp_path}/out/"
-    )
+def test_a_name_that_ends_in_a_slash_is_a_folder_of_one_picture_too(tmp_path: Path, comb: Path) -> None:
+    calibration = ("--calibration", comb.with_name("calibration.yaml"))
+    done = called("trace", comb, *calibration, "--overlay", f"{tmp_path}/seen/", "--svg", f"{tmp_path}/out/")
     assert done.returncode == 0, done.stderr
-    assert [path.name for path in (tmp_path / "seen").iterdir()] == ["1-rectangle-contour.png"]
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["1-rectangle.svg"]
+    assert [path.name for path in (tmp_path / "seen").iterdir()] == ["0-contour.png"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["0.svg"]
 
 
-def test_a_sign_that_the_terminal_does_not_have_is_told_as_an_escape() -> None:
-    done = combtrace("trace", RECTANGLE, variables={"PYTHONIOENCODING": "ascii"})
+def test_a_sign_that_the_terminal_does_not_have_is_told_as_an_escape(comb: Path) -> None:
+    done = combtrace("trace", comb, variables={"PYTHONIOENCODING": "ascii"})
     assert done.returncode == 0, done.stderr
     assert "px\\xb2" in done.stdout
 
 
-def test_json_to_a_file_leaves_the_text_on_standard_output(tmp_path: Path) -> None:
-    done = combtrace("trace", RECTANGLE, "--json", tmp_path / "out.jsonl")
+def test_json_to_a_file_leaves_the_text_on_standard_output(tmp_path: Path, comb: Path) -> None:
+    done = called("trace", comb, "--json", tmp_path / "out.jsonl")
     assert "wall-tips" in done.stdout
     assert json.loads((tmp_path / "out.jsonl").read_text())["status"] == "ok"
 
 
-def test_a_picture_whose_name_is_no_utf_8_is_told_in_json_all_the_same(tmp_path: Path) -> None:
+def test_a_picture_whose_name_is_no_utf_8_is_told_in_json_all_the_same(tmp_path: Path, comb: Path) -> None:
     picture, told = tmp_path / os.fsdecode(b"bild-\xe4.jpg"), tmp_path / "told.json"
-    picture.write_bytes(RECTANGLE.read_bytes())
-    done = combtrace("trace", picture, "--json", told)
+    picture.write_bytes(comb.read_bytes())
+    done = called("trace", picture, "--json", told)
     assert done.returncode == 0, done.stderr
     assert json.loads(told.read_text())["image"].endswith("bild-\\udce4.jpg")
 
 
-def test_text_goes_to_standard_error_when_json_goes_to_standard_output() -> None:
-    done = combtrace("trace", RECTANGLE, "--json", "-")
+def test_text_goes_to_standard_error_when_json_goes_to_standard_output(comb: Path) -> None:
+    done = called("trace", comb, "--json", "-")
     assert "vertices" in done.stderr
     assert len(done.stdout.splitlines()) == 1
 
 
-def test_no_config_file_that_happens_to_lie_around_is_read(tmp_path: Path) -> None:
+def test_no_config_file_that_happens_to_lie_around_is_read(tmp_path: Path, comb: Path) -> None:
     (tmp_path / "config.yaml").write_text("this is: [no configuration")
-    assert combtrace("trace", RECTANGLE, cwd=tmp_path).returncode == 0
+    assert combtrace("trace", comb, cwd=tmp_path).returncode == 0
 
 
-def test_a_recipe_is_found_by_name_and_its_limits_refuse(tmp_path: Path) -> None:
+def test_a_recipe_is_found_by_name_and_its_limits_refuse(tmp_path: Path, comb: Path) -> None:
     config = tmp_path / "config.yaml"
     config.write_text(
-        f"camera: {{kind: files, path: x}}\ncalibration: {{file: {CALIBRATION}}}\ncontroller: {{kind: none}}\n"
-        "recipes:\n- {number: 1, name: default}\n- {number: 2, name: small, max_area_mm2: 5000}\n"
+        f"camera: {{kind: files, path: x}}\ncalibration: {{file: {comb.parent}/calibration.yaml}}\n"
+        "controller: {kind: none}\n"
+        "recipes:\n- {number: 1, name: default}\n- {number: 2, name: small, max_area_mm2: 500}\n"
     )
-    assert traced(RECTANGLE, "--config", config)[0]["status"] == "ok"
-    (record,) = traced(RECTANGLE, "--config", config, "--recipe", "small", status=3)
+    assert traced(comb, "--config", config)[0]["status"] == "ok"
+    (record,) = traced(comb, "--config", config, "--recipe", "small", status=3)
     assert record["reason"] == "area_out_of_limits"
-    assert "5000 mm²" in record["details"][0]
-    done = combtrace("trace", RECTANGLE, "--config", config, "--recipe", "huge")
+    assert "500 mm²" in record["details"][0]
+    done = called("trace", comb, "--config", config, "--recipe", "huge")
     assert done.returncode == 2
     assert "there are: default (1), small (2)" in done.stderr
 
 
-def test_the_worst_status_of_several_pictures_counts(tmp_path: Path) -> None:
+def test_the_worst_status_of_several_pictures_counts(tmp_path: Path, comb: Path) -> None:
     empty = tmp_path / "empty.png"
     cv2.imwrite(str(empty), np.full((200, 300), 30, np.uint8))
-    assert combtrace("trace", RECTANGLE, empty).returncode == 3
-    assert combtrace("trace", RECTANGLE, empty, tmp_path / "nowhere.png").returncode == 2
-    assert [record["status"] for record in traced(RECTANGLE, empty, tmp_path / "no.png", status=2)] == [
+    assert called("trace", comb, empty).returncode == 3
+    assert called("trace", comb, empty, tmp_path / "nowhere.png").returncode == 2
+    assert [record["status"] for record in traced(comb, empty, tmp_path / "no.png", status=2)] == [
         "ok",
         "refused",
         "error",
@@ -309,7 +318,7 @@ def test_an_unusable_file_is_one_clear_line_and_status_2(tmp_path: Path, name: s
     data = BAD[name]
     if data is not None:
         (tmp_path / name).write_bytes(data)
-    done = combtrace("trace", tmp_path / name)
+    done = called("trace", tmp_path / name)
     assert done.returncode == 2
     assert done.stdout == ""
     (line,) = done.stderr.splitlines()
@@ -318,7 +327,7 @@ def test_an_unusable_file_is_one_clear_line_and_status_2(tmp_path: Path, name: s
 
 
 def test_a_folder_is_no_picture(tmp_path: Path) -> None:
-    done = combtrace("trace", tmp_path)
+    done = called("trace", tmp_path)
     assert done.returncode == 2
     assert str(tmp_path) in done.stderr
 
@@ -331,8 +340,10 @@ def test_a_folder_is_no_picture(tmp_path: Path) -> None:
         ("deep.png", lambda grey: grey.astype(np.uint16) * 257),
     ],
 )
-def test_the_same_picture_in_another_form_gives_the_same_contour(tmp_path: Path, name: str, convert: Any) -> None:
-    grey = cv2.imread(str(RECTANGLE), cv2.IMREAD_GRAYSCALE)
+def test_the_same_picture_in_another_form_gives_the_same_contour(
+    tmp_path: Path, name: str, convert: Any, comb: Path
+) -> None:
+    grey = cv2.imread(str(comb), cv2.IMREAD_GRAYSCALE)
     cv2.imwrite(str(tmp_path / "grey.png"), grey)
     cv2.imwrite(str(tmp_path / name), convert(grey))
     plain, other = traced(tmp_path / "grey.png", tmp_path / name)
@@ -357,15 +368,15 @@ def test_the_same_picture_in_another_form_gives_the_same_contour(tmp_path: Path,
         (["--json", "/nowhere/x.jsonl"], "/nowhere/x.jsonl: cannot be written"),
     ],
 )
-def test_bad_usage_is_told_and_has_status_2(arguments: list[str], expected: str) -> None:
-    done = combtrace("trace", RECTANGLE, *arguments)
+def test_bad_usage_is_told_and_has_status_2(arguments: list[str], expected: str, comb: Path) -> None:
+    done = called("trace", comb, *arguments)
     assert done.returncode == 2
     assert expected in done.stderr
     assert "Traceback" not in done.stderr
 
 
 def test_a_picture_that_is_not_there_is_named_once(tmp_path: Path) -> None:
-    told = combtrace("trace", tmp_path / "none.png")
+    told = called("trace", tmp_path / "none.png")
     assert told.returncode == 2
     assert told.stderr.startswith(f"{tmp_path / 'none.png'}: cannot be read")
 
@@ -380,12 +391,12 @@ def test_a_region_of_interest_hides_what_lies_outside() -> None:
     assert cut["reason"] == "touches_border"
     assert "region of interest" in cut["details"][0]
     for wrong in ("1,2,3", "9,9,1,1"):
-        assert combtrace("trace", f"--roi-px={wrong}", RECTANGLE).returncode == 2
+        assert called("trace", f"--roi-px={wrong}", RECTANGLE).returncode == 2
 
 
 def test_a_refusal_is_told_in_russian_with_what_was_measured(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "black.png"), np.zeros((200, 300), np.uint8))
-    told = combtrace("trace", "--language", "ru", tmp_path / "black.png")
+    told = called("trace", "--language", "ru", tmp_path / "black.png")
     assert told.returncode == 3
     assert "отказ: 102 image_quality: Снимок нерезкий" in told.stdout
     assert "brightest parts reach 0 of 255" in told.stdout
@@ -406,26 +417,25 @@ def test_a_refusal_for_several_blocks_shows_both_outlines_below_its_caption(tmp_
         np.testing.assert_allclose(getattr(left, side)(axis=0), getattr(right, side)(axis=0), atol=6)
 
 
-def test_two_links_to_one_picture_each_get_their_outputs(tmp_path: Path) -> None:
+def test_two_links_to_one_picture_each_get_their_outputs(tmp_path: Path, comb: Path) -> None:
     links = [tmp_path / name for name in ("monday.jpg", "tuesday.jpg")]
     for link in links:
-        link.symlink_to(RECTANGLE)
+        link.symlink_to(comb)
     out = tmp_path / "out"
-    records = traced(*links, "--overlay", out, "--calibration", CALIBRATION, "--svg", out)
+    records = traced(*links, "--overlay", out, "--calibration", comb.with_name("calibration.yaml"), "--svg", out)
     assert [record["image"] for record in records] == [str(link) for link in links]
     names = {path.name for path in out.iterdir()}
     assert names == {f"{day}{end}" for day in ("monday", "tuesday") for end in ("-contour.png", ".svg")}
 
 
-def test_a_folder_stands_for_its_pictures_in_order_and_counts_what_it_passes_over(tmp_path: Path) -> None:
+def test_a_folder_stands_for_its_pictures_in_order_and_counts_what_it_passes_over(tmp_path: Path, comb: Path) -> None:
     folder = tmp_path / "day"
     (folder / "older").mkdir(parents=True)
-    small = cv2.imread(str(RECTANGLE), cv2.IMREAD_GRAYSCALE)[::2, ::2]
     for name in ("block10.png", "block9.PNG", "older/block1.png"):
-        cv2.imwrite(str(folder / name), small)
+        shutil.copy(comb, folder / name)
     for name in ("notes.txt", "calibration.yaml", ".hidden.png"):
         (folder / name).write_text("")
-    done = combtrace("trace", folder, "--json", "-", "--overlay", tmp_path / "seen")
+    done = called("trace", folder, "--json", "-", "--overlay", tmp_path / "seen")
     assert done.returncode == 0, done.stderr
     seen = [json.loads(line)["image"] for line in done.stdout.splitlines()]
     assert seen == [str(folder / "block9.PNG"), str(folder / "block10.png")]
@@ -433,9 +443,9 @@ def test_a_folder_stands_for_its_pictures_in_order_and_counts_what_it_passes_ove
     assert {path.name for path in (tmp_path / "seen").iterdir()} == {"block9-contour.png", "block10-contour.png"}
 
 
-def test_a_folder_with_one_picture_has_its_outputs_in_a_folder_too(tmp_path: Path) -> None:
+def test_a_folder_with_one_picture_has_its_outputs_in_a_folder_too(tmp_path: Path, comb: Path) -> None:
     (tmp_path / "in").mkdir()
-    (tmp_path / "in" / "block.jpg").symlink_to(RECTANGLE)
+    (tmp_path / "in" / "block.jpg").symlink_to(comb)
     traced(tmp_path / "in", "--overlay", tmp_path / "seen")
     assert (tmp_path / "seen" / "block-contour.png").is_file()
 
@@ -451,6 +461,6 @@ def test_a_folder_without_a_picture_is_an_error(
     for name in content:
         (folder / name).write_text("")
     name, *options = command.format(tmp_path).split()
-    done = combtrace(name, folder, *options, *(["--calibration", CALIBRATION] if name == "verify" else []))
+    done = called(name, folder, *options, *(["--calibration", CALIBRATION] if name == "verify" else []))
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert f"{folder}: holds no picture, {told}" in done.stderr

@@ -12,7 +12,7 @@ import pytest
 
 from service.daemon.control import MOST_STREAMS, ask
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import COMBTRACE, ENVIRONMENT, combtrace, jobs
+from tests.support.processes.processes import COMBTRACE, ENVIRONMENT, called, jobs
 
 RECIPES = "recipes: [{number: 1, name: a}, {number: 2, name: b, min_area_mm2: 1, max_area_mm2: 100}]\n"
 QUEUE = "{state_dir: state, queue_depth: 20}"
@@ -21,9 +21,10 @@ QUEUE = "{state_dir: state, queue_depth: 20}"
 NEVER_ANSWERS = "machine: {check_scans: 10000}"  # not within 100 s
 
 
-@pytest.fixture
-def cell(tmp_path: Path) -> Iterator[Cell]:
-    yield from _running(tmp_path, "")
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cell]:
+    """Each test leaves it ready."""
+    yield from _running(tmp_path_factory.mktemp("cell"), "")
 
 
 @pytest.fixture
@@ -66,7 +67,7 @@ def acknowledged(client: subprocess.Popen[str]) -> str:
 
 
 def trigger(cell: Cell, *options: str) -> subprocess.CompletedProcess[str]:
-    return combtrace("trigger", "--config", cell.folder / "config.yaml", *options)
+    return called("trigger", "--config", cell.folder / "config.yaml", *options)
 
 
 def waiting(cell: Cell, *options: str) -> subprocess.Popen[str]:
@@ -81,7 +82,7 @@ def test_a_trigger_is_acknowledged_and_its_end_told_by_line_and_status(cell: Cel
     assert re.fullmatch(r"ACK (\d+)\nDONE \1 \d+ \d+\n", done.stdout)
     (job,) = jobs(cell.journal)
     assert (job["trigger_kind"], job["outcome"]) == ("shell", "accepted")
-    shown = combtrace("jobs", "show", str(job["job_id"]), "--config", cell.folder / "config.yaml").stdout
+    shown = called("jobs", "show", str(job["job_id"]), "--config", cell.folder / "config.yaml").stdout
     assert "thickness 20.5 mm" in shown
     refused = trigger(cell, "--recipe", "2")
     assert re.fullmatch(r"ACK (\d+)\nFAIL \1 112 area_out_of_limits\n", refused.stdout)
@@ -93,10 +94,11 @@ def test_a_trigger_is_acknowledged_and_its_end_told_by_line_and_status(cell: Cel
 
 
 def test_a_halted_daemon_answers_nak_and_says_why(cell: Cell) -> None:
-    assert combtrace("halt", "--config", cell.folder / "config.yaml", "--reason", "blade").returncode == 0
+    assert called("halt", "--config", cell.folder / "config.yaml", "--reason", "blade").returncode == 0
     done = trigger(cell)
     assert (done.returncode, done.stdout) == (3, "NAK 121 not_ready\n")
     assert "halted: blade" in done.stderr
+    assert called("resume", "--config", cell.folder / "config.yaml").returncode == 0
 
 
 def test_a_trigger_that_waits_is_told_its_place_and_a_halt_still_finds_room(stuck: Cell) -> None:
@@ -153,10 +155,10 @@ def test_the_socket_refuses_numbers_that_are_none(cell: Cell) -> None:
             ask(cell.folder / "state", {"command": "trigger", **request})
     with pytest.raises(Exception, match="there is no job 77"):
         ask(cell.folder / "state", {"command": "end", "job": 77})
-    assert json.loads(combtrace("status", "--config", cell.folder / "config.yaml", "--json").stdout)["job"] is None
+    assert json.loads(called("status", "--config", cell.folder / "config.yaml", "--json").stdout)["job"] is None
 
 
 def test_without_a_daemon_it_says_so(tmp_path: Path) -> None:
-    done = combtrace("trigger", "--state-dir", tmp_path)
+    done = called("trigger", "--state-dir", tmp_path)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
     assert "no daemon listens. Check that it runs" in done.stderr

@@ -15,7 +15,7 @@ import pytest
 
 from service.cli.main import main
 from tests.support.processes.cell import SAMPLES, Cell
-from tests.support.processes.processes import combtrace, lines, until
+from tests.support.processes.processes import called, lines, until
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def files(cell: Cell, pattern: str) -> list[Path]:
 
 
 def run(cell: Cell, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return combtrace(*(numbered(cell, text) for text in arguments), "--config", cell.folder / "config.yaml")
+    return called(*(numbered(cell, text) for text in arguments), "--config", cell.folder / "config.yaml")
 
 
 def test_jobs_are_listed_and_filtered_while_the_daemon_runs(cell: Cell) -> None:
@@ -139,7 +139,7 @@ def test_a_frame_that_was_changed_since_is_not_replayed(cell: Cell, tmp_path: Pa
     cv2.imwrite(str(frame), pixels)
     text = (cell.folder / "config.yaml").read_text().replace("path: archive", f"path: {tmp_path / 'archive'}")
     (tmp_path / "config.yaml").write_text(text)
-    again = combtrace("replay", str(cell.number(2)), "--config", tmp_path / "config.yaml")
+    again = called("replay", str(cell.number(2)), "--config", tmp_path / "config.yaml")
     assert again.returncode == 2
     assert "is not the frame that was archived" in again.stderr
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.processes import processes
-from tests.support.processes.cell import SAMPLES, Cell
+from tests.support.processes.cell import Cell
 from tests.support.processes.processes import combtrace, jobs, until
 from tests.support.real_parts import missing
 
@@ -34,7 +34,6 @@ def clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_jobs_go_on_whichever_way_the_clock_jumps(tmp_path: Path, clock: Path) -> None:
     cell = Cell(
         tmp_path,
-        camera=f"{{kind: files, path: {SAMPLES / '1-rectangle.jpg'}}}",
         trigger_every_s=0.2,
         link=", heartbeat_timeout_s: 30",
         more="archive: {path: archive, min_free_bytes: 0}\n",

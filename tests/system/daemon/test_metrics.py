@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.processes.cell import Cell
+from tests.support.processes.cell import ON_SAMPLES, Cell
 from tests.support.processes.processes import free_port, until
 from tests.support.real_parts import need_program
 
@@ -32,7 +32,9 @@ def value(text: str, series: str) -> float:
 def text(tmp_path_factory: pytest.TempPathFactory) -> str:
     """What a daemon serves after some jobs."""
     port = free_port()
-    cell = Cell(tmp_path_factory.mktemp("cell"), trigger_every_s=0.2, more=f"metrics: {{port: {port}}}\n")
+    cell = Cell(
+        tmp_path_factory.mktemp("cell"), camera=ON_SAMPLES, trigger_every_s=0.2, more=f"metrics: {{port: {port}}}\n"
+    )
     try:
         cell.goes_on(2)
         until(lambda: value(served(port), 'combtrace_evidence_total{result="stored"}') >= 2, what="evidence")

@@ -12,7 +12,7 @@ from service.daemon.control import ask
 from service.jobs.executor import ROOM
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import Client, token_file
-from tests.support.processes.processes import combtrace, free_port, jobs, lines, until
+from tests.support.processes.processes import called, combtrace, free_port, jobs, lines, until
 from tests.support.processes.small_disk import CannotMount, fill, mounted, remount
 from tests.support.real_parts import missing
 
@@ -118,7 +118,7 @@ def test_while_it_waits_it_is_the_only_one_and_ends_when_told_to(disk: Path, tmp
     config = ("--config", tmp_path / "config.yaml")
     try:
         until(lambda: "-> Error" in cell.service.text, what="Error")
-        status = until(lambda: combtrace("status", *config), what="an answer")
+        status = until(lambda: called("status", *config), what="an answer")
         assert (status.returncode, "storage_full" in status.stdout) == (1, True), status.stdout + status.stderr
         second = combtrace("run", *config)
         assert (second.returncode, "another combtrace" in second.stderr) == (2, True), second.stderr

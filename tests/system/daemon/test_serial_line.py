@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import combtrace, until
+from tests.support.processes.processes import called, until
 from tests.support.processes.terminal import Terminal
 
 
@@ -98,8 +98,8 @@ def test_the_trigger_command_waits_for_the_end(cell: Cell, terminal: Terminal, t
     thread = threading.Thread(target=cable)
     thread.start()
     try:
-        done = combtrace("trigger", "--port", other.name, "--timeout-s", "20")
-        refused = combtrace("trigger", "--port", other.name, "--recipe", "9", "--timeout-s", "20")
+        done = called("trigger", "--port", other.name, "--timeout-s", "20")
+        refused = called("trigger", "--port", other.name, "--recipe", "9", "--timeout-s", "20")
     finally:
         stop.set()
         thread.join()

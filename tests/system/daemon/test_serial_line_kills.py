@@ -18,7 +18,7 @@ import pytest
 
 from service.cli.errors import EXIT_FAILED, EXIT_OK
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import Process, combtrace, jobs, until
+from tests.support.processes.processes import Process, called, jobs, until
 from tests.support.processes.terminal import Terminal
 
 SLOW_CHECK = "machine: {check_scans: 60}"  # 0.6 s from the commit to the answer
@@ -93,9 +93,9 @@ def test_a_job_in_flight_at_a_kill_is_told_and_is_as_complete_as_any_other(tmp_p
         assert first["recipe_digest"] == other["recipe_digest"] is not None
         assert json.loads(first["transfer"])["crc32"]
         config = cell.folder / "config.yaml"
-        replayed = combtrace("replay", str(first_number), "--config", config)
+        replayed = called("replay", str(first_number), "--config", config)
         assert "byte for byte as they were" in replayed.stdout, replayed.stderr
-        shown = combtrace("jobs", "show", str(first_number), "--config", config).stdout
+        shown = called("jobs", "show", str(first_number), "--config", config).stdout
         assert f"{first_number}-overlay.jpg" in shown
 
 
@@ -182,7 +182,7 @@ def test_the_trigger_command_hears_the_end_after_a_kill_and_a_restart(tmp_path: 
 
 
 def test_the_trigger_command_ends_where_nobody_serves_the_line(tmp_path: Path, terminal: Terminal) -> None:
-    ended = combtrace("trigger", "--port", terminal.name)
+    ended = called("trigger", "--port", terminal.name)
     assert ended.returncode == EXIT_FAILED
     assert "no ACK within 10 s. Check that the daemon runs and serves this line" in ended.stderr
 

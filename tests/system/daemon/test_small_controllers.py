@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.processes.cell import Cell
+from tests.support.processes.cell import ON_SAMPLES, Cell
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,13 @@ from tests.support.processes.cell import Cell
     ],
 )
 def test_jobs_are_accepted_by_a_controller_that_is_not_as_most_are(tmp_path: Path, machine: str, link: str) -> None:
-    cell = Cell(tmp_path, trigger_every_s=0.2, scenario=f"machine: {{{machine}}}\n", link=f", {link}" if link else "")
+    cell = Cell(
+        tmp_path,
+        camera=ON_SAMPLES,
+        trigger_every_s=0.2,
+        scenario=f"machine: {{{machine}}}\n",
+        link=f", {link}" if link else "",
+    )
     try:
         cell.goes_on(3)
     finally:

@@ -14,7 +14,7 @@ import pytest
 from service.cli.daemon.run import FILE_THREADS
 from tests.soak.long_run import run
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import ENVIRONMENT, combtrace, jobs, until
+from tests.support.processes.processes import ENVIRONMENT, called, jobs, until
 from tests.support.processes.small_disk import CannotMount, fill, mounted
 from tests.support.real_parts import missing
 
@@ -114,7 +114,7 @@ def test_a_damaged_journal_is_set_aside_and_numbers_and_evidence_go_on(tmp_path:
         assert (next(tmp_path.glob("journal.sqlite.damaged-*"))).exists()
         new = [job["job_id"] for job in jobs(cell.journal) if job["trigger_kind"] != "found"]
         assert min(new) > highest, "found: the last one, taken back as the controller knew of it"
-        again = combtrace("replay", str(second), "--config", tmp_path / "config.yaml")
+        again = called("replay", str(second), "--config", tmp_path / "config.yaml")
         assert "byte for byte as they were" in again.stdout, again.stderr
     finally:
         cell.stop()

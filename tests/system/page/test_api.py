@@ -16,7 +16,7 @@ import pytest
 
 from service.daemon.control import ask
 from service.web.models import Drawing, Job, Jobs, Notes, Reasons, ServiceState
-from tests.support.processes.cell import Cell
+from tests.support.processes.cell import ON_SAMPLES, Cell
 from tests.support.processes.page_client import OTHER_TOKEN, TOKEN, Client, token_file
 from tests.support.processes.processes import free_port, until
 
@@ -51,7 +51,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     folder, port = tmp_path_factory.mktemp("page"), free_port()
     token_file(folder)
     more = f"page: {{port: {port}, token_file: tokens, names: [cutter.plant.example]}}\n"
-    cell = Cell(folder, triggers="[]", trigger_every_s=None, more=more)
+    cell = Cell(folder, triggers="[]", camera=ON_SAMPLES, trigger_every_s=None, more=more)
     try:
         cell.ready()
         yield Served(cell, Client(port))

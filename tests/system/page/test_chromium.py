@@ -15,7 +15,7 @@ import pytest
 from playwright.sync_api import Browser, Page, Route, expect, sync_playwright
 
 from service.reasons import Language, Reason
-from tests.support.processes.cell import Cell
+from tests.support.processes.cell import ON_SAMPLES, Cell
 from tests.support.processes.page_client import TOKEN, Client, token_file
 from tests.support.processes.processes import free_port, until
 from tests.support.real_parts import need_program
@@ -90,7 +90,7 @@ def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cell, Clien
     folder, port = tmp_path_factory.mktemp("page"), free_port()
     token_file(folder)
     more = f"page: {{port: {port}, token_file: tokens}}\n"
-    started = Cell(folder, triggers="[]", trigger_every_s=None, more=more)
+    started = Cell(folder, triggers="[]", camera=ON_SAMPLES, trigger_every_s=None, more=more)
     try:
         started.ready()
         yield started, Client(port)

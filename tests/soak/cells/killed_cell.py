@@ -118,7 +118,7 @@ class KilledCell:
         killing = self.killing
         (self.folder / "config.yaml").write_text(
             "camera: {kind: files, path: combs, loop: true}\n"
-            "calibration: {file: combs/calibration.yaml}\n"
+            "calibration: {file: combs.yaml}\n"
             f"controller: {{kind: modbus-{killing.transport}, port: {port}, timeout_s: 0.3,"
             f" poll_period_s: 0.01, ack_timeout_s: 1, word_order: {killing.word_order},"
             f" payload_capacity: {killing.payload_capacity}, valid_for_s: {self.valid_for_s}}}\n"
@@ -134,7 +134,7 @@ class KilledCell:
         return frozenset(KNOWN)
 
     def _traced(self) -> frozenset[Rings]:
-        pictures = sorted(self.combs.glob("*.png"))
+        pictures = sorted(self.combs.iterdir())
         table = self.folder / "known.json"
         done = combtrace(
             "trace", *pictures, "--config", self.folder / "config.yaml", "--json", table, bound_s=PATIENT_S

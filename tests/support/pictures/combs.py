@@ -24,11 +24,11 @@ def comb(columns: int, rows: int) -> np.ndarray:
 
 
 def write_combs(folder: Path) -> Path:
-    """Make the folder, with a picture of each size and `calibration.yaml`."""
+    """Make the folder, with a picture of each size; their calibration lies beside it, under its name and `.yaml`."""
     folder.mkdir()
     for number, (columns, rows) in enumerate(SIZES):
         cv2.imwrite(str(folder / f"{number}.png"), comb(columns, rows))
-    (folder / "calibration.yaml").write_text(
+    folder.with_suffix(".yaml").write_text(
         "version: 1\nkind: simple\nimage_width: 320\nimage_height: 240\nmm_per_pixel: 0.5\nplane_height_mm: 20\n"
         "origin_px: [0, 0]\nrotation_deg: 0\n"
     )

@@ -35,8 +35,9 @@ class Cell:
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
         self._trigger_every += ("--recipe", str(recipe))
-        seen = SAMPLES if camera else write_combs(folder / "combs")
-        camera = camera or f"{{kind: files, path: {seen}, loop: true}}"
+        if not camera:
+            combs = write_combs(folder / "combs")
+            camera, calibration = f"{{kind: files, path: {combs}, loop: true}}", calibration or folder / "combs.yaml"
         self.folder = folder
         self.scenario = scenario  # the controller's, from its next start on
         self.port = free_port()
@@ -44,7 +45,7 @@ class Cell:
         self.accepted = folder / "accepted.jsonl"
         (folder / "config.yaml").write_text(
             f"camera: {camera}\n"
-            f"calibration: {{file: {calibration or seen / 'calibration.yaml'}}}\n"
+            f"calibration: {{file: {calibration or SAMPLES / 'calibration.yaml'}}}\n"
             f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: 0.5, ack_timeout_s: 1{link}}}\n"
             f"triggers: {triggers}\n"
             f"service: {service}\n"

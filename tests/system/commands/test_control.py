@@ -15,7 +15,7 @@ from pymodbus.client import ModbusTcpClient
 from service.daemon.control import ask
 from tests.support.nobody import needs_root, python_as_nobody
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import called, until
+from tests.support.processes.processes import called, combtrace, until
 from tests.support.processes.terminal import Terminal
 
 SERVICE_BLOCK, OWNER = 16, 11
@@ -105,7 +105,7 @@ def test_a_halt_is_done_whatever_its_reason_holds(lasting: Cell) -> None:
     with connected(lasting) as client:
         client.sendall(b'{"command": "halt", "reason": "\\udce4"}\n')
         assert json.loads(client.makefile("rb").readline()) == {"ok": True, "state": "Halted"}
-    assert "udce4" in called("status", *config).stdout
+    assert "udce4" in combtrace("status", *config).stdout
     assert called("resume", *config).returncode == 0
 
 

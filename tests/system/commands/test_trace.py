@@ -197,7 +197,7 @@ def test_no_output_takes_the_place_of_a_picture_or_of_another_output(
 
 
 def test_a_name_that_ends_in_a_slash_is_a_folder_of_one_picture_too(tmp_path: Path, comb: Path) -> None:
-    calibration = ("--calibration", comb.with_name("calibration.yaml"))
+    calibration = ("--calibration", comb.parent.with_suffix(".yaml"))
     done = called("trace", comb, *calibration, "--overlay", f"{tmp_path}/seen/", "--svg", f"{tmp_path}/out/")
     assert done.returncode == 0, done.stderr
     assert [path.name for path in (tmp_path / "seen").iterdir()] == ["0-contour.png"]
@@ -238,7 +238,7 @@ def test_no_config_file_that_happens_to_lie_around_is_read(tmp_path: Path, comb:
 def test_a_recipe_is_found_by_name_and_its_limits_refuse(tmp_path: Path, comb: Path) -> None:
     config = tmp_path / "config.yaml"
     config.write_text(
-        f"camera: {{kind: files, path: x}}\ncalibration: {{file: {comb.parent}/calibration.yaml}}\n"
+        f"camera: {{kind: files, path: x}}\ncalibration: {{file: {comb.parent}.yaml}}\n"
         "controller: {kind: none}\n"
         "recipes:\n- {number: 1, name: default}\n- {number: 2, name: small, max_area_mm2: 500}\n"
     )
@@ -422,7 +422,7 @@ def test_two_links_to_one_picture_each_get_their_outputs(tmp_path: Path, comb: P
     for link in links:
         link.symlink_to(comb)
     out = tmp_path / "out"
-    records = traced(*links, "--overlay", out, "--calibration", comb.with_name("calibration.yaml"), "--svg", out)
+    records = traced(*links, "--overlay", out, "--calibration", comb.parent.with_suffix(".yaml"), "--svg", out)
     assert [record["image"] for record in records] == [str(link) for link in links]
     names = {path.name for path in out.iterdir()}
     assert names == {f"{day}{end}" for day in ("monday", "tuesday") for end in ("-contour.png", ".svg")}

@@ -114,7 +114,7 @@ def several_blocks(traced: Trace | None, limits: Limits) -> Finding | None:
 
 
 def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | None:
-    """Contour and busy part of the picture farther apart than `limit` pitches, or a bump or dent that chips make."""
+    """Contour and busy picture farther apart than `limit` pitches, an edge without cells, or a chip's bump or dent."""
     if traced is None or traced.disagreement is None or limit is None:
         return None
     if traced.narrow is not None:
@@ -126,6 +126,14 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
             f"The contour {what} by {narrow.depth_pitches:.1f} cells over {narrow.width_pitches:.1f} cells near "
             f"({x:.0f}, {y:.0f}) px: so narrow a part may be a chip, a strip or a label on the block, or cells lost. "
             "Look at the overlay; take it away, or set max_disagreement_pitches: 0 for parts that narrow.",
+        )
+    if traced.bare is not None:
+        x, y = traced.bare.place_px
+        return Finding(
+            Refusal.METHODS_DISAGREE,
+            f"Along {traced.bare.length_pitches:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, no cells lie "
+            "just within it: it may run over the table, a label or along a cable there. Look at the overlay; clear the "
+            "edge, check light and table, or set max_disagreement_pitches: 0 for blocks with filled cells.",
         )
     apart = traced.disagreement
     advice = "Look at the overlay; check light and table, and that nothing lies against the block."

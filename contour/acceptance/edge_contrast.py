@@ -67,10 +67,7 @@ def _longest(planes: list[Bytes], ring: Ring, out_px: float, *, dark: bool) -> A
 
 def _alike(planes: list[Bytes], lengths: RingLengths, at: Float64s, out_px: float, *, dark: bool) -> Bools:
     """At which lengths along a ring what lies beyond is nowhere told from the walls, shape (N,)."""
-    place, reach = lengths.at(at), _SPACING * abs(out_px)
-    along = lengths.at(at + reach) - lengths.at(at - reach)
-    along *= out_px / np.maximum(np.hypot(*along.T)[:, None], 1e-9)
-    outward = np.column_stack([along[:, 1], -along[:, 0]])
+    place, outward = lengths.at(at), out_px * lengths.normals(at, _SPACING * abs(out_px))
     tails = [100.0 - _CELLS, 100.0 - _WALLS] if dark else [_CELLS, _WALLS]
     sampled = [
         [

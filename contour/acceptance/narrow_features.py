@@ -1,11 +1,13 @@
 """Bumps and dents of an outline too narrow to be told from a chip that clings to the block, or from cells lost; and
-wider bumps that stand upright on an edge, as a strip of cells does that was cut off, or a printed label.
+wider bumps that stand upright on an edge, as a strip of cells does that was cut off, or a printed label; and arms of
+any length and direction that are as narrow as a cable, or as a strip and not pointed.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from contour.geometry.arrays import Float64s, Indices
@@ -24,6 +26,11 @@ _SLOPE = 0.5 * float(np.tan(np.radians(_ANGLE_DEG)))
 # What stands out by no more than this times what the edges on its two sides are apart is a step from one to the other.
 _STEP = 1.5
 _SPACING, _LONGEST = 0.25, 20.0
+# Arms: narrower than this, longer than that, and with room for a disc of that radius at the end. A corner of 13 degrees
+# is as narrow as the first over as much; corners and horns as narrow as the second are pointed.
+_ARMS = ((1.5, 6.0, 0.0), (3.5, 2.0, 0.95))
+_ARM_END = 1.5
+_PITCH_SAMPLES = 6.0
 # From foot to foot the narrowest is told: a wider one, farther out on the same edge, is no deeper by this.
 _DEEPER = 0.05
 
@@ -50,7 +57,32 @@ def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
     A corner is none, nor is the end of an arm: there the edges beside it run another way.
     """
     found = [one for ring in contour.rings for one in [_deepest(ring, pitch_px)] if one is not None]
+    found += _arms(contour, pitch_px)
     return max(found, key=lambda one: one.depth_pitches) if found else None
+
+
+def _arms(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
+    """Parts of a contour far from all that is wider than they are."""
+    step = pitch_px / _PITCH_SAMPLES
+    first = contour.exterior.min(axis=0) - pitch_px
+    width, height = np.ceil((contour.exterior.max(axis=0) + pitch_px - first) / step).astype(int).tolist()
+    drawn = np.zeros((height, width), np.uint8)
+    cv2.fillPoly(drawn, [np.rint((ring - first) / step).astype(np.int32) for ring in contour.rings], 1)
+    room = np.asarray(cv2.distanceTransform(drawn, cv2.DIST_L2, 3), np.float32) / np.float32(_PITCH_SAMPLES)
+    found = []
+    for narrow, long, blunt in _ARMS:
+        wide = (room >= 0.5 * narrow).astype(np.uint8)
+        away = np.minimum(cv2.distanceTransform(1 - wide, cv2.DIST_L2, 3), width + height) / _PITCH_SAMPLES
+        away -= 0.5 * narrow
+        count, parts = cv2.connectedComponents(((drawn > 0) & (away > 0.5 * long)).astype(np.uint8))
+        for part in range(1, count):
+            y, x = np.unravel_index(int(np.where(parts == part, away, 0.0).argmax()), away.shape)
+            end = round(_ARM_END * _PITCH_SAMPLES)
+            disc = float(room[max(0, y - end) : y + end + 1, max(0, x - end) : x + end + 1].max())
+            if away[y, x] > long and disc >= blunt:
+                place_x, place_y = (first + step * np.array([x, y])).tolist()
+                found.append(NarrowFeature(float(away[y, x]), narrow, (place_x, place_y), True))
+    return found
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contour.acceptance.bare_edge import BareEdge, bare_edge
 from contour.acceptance.disagreement import Disagreement, disagreement
 from contour.acceptance.edge_contrast import AlikeEdge, alike_edge
 from contour.acceptance.narrow_features import NarrowFeature, narrow_feature
@@ -25,7 +26,7 @@ class CheckedTrace:
 
     `quality` says how well its walls are seen. `disagreement` is the widest one with the busy part of the picture, None
     without a pitch. `narrow`: its deepest bump or dent that is no wider than a chip. `alike`: the longest part of its
-    edge along which the table is as light as the walls.
+    edge along which the table is as light as the walls. `bare`: the longest part of its edge without cells behind it.
     """
 
     trace: Trace
@@ -33,6 +34,7 @@ class CheckedTrace:
     disagreement: Disagreement | None = None
     narrow: NarrowFeature | None = None
     alike: AlikeEdge | None = None
+    bare: BareEdge | None = None
 
     def moved(self, first: Float64s) -> CheckedTrace:
         """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
@@ -40,7 +42,8 @@ class CheckedTrace:
         apart = None if self.disagreement is None else self.disagreement.moved(x, y)
         narrow = None if self.narrow is None else self.narrow.moved(x, y)
         alike = None if self.alike is None else self.alike.moved(x, y)
-        return replace(self, trace=self.trace.moved(first), disagreement=apart, narrow=narrow, alike=alike)
+        bare = None if self.bare is None else self.bare.moved(x, y)
+        return replace(self, trace=self.trace.moved(first), disagreement=apart, narrow=narrow, alike=alike, bare=bare)
 
 
 def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> CheckedTrace:
@@ -49,7 +52,7 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
     `picture` and `rectifier` are those it was traced with.
     """
     quality = block_quality(picture, traced.light, traced.contour, traced.pitch_px)
-    apart = narrow = alike = None
+    apart = narrow = alike = bare = None
     if traced.pitch_px is not None:
         flat = None if traced.look is None else traced.look.lit.astype(np.uint8)
         apart = disagreement(picture, _bent(traced, traced.pitch_px, rectifier), traced.pitch_px, flat)
@@ -57,7 +60,8 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
         if traced.evidence is not None:
             narrow = narrow_feature(traced.contour, traced.pitch_px)
             alike = alike_edge(picture, traced.contour, traced.pitch_px, dark=traced.polarity == "dark")
-    return CheckedTrace(traced, quality, apart, narrow, alike)
+            bare = bare_edge(traced, traced.pitch_px)
+    return CheckedTrace(traced, quality, apart, narrow, alike, bare)
 
 
 def _bent(traced: Trace, pitch_px: float, rectifier: Rectifier | None) -> Contour:

@@ -42,6 +42,14 @@ class RingLengths:
         edge, share = self.places(np.mod(lengths, self.length))
         return np.asarray(self.ring[edge] + share[:, None] * self.edges[edge])
 
+    def normals(self, lengths: Float64s, reach: float) -> Float64s:
+        """Unit normals at lengths, of the chord over so much on either side, shape (M, 2): out of a ring with positive
+        shoelace, into one with negative.
+        """
+        along = self.at(lengths + reach) - self.at(lengths - reach)
+        along /= np.maximum(np.hypot(*along.T)[:, None], np.finfo(float).tiny)
+        return np.column_stack([along[:, 1], -along[:, 0]])
+
     def path(self, start: float, end: float) -> Float64s:
         """The ring from one length to a later one, no farther on than its end: both places and the vertices between."""
         between = self.ring[(self.starts > start) & (self.starts < end)]

@@ -131,6 +131,33 @@ def test_a_step_is_none(depth: float, slant: float) -> None:
     assert found(shapely.Polygon(step), 25.0) is None
 
 
+@pytest.mark.parametrize("long", [8.0, 25.0, 60.0])
+def test_a_thread_of_any_length_is_found_at_its_end(long: float) -> None:
+    """As a cable makes that was taken for a wall; it leaves the block in a bend."""
+    path = shapely.LineString([(690, 480), (740, 500), (760 + 0.4 * long * PITCH, 480), (760 + long * PITCH, 560)])
+    one = found(BLOCK | path.buffer(0.4 * PITCH))
+    assert one is not None
+    assert one.outwards
+    assert one.depth_pitches > 0.8 * long
+    assert one.place_px == pytest.approx((760 + long * PITCH, 560), abs=1.5 * PITCH)
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 25.0])
+@pytest.mark.parametrize("width", [2.2, 3.0])
+def test_a_strip_of_cells_at_a_corner_is_found_whatever_way_it_lies(width: float, turn_deg: float) -> None:
+    strip = shapely.LineString([(690, 490), (690 + 9 * PITCH, 490 + 5 * PITCH)]).buffer(
+        0.5 * width * PITCH, cap_style="flat"
+    )
+    one = found(BLOCK | strip, turn_deg)
+    assert one is not None
+    assert one.outwards
+    assert 4.0 < one.depth_pitches < 11.0
+
+
+def test_what_is_nowhere_wider_than_a_thread_is_one() -> None:
+    assert found(shapely.LineString([(0, 0), (400, 30)]).buffer(0.5 * PITCH)) is not None
+
+
 def test_curves_are_none() -> None:
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     for lobes, strength in ((2, 0.15), (3, 0.1), (5, 0.06)):

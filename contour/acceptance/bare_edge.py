@@ -1,0 +1,102 @@
+"""Parts of an outline that have no cells behind them: there it runs over the table, over a label or along a cable.
+
+Just within a cut edge light changes from cell to cell as it does farther in. Where it does not, and what lies on both
+sides of the outline is alike, the outline has left the block. Where the two differ something may end there, a filled
+cell for one; but not over a few cells, for then what fills them is told as such.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from contour.edge.ring_places import runs_of
+from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import signed_area
+from contour.image.pixel_sampling import sample_at
+from contour.tracing.trace import Trace
+
+# Cell pitches: along the outline, and out of it.
+_SPACING = 0.1
+_WITHIN, _FARTHER_IN, _BEYOND = (-0.35, -0.55, -0.75), (-1.5, -2.0), (0.4, 0.6, 0.8)
+# No line through comb goes so far without a wall; what is finer is noise. Over how much of the edge the comb farther in
+# is taken together, and how near to what hides or fills it nothing is said.
+_CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
+# Of the changes of light farther in: those where no cells are, and what both sides differ by that are alike.
+_QUIET, _ALIKE = 0.45, 0.3
+# How long such parts are where both sides are alike, and where they are not, pitches.
+_LONG_ALIKE, _LONG = 1.0, 2.5
+
+
+@dataclass(frozen=True)
+class BareEdge:
+    """A part of an outline without cells behind it: its length, cell pitches, and its middle, pixels (x, y)."""
+
+    length_pitches: float
+    place_px: tuple[float, float]
+
+    def moved(self, x: float, y: float) -> BareEdge:
+        """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
+        return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
+
+
+def bare_edge(traced: Trace, pitch_px: float) -> BareEdge | None:
+    """The longest part of a traced outline without cells behind it; None where none is long.
+
+    What the trace's evidence tells as hidden or filled is left out.
+    """
+    fine = max(1, round(_FINE * pitch_px))
+    light = np.asarray(cv2.blur(traced.light, (fine, fine)), np.uint8)
+    out_px = float(np.sign(signed_area(traced.contour.exterior))) * pitch_px
+    found: list[BareEdge] = []
+    for number, ring in enumerate(traced.contour.rings):
+        lengths = RingLengths.of(ring)
+        at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
+        bare, alike = _bare(light, lengths, at, out_px)
+        bare &= ~_known(traced, number, at, _BESIDE * pitch_px)
+        for part, long in ((bare & alike, _LONG_ALIKE), (bare, _LONG)):
+            run = max(runs_of(part), key=len) if part.any() else at[:0]
+            if len(run) * _SPACING > long:
+                x, y = lengths.at(at[run[len(run) // 2 :][:1]])[0].tolist()
+                found.append(BareEdge(_SPACING * len(run), (x, y)))
+    return max(found, key=lambda one: one.length_pitches) if found else None
+
+
+def _known(traced: Trace, ring: int, at: Float64s, beside_px: float) -> Bools:
+    """Which lengths along a ring lie where the edge is hidden or filled, or beside that, shape (N,)."""
+    told = [one for one in traced.evidence or () if one.ring == ring and (one.state != "seen" or one.by is not None)]
+    within = [(at > one.from_px - beside_px) & (at < one.to_px + beside_px) for one in told]
+    return np.asarray(np.any(within, axis=0) if within else np.zeros(at.shape, np.bool_))
+
+
+def _bare(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Bools, Bools]:
+    """At which lengths along a ring no cells lie just within, and where both sides are alike, shape (N,) both.
+
+    `out_px`: the cell pitch, negative where the ring's material lies to the right of its direction.
+    """
+    place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * abs(out_px))
+
+    def seen(pitches: tuple[float, ...]) -> Float64s:
+        x, y = (place[:, axis] + np.array(pitches)[:, None] * outward[:, axis] for axis in (0, 1))
+        return sample_at(light, x, y)
+
+    within, beyond = seen(_WITHIN), seen(_BEYOND)
+    comb = _over(_changes(seen(_FARTHER_IN)).max(axis=0), _COMB_OVER).mean(axis=1)
+    bare = _changes(within).max(axis=0) < _QUIET * comb
+    return bare, np.abs(within.mean(axis=0) - beyond.mean(axis=0)) < _ALIKE * comb
+
+
+def _changes(light: Float64s) -> Float64s:
+    """What light along lines beside a ring, (K, N), changes by over a cell about each place, (K, N)."""
+    around = [_over(line, _CELL) for line in light]
+    return np.stack([line.max(axis=1) - line.min(axis=1) for line in around])
+
+
+def _over(values: Float64s, pitches: float) -> Float64s:
+    """Values at places around a ring, (N,), with those on both sides of each, so many pitches in all, (N, M)."""
+    half = round(0.5 * pitches / _SPACING)
+    turned = np.take(values, np.arange(-half, len(values) + half), mode="wrap")
+    return np.lib.stride_tricks.sliding_window_view(turned, 2 * half + 1)

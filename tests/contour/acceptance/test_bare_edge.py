@@ -1,0 +1,113 @@
+"""Parts of an outline without cells behind them."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+import shapely
+from numpy.typing import NDArray
+
+from contour.acceptance.acceptance import View, judge
+from contour.acceptance.bare_edge import BareEdge, bare_edge
+from contour.acceptance.disagreement import Disagreement
+from contour.acceptance.findings import Limits, Refusal
+from contour.acceptance.trace_check import CheckedTrace
+from contour.edge.stretches import Hider, State, Stretch
+from contour.geometry.rings import Contour, Ring, oriented
+from contour.polygon.polygon import Polygon
+from contour.tracing.trace import Trace
+
+PITCH = 16.0
+BLOCK = shapely.box(80, 80, 400, 336)
+HOLE = shapely.box(160, 160, 240, 240)
+
+
+def ring(shape: shapely.Polygon) -> Ring:
+    return oriented(np.array(shape.exterior.coords)[:-1], counter_clockwise=False)
+
+
+def comb(shape: shapely.Polygon, table: int, *, walls: int = 200, cells: int = 60) -> NDArray[np.uint8]:
+    """A grid for cells within the shape, on a table: grey levels."""
+    lines = np.arange(480) % int(PITCH) < 3
+    grid = np.where(lines | lines[:, None], walls, cells).astype(np.uint8)
+    block = np.zeros((480, 480), np.uint8)
+    rings = [np.array(one.coords)[:-1] for one in (shape.exterior, *shape.interiors)]
+    cv2.fillPoly(block, [np.rint(one).astype(np.int32) for one in rings], 1)
+    return np.where(block > 0, grid, np.uint8(table))
+
+
+def traced(picture: NDArray[np.uint8], outline: shapely.Polygon, *evidence: Stretch) -> Trace:
+    exterior, holes = ring(outline), [np.array(one.coords)[:-1] for one in outline.interiors]
+    contour = Contour(exterior, tuple(oriented(hole, counter_clockwise=True) for hole in holes))
+    return Trace("wall-tips", "bright", PITCH, contour, picture, evidence=evidence)
+
+
+def found(picture: NDArray[np.uint8], outline: shapely.Polygon, *evidence: Stretch) -> BareEdge | None:
+    return bare_edge(traced(picture, outline, *evidence), PITCH)
+
+
+@pytest.mark.parametrize("table", [10, 60, 130, 200, 250])
+def test_along_a_cut_edge_cells_lie_behind_it_all_around(table: int) -> None:
+    holed = BLOCK - HOLE
+    assert found(comb(holed, table), holed) is None
+    assert found(comb(holed, table, walls=30, cells=150), holed) is None
+
+
+@pytest.mark.parametrize("table", [10, 130, 250])
+def test_where_an_outline_bulges_over_the_table_it_is_told_with_its_place(table: int) -> None:
+    bulge = shapely.Polygon([(400, 120), (400 + 0.9 * PITCH, 160), (400 + 0.9 * PITCH, 200), (400, 240)])
+    one = found(comb(BLOCK, table), BLOCK | bulge)
+    assert one is not None
+    assert one.length_pitches == pytest.approx(3.0, abs=1.5)
+    assert one.place_px == pytest.approx((400 + 0.9 * PITCH, 180), abs=1.5 * PITCH)
+    assert one.moved(10.0, 20.0).place_px == (one.place_px[0] + 10.0, one.place_px[1] + 20.0)
+
+
+def test_a_corner_drawn_where_the_block_is_rounded_is_told() -> None:
+    rounded = BLOCK - (shapely.box(320, 256, 410, 346) - shapely.Point(320, 256).buffer(80))
+    one = found(comb(rounded, 20), BLOCK)
+    assert one is not None
+    assert one.place_px == pytest.approx((400, 336), abs=2.5 * PITCH)
+
+
+def test_a_hole_drawn_too_small_is_told() -> None:
+    one = found(comb(BLOCK - HOLE.buffer(PITCH), 20), BLOCK - HOLE)
+    assert one is not None
+    assert shapely.Point(one.place_px).distance(HOLE.exterior) < 1.0
+
+
+def filled(height: float) -> NDArray[np.uint8]:
+    """A block with cells filled at its right edge, over so many pitches; they are as dark as nothing else is."""
+    picture = comb(BLOCK, 130)
+    half = round(0.5 * height * PITCH)
+    picture[208 - half : 208 + half, 340:400] = 15
+    return picture
+
+
+def test_a_filled_cell_ends_as_the_edge_does_but_not_several() -> None:
+    assert found(filled(2.0), BLOCK) is None
+    assert found(filled(6.0), BLOCK) is not None
+
+
+@pytest.mark.parametrize(("state", "by"), [("seen", "compound"), ("bridged", "object"), ("covered", "object")])
+def test_what_is_told_to_fill_or_to_hide_the_edge_is_left_out(state: State, by: Hider) -> None:
+    outline = ring(BLOCK)
+    at = [float(np.abs(outline[:k] - np.roll(outline, -1, axis=0)[:k]).sum()) for k in range(5)]
+    right = next(k for k in range(4) if outline[k][0] == outline[(k + 1) % 4][0] == 400.0)
+    assert found(filled(6.0), BLOCK, Stretch(0, at[right], at[right + 1], state, by, 1.0)) is None
+    assert found(filled(6.0), BLOCK, Stretch(0, at[right], at[right + 1], "seen", None, 1.0)) is not None
+
+
+def test_such_a_contour_is_refused_with_the_place_and_the_next_step_where_the_picture_is_asked() -> None:
+    block = traced(comb(BLOCK, 20), BLOCK)
+    agrees = Disagreement(0.1, (0.0, 0.0), True, 0.0)
+    checked = CheckedTrace(block, disagreement=agrees, bare=BareEdge(3.2, (120.0, 80.0)))
+    polygon = Polygon(block.contour, None, 1e4, None, None)
+    findings = judge(polygon, View((480, 480)), Limits(max_disagreement_pitches=2.0), traced=checked)
+    (text,) = [finding.text for finding in findings if finding.refusal == Refusal.METHODS_DISAGREE]
+    assert "3.2 cells" in text
+    assert "(120, 80) px" in text
+    assert "Look at the overlay" in text
+    free = judge(polygon, View((480, 480)), Limits(), traced=checked)
+    assert not [finding for finding in free if finding.refusal == Refusal.METHODS_DISAGREE]

@@ -4,12 +4,13 @@ Between each two witnesses that lie on the outline there is a stretch of it. Its
 variance that is a sum of squares:
 
 - blur: a blurred edge shifts as one where light, side walls and table differ; no number of witnesses averages that out;
-- dark: once more where walls are dark, whose ends fade into the shadow beside them;
+- clipped: once more where walls are at full scale, for half of what can be seen of their height lies farther out;
 - leverage: witnesses scatter as they show; a fit divides that by the root of their number, less so beyond the last of
   them and at the corners of short edges;
 - gap: where no witness lies for more than a pitch, the outline is a guess that grows with the gap, if slowly: most gaps
   lie in straight edges;
-- misfit: neighbours in a row that lie off on one side say that the outline has left the cut;
+- misfit: neighbours in a row that lie off on one side, farther than scatter has them, say that the outline has left
+  the cut;
 - outside: a wall end beyond the outline is material that the outline leaves out, even if it is a single one.
 
 The bound is the length within which these normal laws together put 95 % of the outline. All terms are lengths in the
@@ -36,6 +37,9 @@ LEAST_PX = 0.15
 _CAP_PITCHES = 0.5
 """A witness farther off than half a cell is debris or an inner wall; it says that much and no more."""
 
+_OF_SCATTER = 0.8
+"""Of the scatter of single witnesses: in four of five cases the middle ones of five lie no farther off by chance."""
+
 _HALVINGS = 24
 _REACH = np.linspace(0.0, 6.0, 601)
 _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
@@ -45,16 +49,16 @@ _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
 class Coefficients:
     """Standard deviation that one pixel of each cause stands for.
 
-    Fitted by `python -m benchmarks.accuracy.uncertainty --calibrate`, but for two things: the fit all but leaves `gap`
-    out, which is kept, for a longer gap must state more; and all are 5 % larger, for of one fresh set 89.5 % had held.
+    Fitted by `python -m benchmarks.accuracy.uncertainty --calibrate`, but for `gap`, which the fit all but leaves out:
+    a longer gap must state more.
     """
 
-    blur: float = 0.267
-    dark: float = 0.417
-    leverage: float = 1.048
+    blur: float = 0.34
+    clipped: float = 0.5
+    leverage: float = 1.05
     gap: float = 0.0042
-    misfit: float = 0.351
-    outside: float = 1.187
+    misfit: float = 1.1
+    outside: float = 1.3
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ class Stretches:
 
     length: Float64s
     blur: Float64s
-    dark: Float64s
+    clipped: Float64s
     leverage: Float64s
     gap: Float64s
     misfit: Float64s
@@ -83,14 +87,14 @@ def uncertainty(
     *,
     pitch_px: float,
     blur_px: float,
-    dark: bool = False,
+    clipped: float = 0.0,
     coefficients: Coefficients | None = None,
 ) -> float:
     """95 % bound on the distance between outline and truth, pixels, of all rings together.
 
-    dark: whether walls are darker than the table.
+    clipped: share of the witnesses beside which walls are at full scale.
     """
-    stretches = [ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, dark=dark) for ring in rings]
+    stretches = [ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, clipped=clipped) for ring in rings]
     sigma = np.concatenate([one.sigma(coefficients or Coefficients()) for one in stretches])
     return max(bound(sigma, np.concatenate([one.length for one in stretches])), LEAST_PX)
 
@@ -110,7 +114,7 @@ def bound(sigma: Float64s, length: Float64s) -> float:
 
 
 def ring_stretches(
-    evidence: RingEvidence, fitted: FittedRing, *, pitch_px: float, blur_px: float, dark: bool = False
+    evidence: RingEvidence, fitted: FittedRing, *, pitch_px: float, blur_px: float, clipped: float = 0.0
 ) -> Stretches:
     """The stretches of one ring and the causes of error in each."""
     on_line = np.flatnonzero(fitted.inlier)
@@ -122,14 +126,15 @@ def ring_stretches(
     length = np.maximum(np.diff(position, append=position[0] + around), 0.0)
     leverage = _leverage(evidence, fitted, np.mod(position + 0.5 * length, around), around)
     residual = np.clip(fitted.residual, -_CAP_PITCHES * pitch_px, _CAP_PITCHES * pitch_px)
+    together = _largest_between(np.abs(_middle_of_five(residual)), on_line)
     left_out = ~fitted.inlier & (evidence.kind != WitnessKind.OUTERMOST)
     return Stretches(
         length=length,
         blur=np.full(len(length), blur_px),
-        dark=np.full(len(length), blur_px if dark else 0.0),
+        clipped=np.full(len(length), clipped * blur_px),
         leverage=leverage * fitted.spread_px,
         gap=np.maximum(length - pitch_px, 0.0),
-        misfit=_largest_between(np.abs(_middle_of_five(residual)), on_line),
+        misfit=np.sqrt(np.maximum(together**2 - (_OF_SCATTER * fitted.spread_px) ** 2, 0.0)),
         outside=_largest_between(np.where(left_out, np.maximum(residual, 0.0), 0.0), on_line),
     )
 

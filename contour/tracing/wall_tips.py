@@ -8,7 +8,7 @@ import numpy as np
 
 from contour.edge.edge_evidence import ring_evidence
 from contour.edge.table_look import TableLook, table_look
-from contour.edge.visible_edge import doubtful, fit_visible
+from contour.edge.visible_edge import VisibleRing, doubtful, fit_visible
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
@@ -52,14 +52,10 @@ def wall_tips(
     light = wall_light(picture)
     if settings.edge == "cells":
         return _closed_cells(picture, light, settings, on_stage)
-    seen, look = _looked_at(picture, light, settings, on_stage)
+    seen, look = looked_at(picture, light, settings, on_stage)
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
-    visible = [
-        fit_visible(ring, picture, look, rectifier, lambda evidence: _fitted(evidence, seen, rectifier))
-        for ring in seen.rings
-        if not (ring.is_hole and look.fills(ring))
-    ]
+    visible = visible_rings(picture, seen, look, rectifier)
     for one in visible:
         check_against_evidence(one.evidence, one.fitted.ring, seen.pitch_px, rectifier)
     rings = [one.fitted for one in visible]
@@ -77,7 +73,7 @@ def wall_tips(
         [(one.evidence, one.fitted) for one in visible],
         pitch_px=seen.pitch_px,
         blur_px=seen.blur_px,
-        dark=seen.polarity == "dark",
+        clipped=seen.clipped,
     )
     on_stage("trace")
     evidence = tuple(
@@ -88,7 +84,18 @@ def wall_tips(
     return replace(_trace(seen, contour, light, uncertainty_px=sure_px), evidence=evidence, look=look)
 
 
-def _looked_at(
+def visible_rings(
+    picture: Bytes, seen: BlockEvidence, look: TableLook, rectifier: Rectifier | None
+) -> list[VisibleRing]:
+    """The rings of a block, exterior first, fitted to what is seen of their edges. Raises NoBlockFound."""
+    return [
+        fit_visible(ring, picture, look, rectifier, lambda evidence: _fitted(evidence, seen, rectifier))
+        for ring in seen.rings
+        if not (ring.is_hole and look.fills(ring))
+    ]
+
+
+def looked_at(
     picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage
 ) -> tuple[BlockEvidence, TableLook]:
     """What is seen of the block, and of what lies on it and around it: once more where that hides some of its edge."""

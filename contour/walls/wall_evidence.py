@@ -99,7 +99,7 @@ class BlockEvidence:
 
     leaves_picture: whether the block runs out of the picture, so that its rings follow the picture's border there.
     others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
-    pixels. comb: what its cells look like.
+    pixels. comb: what its cells look like. clipped: share of its witnesses beside which light is at full scale.
     """
 
     rings: tuple[RingEvidence, ...]
@@ -109,6 +109,7 @@ class BlockEvidence:
     blur_px: float
     noise: float
     contrast: float
+    clipped: float
     leaves_picture: bool = False
     others: tuple[Piece, ...] = ()
     reaches_frame: bool = False

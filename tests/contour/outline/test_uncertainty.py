@@ -140,7 +140,7 @@ def test_neighbours_off_on_one_side_and_material_left_outside_are_seen() -> None
     kind = np.full_like(evidence.kind, WitnessKind.CLEAN)
     off = replace(fitted, residual=residual, inlier=inlier)
     seen = ring_stretches(replace(evidence, kind=kind), off, pitch_px=PITCH, blur_px=1.0)
-    assert seen.misfit.max() == 6.0
+    assert seen.misfit.max() == pytest.approx(6.0, abs=0.01)
     assert seen.outside.max() == 9.0
     assert np.count_nonzero(seen.misfit > 1.0) <= 3
     assert np.count_nonzero(seen.outside > 1.0) == 1
@@ -183,13 +183,13 @@ def test_the_bound_weighs_rings_by_length_alone() -> None:
     assert bound(sigma, length * 7.0) == pytest.approx(bound(sigma, length))
 
 
-def test_dark_walls_leave_it_less_sure() -> None:
+def test_walls_at_full_scale_leave_it_less_sure() -> None:
     evidence = witnesses(WIDE, seed=1)
     fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
-    bright, dark = (
-        uncertainty([(evidence, fitted)], pitch_px=PITCH, blur_px=1.0, dark=is_dark) for is_dark in (False, True)
+    clear, clipped = (
+        uncertainty([(evidence, fitted)], pitch_px=PITCH, blur_px=1.0, clipped=share) for share in (0.0, 1.0)
     )
-    assert dark > bright
+    assert clipped > clear
 
 
 @pytest.mark.parametrize("kind", ["easy", "shop", "dim", "dark"])

@@ -101,9 +101,9 @@ class _Beside:
         one, two = (np.roll(places, -way * reach, axis=0) for reach in (half, 2 * half))
         return cls(_unit(way * (one - places)), _unit(way * (two - one)), (one + two) / 2)
 
-    def rolled(self, steps: int) -> _Beside:
-        """What lies beside the places so many steps on."""
-        return _Beside(*(np.roll(part, -steps, axis=0) for part in (self.near, self.far, self.middle)))
+    def take(self, chosen: Indices) -> _Beside:
+        """What lies beside some of the places."""
+        return _Beside(*(part[chosen] for part in (self.near, self.far, self.middle)))
 
     def along(self, foot: Float64s) -> Float64s:
         """Cosine of the angle to the foot, of the half that runs less along it."""
@@ -127,15 +127,19 @@ def _deepest(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     for steps in range(2, min(int(_LONGEST * pitch_px / spacing), count // 2)):
         foot = np.roll(places, -steps, axis=0) - places
         width = np.hypot(*foot.T)
-        along = foot / np.maximum(width, 1e-9)[:, None]
-        other = after.rolled(steps)
-        least = np.maximum(np.maximum(_DEPTH * pitch_px, _SLOPE * width), _STEP * before.apart(other))
         # A path so long reaches no farther out of its foot than half of it would, bent in its middle.
-        chosen = (width < _WIDE * pitch_px) & ((steps * spacing) ** 2 - width**2 > (2.0 * least) ** 2)
-        chosen &= np.minimum(before.along(along), other.along(along)) > aligned
-        starts = np.flatnonzero(chosen)
-        if len(starts):
-            best = _deeper(best, places, (starts, steps), (along, width, least), pitch_px)
+        reach = 0.5 * np.sqrt(np.maximum((steps * spacing) ** 2 - width**2, 0.0))
+        starts = np.flatnonzero((width < _WIDE * pitch_px) & (reach > np.maximum(_DEPTH * pitch_px, _SLOPE * width)))
+        if not len(starts):
+            continue
+        width, one, other = width[starts], before.take(starts), after.take((starts + steps) % count)
+        along = foot[starts] / np.maximum(width, 1e-9)[:, None]
+        least = np.maximum(np.maximum(_DEPTH * pitch_px, _SLOPE * width), _STEP * one.apart(other))
+        chosen = (reach[starts] > least) & (np.minimum(one.along(along), other.along(along)) > aligned)
+        if chosen.any():
+            best = _deeper(
+                best, places, (starts[chosen], steps), (along[chosen], width[chosen], least[chosen]), pitch_px
+            )
     return best
 
 
@@ -148,7 +152,7 @@ def _deeper(
 ) -> NarrowFeature | None:
     """The deepest of those that begin at `run`'s places and are its steps long, or `best` where none is deeper."""
     starts, steps = run
-    along, width, least = (part[starts] for part in foot)
+    along, width, least = foot
     path = places[(starts[:, None] + np.arange(steps + 1)) % len(places)] - places[starts][:, None, :]
     off = path[:, :, 0] * along[:, 1:] - path[:, :, 1] * along[:, :1]
     farthest = np.abs(off).argmax(axis=1)

@@ -28,8 +28,8 @@ _STEP = 1.5
 _SPACING, _LONGEST = 0.25, 20.0
 # Arms: narrower than this, longer than that, and with room for a disc of that radius at the end. A corner of 13 degrees
 # is as narrow as the first over as much; corners and horns as narrow as the second are pointed.
-_ARMS = ((1.5, 6.0, 0.0), (3.5, 2.0, 0.95))
-_ARM_END = 1.5
+_ARMS = ((1.5, 6.0, 0.0), (5.0, 2.5, 0.9))
+_ARM_END = 1.7
 _PITCH_SAMPLES = 6.0
 # From foot to foot the narrowest is told: a wider one, farther out on the same edge, is no deeper by this.
 _DEEPER = 0.05
@@ -68,18 +68,18 @@ def _arms(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
     width, height = np.ceil((contour.exterior.max(axis=0) + pitch_px - first) / step).astype(int).tolist()
     drawn = np.zeros((height, width), np.uint8)
     cv2.fillPoly(drawn, [np.rint((ring - first) / step).astype(np.int32) for ring in contour.rings], 1)
-    room = np.asarray(cv2.distanceTransform(drawn, cv2.DIST_L2, 3), np.float32) / np.float32(_PITCH_SAMPLES)
+    room = np.asarray(cv2.distanceTransform(drawn, cv2.DIST_L2, 5), np.float32) / np.float32(_PITCH_SAMPLES)
+    down, across = np.ogrid[:height, :width]
     found = []
     for narrow, long, blunt in _ARMS:
         wide = (room >= 0.5 * narrow).astype(np.uint8)
-        away = np.minimum(cv2.distanceTransform(1 - wide, cv2.DIST_L2, 3), width + height) / _PITCH_SAMPLES
+        away = np.minimum(cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5), width + height) / _PITCH_SAMPLES
         away -= 0.5 * narrow
         count, parts = cv2.connectedComponents(((drawn > 0) & (away > 0.5 * long)).astype(np.uint8))
         for part in range(1, count):
             y, x = np.unravel_index(int(np.where(parts == part, away, 0.0).argmax()), away.shape)
-            end = round(_ARM_END * _PITCH_SAMPLES)
-            disc = float(room[max(0, y - end) : y + end + 1, max(0, x - end) : x + end + 1].max())
-            if away[y, x] > long and disc >= blunt:
+            end = np.hypot(down - y, across - x) < _ARM_END * _PITCH_SAMPLES
+            if away[y, x] > long and room[end].max() >= blunt:
                 place_x, place_y = (first + step * np.array([x, y])).tolist()
                 found.append(NarrowFeature(float(away[y, x]), narrow, (place_x, place_y), True))
     return found

@@ -64,6 +64,8 @@ class TableLook:
     """Where it is darker in all channels, as a shadow makes a table."""
     away: Float32s
     """Distance of each sample from what is foreign, pixels."""
+    plain: bool = True
+    """Whether what lies beside the block is judged: not where the table mirrors it, or has borders of its own."""
 
     def foreign_at(self, points: Float64s) -> Float64s:
         """Distance of points (N, 2), pixels, from the nearest foreign thing, shape (N,), pixels."""
@@ -111,8 +113,11 @@ def beside(look: TableLook) -> float:
     return _BESIDE_PITCHES * look.pitch_px + look.step
 
 
-def table_look(picture: Bytes, seen: BlockEvidence) -> TableLook:
-    """What is table and what is neither table nor comb in a picture, grey (H, W) or BGR (H, W, 3), uint8."""
+def table_look(picture: Bytes, seen: BlockEvidence, before: TableLook | None = None) -> TableLook:
+    """What is table and what is neither table nor comb in a picture, grey (H, W) or BGR (H, W, 3), uint8.
+
+    `before`: what was seen when the block was taken to reach beneath things.
+    """
     pitch_px = seen.pitch_px
     step = max(_FINEST_PX, int(pitch_px / _SAMPLES_PER_PITCH))
     small = whole_averaged(picture, step)
@@ -140,11 +145,13 @@ def table_look(picture: Bytes, seen: BlockEvidence) -> TableLook:
     shade = np.all((off < 0) & (off > (_DEEPEST_SHADE - 1.0) * level), axis=2)
     every = foreign | beside_block
     look = TableLook(table, every, every, step, pitch_px, np.asarray(lighter), np.asarray(shade), _away(every, step))
+    if before is not None and before.plain:
+        return look
     exterior = seen.rings[0].points
     if np.count_nonzero(look.foreign_at(exterior) < beside(look)) > _MOST * len(exterior):
         # All around the block: the table mirrors it, or is no plain one. Neither is smooth.
         within = (foreign & inside) | _mostly(beside_block, busy < _SMOOTH)
-        look = replace(look, foreign=within, away=_away(within, step))
+        look = replace(look, foreign=within, away=_away(within, step), plain=False)
     return look
 
 

@@ -151,7 +151,7 @@ def test_a_strip_of_cells_at_a_corner_is_found_whatever_way_it_lies(width: float
     one = found(BLOCK | strip, turn_deg)
     assert one is not None
     assert one.outwards
-    assert 4.0 < one.depth_pitches < 11.0
+    assert 4.0 < one.depth_pitches < 12.0
 
 
 def test_what_is_nowhere_wider_than_a_thread_is_one() -> None:

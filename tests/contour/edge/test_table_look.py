@@ -134,3 +134,22 @@ def test_a_hole_with_the_table_in_it_is_one_and_a_filled_one_is_none() -> None:
     assert not look_at(lambda picture: picture, "holed").fills(hole)
     assert look_at(lambda picture: painted(picture, ring, 150), "holed").fills(hole)
     assert not look_at(lambda picture: painted(picture, ring, 10), "holed").fills(hole)
+
+
+def striped_around(picture: Picture) -> Picture:
+    """Stripes as wide as half a cell all around the block, such as borders of a table's own."""
+    around = np.zeros(picture.shape, np.uint8)
+    cv2.fillPoly(around, [np.rint(block("rectangle").truth_px.exterior).astype(np.int32)], 1)
+    beside = (cv2.dilate(around, np.ones((121, 121), np.uint8)) > 0) & (around == 0)
+    stripes = np.where(np.add.outer(np.arange(picture.shape[0]), np.arange(picture.shape[1])) % 24 < 12, 90, 190)
+    return np.where(beside, stripes, picture).astype(np.uint8)
+
+
+def test_borders_all_around_are_the_tables_own_but_not_around_what_a_thing_left_of_a_block() -> None:
+    picture, seen = plain()
+    own = table_look(striped_around(picture), seen)
+    assert not own.plain
+    assert own.things.sum() > 2 * own.foreign.sum()
+    known = table_look(striped_around(picture), seen, look_at(lambda same: same))
+    assert known.plain
+    assert (known.foreign == known.things).all()

@@ -64,9 +64,10 @@ def light_from_table(picture: Bytes, light: Bytes, mask: Bytes, hop: int) -> Byt
     margin = max(1, min(walls.shape) // 50)
     rim[margin:-margin, margin:-margin] = False
     free = near & ~walls
-    if not (walls.any() and free.any()):
+    parts = walls & near, free, rim & ~near | rim & walls
+    if not all(part.any() for part in parts):
         return None
-    wall, cell, table = (np.median(colours[part], axis=0) for part in (walls & near, free, rim & ~near | rim & walls))
+    wall, cell, table = (np.median(colours[part], axis=0) for part in parts)
     from_table, from_cell = wall - table, wall - cell
     across = from_cell - from_table
     share = float(np.clip(-(from_table @ across) / max(float(across @ across), 1e-9), 0.0, 1.0))

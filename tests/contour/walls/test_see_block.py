@@ -28,7 +28,7 @@ from contour.synthetic import (
 )
 from contour.walls.cell_scale import probe
 from contour.walls.coarse_block import coarse_block
-from contour.walls.lightness import wall_light
+from contour.walls.lightness import light_from_table, wall_light
 from contour.walls.see_block import see_block
 from contour.walls.wall_evidence import BlockEvidence, WitnessKind
 from contour.walls.wall_mask import wall_mask
@@ -212,3 +212,13 @@ def test_an_empty_mask_is_no_block() -> None:
 def test_an_unusable_array_is_an_error_that_names_its_shape(shape: tuple[int, ...]) -> None:
     with pytest.raises(PictureError, match=str(shape[0])):
         seen_in(np.zeros(shape, np.uint8), "auto")
+
+
+def test_where_a_coloured_picture_shows_no_table_its_light_is_kept() -> None:
+    """Cells up to its border: nothing is known of a table's colour, which a channel could part from walls."""
+    walls = np.zeros((240, 320), np.uint8)
+    for first in (6, 7, 8):
+        walls[first:-6:8], walls[6:-6, first::8] = 255, 255
+    walls[:, :6], walls[:, -6:] = 0, 0
+    picture = np.dstack([walls, walls // 2, walls // 4])
+    assert light_from_table(picture, walls, walls, 1) is None

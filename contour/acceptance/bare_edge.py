@@ -25,10 +25,10 @@ _WITHIN, _FARTHER_IN, _BEYOND = (-0.35, -0.55, -0.75), (-1.5, -2.0), (0.4, 0.6, 
 # No line through comb goes so far without a wall; what is finer is noise. Over how much of the edge the comb farther in
 # is taken together, and how near to what hides or fills it nothing is said.
 _CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
-# Of the changes of light farther in: those where no cells are, and what both sides differ by that are alike.
-_QUIET, _ALIKE = 0.45, 0.3
-# How long such parts are where both sides are alike, and where they are not, pitches.
-_LONG_ALIKE, _LONG = 1.0, 2.5
+# Of the changes of light farther in: those where no cells are, and what both sides of the outline differ by where they
+# are alike; and over how much of it, pitches. The more bare and alike, the shorter: a corner drawn past the block's own
+# is no longer than that; and where both sides differ, filled cells are no shorter.
+_BARE = ((0.25, 0.2, 0.65), (0.45, 0.3, 1.0), (0.45, np.inf, 2.5))
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,10 @@ def bare_edge(traced: Trace, pitch_px: float) -> BareEdge | None:
     for number, ring in enumerate(traced.contour.rings):
         lengths = RingLengths.of(ring)
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
-        bare, alike = _bare(light, lengths, at, out_px)
-        bare &= ~_known(traced, number, at, _BESIDE * pitch_px)
-        for part, long in ((bare & alike, _LONG_ALIKE), (bare, _LONG)):
+        changes, apart = _within(light, lengths, at, out_px)
+        judged = ~_known(traced, number, at, _BESIDE * pitch_px)
+        for quiet, alike, long in _BARE:
+            part = judged & (changes < quiet) & (apart < alike)
             run = max(runs_of(part), key=len) if part.any() else at[:0]
             if len(run) * _SPACING > long:
                 x, y = lengths.at(at[run[len(run) // 2 :][:1]])[0].tolist()
@@ -72,8 +73,9 @@ def _known(traced: Trace, ring: int, at: Float64s, beside_px: float) -> Bools:
     return np.asarray(np.any(within, axis=0) if within else np.zeros(at.shape, np.bool_))
 
 
-def _bare(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Bools, Bools]:
-    """At which lengths along a ring no cells lie just within, and where both sides are alike, shape (N,) both.
+def _within(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s]:
+    """By how much light changes just within a ring, at lengths along it, and by how much both sides of it differ, of
+    what it changes by farther in, shape (N,) both.
 
     `out_px`: the cell pitch, negative where the ring's material lies to the right of its direction.
     """
@@ -85,8 +87,8 @@ def _bare(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tu
 
     within, beyond = seen(_WITHIN), seen(_BEYOND)
     comb = _over(_changes(seen(_FARTHER_IN)).max(axis=0), _COMB_OVER).mean(axis=1)
-    bare = _changes(within).max(axis=0) < _QUIET * comb
-    return bare, np.abs(within.mean(axis=0) - beyond.mean(axis=0)) < _ALIKE * comb
+    comb = np.maximum(comb, 1.0)
+    return _changes(within).max(axis=0) / comb, np.abs(within.mean(axis=0) - beyond.mean(axis=0)) / comb
 
 
 def _changes(light: Float64s) -> Float64s:

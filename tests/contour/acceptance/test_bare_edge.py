@@ -28,8 +28,8 @@ def ring(shape: shapely.Polygon) -> Ring:
 
 
 def comb(shape: shapely.Polygon, table: int, *, walls: int = 200, cells: int = 60) -> NDArray[np.uint8]:
-    """A grid for cells within the shape, on a table: grey levels."""
-    lines = np.arange(480) % int(PITCH) < 3
+    """A grid for cells within the shape, on a table: grey levels. Straight cuts go through the middle of cells."""
+    lines = np.arange(8, 488) % int(PITCH) < 3
     grid = np.where(lines | lines[:, None], walls, cells).astype(np.uint8)
     block = np.zeros((480, 480), np.uint8)
     rings = [np.array(one.coords)[:-1] for one in (shape.exterior, *shape.interiors)]

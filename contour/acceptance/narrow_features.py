@@ -69,17 +69,21 @@ def _arms(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
     drawn = np.zeros((height, width), np.uint8)
     cv2.fillPoly(drawn, [np.rint((ring - first) / step).astype(np.int32) for ring in contour.rings], 1)
     room = np.asarray(cv2.distanceTransform(drawn, cv2.DIST_L2, 5), np.float32) / np.float32(_PITCH_SAMPLES)
-    down, across = np.ogrid[:height, :width]
+    end = round(_ARM_END * _PITCH_SAMPLES)
+    disc = np.hypot(*np.ogrid[-end : end + 1, -end : end + 1]) < _ARM_END * _PITCH_SAMPLES
+    framed = cv2.copyMakeBorder(room, end, end, end, end, cv2.BORDER_CONSTANT)
     found = []
     for narrow, long, blunt in _ARMS:
         wide = (room >= 0.5 * narrow).astype(np.uint8)
         away = np.minimum(cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5), width + height) / _PITCH_SAMPLES
         away -= 0.5 * narrow
-        count, parts = cv2.connectedComponents(((drawn > 0) & (away > 0.5 * long)).astype(np.uint8))
-        for part in range(1, count):
-            y, x = np.unravel_index(int(np.where(parts == part, away, 0.0).argmax()), away.shape)
-            end = np.hypot(down - y, across - x) < _ARM_END * _PITCH_SAMPLES
-            if away[y, x] > long and room[end].max() >= blunt:
+        _, parts, stats, _ = cv2.connectedComponentsWithStats((drawn & (away > 0.5 * long)).astype(np.uint8))
+        for part, (left, top, wide_px, high_px, _) in list(enumerate(stats.tolist()))[1:]:
+            box = slice(top, top + high_px), slice(left, left + wide_px)
+            y, x = np.unravel_index(int(np.where(parts[box] == part, away[box], 0.0).argmax()), (high_px, wide_px))
+            y, x = y + top, x + left
+            blunter = framed[y : y + 2 * end + 1, x : x + 2 * end + 1][disc].max() >= blunt
+            if away[y, x] > long and blunter:
                 place_x, place_y = (first + step * np.array([x, y])).tolist()
                 found.append(NarrowFeature(float(away[y, x]), narrow, (place_x, place_y), True))
     return found

@@ -13,6 +13,7 @@ from drivers.controller.mailbox.pages import Page
 from drivers.controller.simulated.verdict import KINDS, Verdict
 from tests.support.controller.raw_client import SESSION, Client, page, simulated
 from tests.support.controller.simulated_bench import sealed
+from tests.support.service.waiting import until
 
 # --- the verdict ------------------------------------------------------------------------------------------------------
 
@@ -153,13 +154,15 @@ async def test_a_heartbeat_that_stands_still_on_an_open_connection_is_noted_once
         assert controller.verdict.longest_heartbeat_gap_s == pytest.approx(6.3)
 
 
-async def test_a_client_that_went_away_and_came_back_had_no_stalled_heartbeat() -> None:
-    now = 100.0
+async def test_a_client_that_went_away_and_came_back_had_no_stalled_heartbeat(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, seen = 100.0, list[bool]()
     async with simulated(now=lambda: now) as controller:
-        for _ in range(2):
+        told = controller.connection
+        monkeypatch.setattr(controller, "connection", lambda up: (told(up), seen.append(up)))
+        for times in (1, 2):
             async with Client(controller.port) as client:
-                await asyncio.sleep(0.01)
                 await client.write(16, *encode_service(ServiceBlock(service_heartbeat=1), "big"))
+            await until(lambda count=times: seen == [True, False] * count)
             now += 60
         assert controller.verdict.clean
 

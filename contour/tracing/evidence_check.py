@@ -24,7 +24,8 @@ def check_against_evidence(evidence: RingEvidence, ring: Ring, pitch_px: float, 
     picture a lens bends a long edge by more than a small cell.
     """
     ends = evidence.kind != WitnessKind.OUTERMOST
-    depth = depth_inside(ring, evidence.points, rectifier)
+    into_ring = depth_inside(ring, evidence.points, rectifier)
+    depth = -into_ring if evidence.is_hole else into_ring
     # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
     inside, outside = depth / pitch_px, -depth[ends] / pitch_px
     for off, points, most, how_far in (

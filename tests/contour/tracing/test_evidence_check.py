@@ -60,9 +60,15 @@ def test_three_ends_in_a_row_are_missing_cells() -> None:
     check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
 
 
-def test_two_ends_side_by_side_outside_are_material_that_the_outline_leaves_out_and_one_is_a_chip() -> None:
+@pytest.mark.parametrize("is_hole", [False, True])
+def test_two_ends_side_by_side_outside_are_material_that_the_outline_leaves_out_and_one_is_a_chip(
+    is_hole: bool,
+) -> None:
     evidence = witnesses(BLOCK, seed=2)
-    for count, pitches in ((1, 0.6), (2, 0.25)):
+    if is_hole:
+        evidence = replace(evidence, is_hole=True, normal=-evidence.normal)
+    # Inside, two are a cell that is missing.
+    for count, pitches in ((1, 0.6), (2, 0.25), (2, -0.8)):
         off = np.isin(np.arange(len(evidence.points)), np.arange(10, 10 + count))
         moved = evidence.points + np.where(off, pitches * PITCH, 0.0)[:, None] * evidence.normal
         check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)

@@ -7,21 +7,19 @@ cell for one; but not over a few cells, for then what fills them is told as such
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import cv2
 import numpy as np
 
-from contour.edge.ring_places import runs_of
+from contour.edge.edge_parts import EdgePart, light_beside, longest_part, with_sides
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import signed_area
-from contour.image.pixel_sampling import sample_at
 from contour.tracing.trace import Trace
 
 # Cell pitches: along the outline, and out of it.
 _SPACING = 0.1
-_WITHIN, _FARTHER_IN, _BEYOND = (-0.35, -0.55, -0.75), (-1.5, -2.0), (0.4, 0.6, 0.8)
+_WITHIN = np.array([-0.35, -0.55, -0.75])
+_FARTHER_IN, _BEYOND = np.array([-1.5, -2.0]), np.array([0.4, 0.6, 0.8])
 # No line through comb goes so far without a wall; what is finer is noise. Over how much of the edge the comb farther in
 # is taken together, and how near to what hides or fills it nothing is said.
 _CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
@@ -31,19 +29,7 @@ _CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
 _BARE = ((0.25, 0.2, 0.65), (0.45, 0.3, 1.0), (0.45, np.inf, 2.5))
 
 
-@dataclass(frozen=True)
-class BareEdge:
-    """A part of an outline without cells behind it: its length, cell pitches, and its middle, pixels (x, y)."""
-
-    length_pitches: float
-    place_px: tuple[float, float]
-
-    def moved(self, x: float, y: float) -> BareEdge:
-        """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
-        return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
-
-
-def bare_edge(traced: Trace, pitch_px: float) -> BareEdge | None:
+def bare_edge(traced: Trace, pitch_px: float) -> EdgePart | None:
     """The longest part of a traced outline without cells behind it; None where none is long.
 
     What the trace's evidence tells as hidden or filled is left out.
@@ -51,18 +37,16 @@ def bare_edge(traced: Trace, pitch_px: float) -> BareEdge | None:
     fine = max(1, round(_FINE * pitch_px))
     light = np.asarray(cv2.blur(traced.light, (fine, fine)), np.uint8)
     out_px = float(np.sign(signed_area(traced.contour.exterior))) * pitch_px
-    found: list[BareEdge] = []
+    found: list[EdgePart] = []
     for number, ring in enumerate(traced.contour.rings):
         lengths = RingLengths.of(ring)
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
         changes, apart = _within(light, lengths, at, out_px)
         judged = ~_known(traced, number, at, _BESIDE * pitch_px)
         for quiet, alike, long in _BARE:
-            part = judged & (changes < quiet) & (apart < alike)
-            run = max(runs_of(part), key=len) if part.any() else at[:0]
-            if len(run) * _SPACING > long:
-                x, y = lengths.at(at[run[len(run) // 2 :][:1]])[0].tolist()
-                found.append(BareEdge(_SPACING * len(run), (x, y)))
+            part = longest_part(judged & (changes < quiet) & (apart < alike), lengths, at, _SPACING)
+            if part is not None and part.length_pitches > long:
+                found.append(part)
     return max(found, key=lambda one: one.length_pitches) if found else None
 
 
@@ -80,25 +64,13 @@ def _within(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> 
     `out_px`: the cell pitch, negative where the ring's material lies to the right of its direction.
     """
     place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * abs(out_px))
-
-    def seen(pitches: tuple[float, ...]) -> Float64s:
-        x, y = (place[:, axis] + np.array(pitches)[:, None] * outward[:, axis] for axis in (0, 1))
-        return sample_at(light, x, y)
-
-    within, beyond = seen(_WITHIN), seen(_BEYOND)
-    comb = _over(_changes(seen(_FARTHER_IN)).max(axis=0), _COMB_OVER).mean(axis=1)
-    comb = np.maximum(comb, 1.0)
-    return _changes(within).max(axis=0) / comb, np.abs(within.mean(axis=0) - beyond.mean(axis=0)) / comb
+    within, beyond, farther = (
+        light_beside(light, place, outward, pitches) for pitches in (_WITHIN, _BEYOND, _FARTHER_IN)
+    )
+    comb = np.maximum(with_sides(_changes(farther), _COMB_OVER / _SPACING).mean(axis=1), 1.0)
+    return _changes(within) / comb, np.abs(within.mean(axis=0) - beyond.mean(axis=0)) / comb
 
 
 def _changes(light: Float64s) -> Float64s:
-    """What light along lines beside a ring, (K, N), changes by over a cell about each place, (K, N)."""
-    around = [_over(line, _CELL) for line in light]
-    return np.stack([line.max(axis=1) - line.min(axis=1) for line in around])
-
-
-def _over(values: Float64s, pitches: float) -> Float64s:
-    """Values at places around a ring, (N,), with those on both sides of each, so many pitches in all, (N, M)."""
-    half = round(0.5 * pitches / _SPACING)
-    turned = np.take(values, np.arange(-half, len(values) + half), mode="wrap")
-    return np.lib.stride_tricks.sliding_window_view(turned, 2 * half + 1)
+    """The most that light along lines beside a ring, (K, N), changes by over a cell about each place, (N,)."""
+    return np.asarray(np.ptp(with_sides(light, _CELL / _SPACING), axis=2).max(axis=0))

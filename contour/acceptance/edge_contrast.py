@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.edge.ring_places import runs_of
+from contour.edge.edge_parts import EdgePart, light_beside, longest_part, with_sides
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, signed_area
-from contour.image.pixel_sampling import planes_of, sample_at
+from contour.image.pixel_sampling import planes_of
 
 # Cell pitches: along the outline, out of it, and into the block.
 _SPACING = 0.25
@@ -26,21 +25,7 @@ _CELLS, _WALLS = 10.0, 97.0
 _ALIKE = 0.3
 
 
-@dataclass(frozen=True)
-class AlikeEdge:
-    """The longest part of an outline along which table and walls are alike: its length, cell pitches, and its middle,
-    pixels (x, y).
-    """
-
-    length_pitches: float
-    place_px: tuple[float, float]
-
-    def moved(self, x: float, y: float) -> AlikeEdge:
-        """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
-        return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
-
-
-def alike_edge(picture: Bytes, contour: Contour, pitch_px: float, *, dark: bool) -> AlikeEdge | None:
+def alike_edge(picture: Bytes, contour: Contour, pitch_px: float, *, dark: bool) -> EdgePart | None:
     """Where table and walls are alike, in all channels of a picture, grey (H, W) or BGR (H, W, 3), uint8; None where
     they are nowhere.
 
@@ -53,33 +38,25 @@ def alike_edge(picture: Bytes, contour: Contour, pitch_px: float, *, dark: bool)
     return max(found, key=lambda one: one.length_pitches) if found else None
 
 
-def _longest(planes: list[Bytes], ring: Ring, out_px: float, *, dark: bool) -> AlikeEdge | None:
+def _longest(planes: list[Bytes], ring: Ring, out_px: float, *, dark: bool) -> EdgePart | None:
     """On one ring; `out_px`: the cell pitch, negative where its material lies to the right of its direction."""
     lengths = RingLengths.of(ring)
     at = np.arange(0.0, lengths.length, _SPACING * abs(out_px))
     alike = _alike(planes, lengths, at, out_px, dark=dark)
-    if not alike.any():
-        return None
-    run = max(runs_of(alike), key=len)
-    x, y = lengths.at(at[run[len(run) // 2 :][:1]])[0].tolist()
-    return AlikeEdge(_SPACING * len(run), (x, y))
+    return longest_part(alike, lengths, at, _SPACING)
 
 
 def _alike(planes: list[Bytes], lengths: RingLengths, at: Float64s, out_px: float, *, dark: bool) -> Bools:
     """At which lengths along a ring what lies beyond is nowhere told from the walls, shape (N,)."""
     place, outward = lengths.at(at), out_px * lengths.normals(at, _SPACING * abs(out_px))
     tails = [100.0 - _CELLS, 100.0 - _WALLS] if dark else [_CELLS, _WALLS]
-    sampled = [
-        [
-            sample_at(plane, *(place[:, axis] + pitches[:, None] * outward[:, axis] for axis in (0, 1)))
-            for pitches in (_OUT, -_IN)
-        ]
-        for plane in planes
-    ]
+    sampled = [[light_beside(plane, place, outward, pitches) for pitches in (_OUT, -_IN)] for plane in planes]
     by_all = _like_walls(sampled, lambda within: np.percentile(within, tails)[:, None])
     if not by_all.any():
         return by_all
-    return by_all & _like_walls(sampled, lambda within: np.percentile(_around(within, _BLOCK_OVER), tails, axis=(0, 2)))
+    return by_all & _like_walls(
+        sampled, lambda within: np.percentile(with_sides(within, _BLOCK_OVER / _SPACING), tails, axis=(0, 2))
+    )
 
 
 def _like_walls(sampled: list[list[Float64s]], levels: Callable[[Float64s], Float64s]) -> Bools:
@@ -90,12 +67,5 @@ def _like_walls(sampled: list[list[Float64s]], levels: Callable[[Float64s], Floa
     for beyond, within in sampled:
         cells, walls = levels(within)
         contrast = np.maximum(contrast, np.abs(walls - cells))
-        apart = np.maximum(apart, np.abs(walls - _around(beyond, _TABLE_OVER).mean(axis=2)))
+        apart = np.maximum(apart, np.abs(walls - with_sides(beyond, _TABLE_OVER / _SPACING).mean(axis=2)))
     return np.asarray(apart.min(axis=0) < _ALIKE * contrast)
-
-
-def _around(values: Float64s, pitches: float) -> Float64s:
-    """Values at places around a ring, (K, N), with those on both sides of each, so many pitches in all, (K, N, M)."""
-    half = round(0.5 * pitches / _SPACING)
-    turned = np.take(values, np.arange(-half, values.shape[1] + half), axis=1, mode="wrap")
-    return np.lib.stride_tricks.sliding_window_view(turned, 2 * half + 1, axis=1)

@@ -78,7 +78,7 @@ def _arms(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
         away = np.minimum(cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5), width + height) / _PITCH_SAMPLES
         away -= 0.5 * narrow
         _, parts, stats, _ = cv2.connectedComponentsWithStats((drawn & (away > 0.5 * long)).astype(np.uint8))
-        for part, (left, top, wide_px, high_px, _) in list(enumerate(stats.tolist()))[1:]:
+        for part, (left, top, wide_px, high_px, _) in enumerate(stats[1:].tolist(), 1):
             box = slice(top, top + high_px), slice(left, left + wide_px)
             y, x = np.unravel_index(int(np.where(parts[box] == part, away[box], 0.0).argmax()), (high_px, wide_px))
             y, x = y + top, x + left

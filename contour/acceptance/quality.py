@@ -13,6 +13,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes, Float32s, Int64s
 from contour.geometry.rings import Contour, Ring
+from contour.image.pixel_sampling import FULL_SCALE
 
 # So many pixels tell enough, and cost about a millisecond.
 _SAMPLED_PX = 60_000
@@ -28,7 +29,6 @@ _TAILS_OF_NOISE = 3.5
 _SECOND_OF_NOISE = 0.2533 * 6.0
 # Steepest rise of a blurred step, and of a blurred line, over their height: 0.40 and 0.61 of 1/sigma.
 _STEEPEST = 0.5
-_FULL = 254
 
 # Of a picture in which nothing was traced.
 _LOOKED_AT_PX = 300_000
@@ -80,7 +80,7 @@ def block_quality(picture: Bytes, light: Bytes, contour: Contour, pitch_px: floa
     pitch_px = pitch_px or _USUAL_PITCH_PX
     places = _tile_places(light.shape, contour.exterior, pitch_px)
     colours, tiles = _tiles(picture, places), _tiles(light, places)
-    clipped = float(np.mean(colours.reshape(*tiles.shape, -1).max(axis=3) >= _FULL))
+    clipped = float(np.mean(colours.reshape(*tiles.shape, -1).max(axis=3) >= FULL_SCALE))
     low, high = _tails(tiles)
     noise = _noise(tiles)
     contrast = np.maximum(high - low - _TAILS_OF_NOISE * noise, 0.0)
@@ -213,7 +213,7 @@ def picture_faults(picture: Bytes) -> tuple[str, ...]:
     hop = max(1, round(np.sqrt(picture.shape[0] * picture.shape[1] / _LOOKED_AT_PX)))
     light = picture if picture.ndim == 2 else picture.max(axis=2)
     brightest = float(np.quantile(light[::hop, ::hop], 1 - _SPECKS))
-    clipped = float(np.mean(light[::hop, ::hop] >= _FULL))
+    clipped = float(np.mean(light[::hop, ::hop] >= FULL_SCALE))
     if brightest < _DARK_LEVEL:
         return (
             f"its brightest parts reach {brightest:.0f} of 255 grey levels, at least {_DARK_LEVEL:g} are needed. "

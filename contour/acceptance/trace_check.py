@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.acceptance.bare_edge import BareEdge, bare_edge
+from contour.acceptance.bare_edge import bare_edge
 from contour.acceptance.disagreement import Disagreement, disagreement
-from contour.acceptance.edge_contrast import AlikeEdge, alike_edge
+from contour.acceptance.edge_contrast import alike_edge
 from contour.acceptance.narrow_features import NarrowFeature, narrow_feature
 from contour.acceptance.quality import Quality, block_quality
+from contour.edge.edge_parts import EdgePart
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, densified
@@ -33,17 +34,15 @@ class CheckedTrace:
     quality: Quality | None = None
     disagreement: Disagreement | None = None
     narrow: NarrowFeature | None = None
-    alike: AlikeEdge | None = None
-    bare: BareEdge | None = None
+    alike: EdgePart | None = None
+    bare: EdgePart | None = None
 
     def moved(self, first: Float64s) -> CheckedTrace:
         """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
-        apart = None if self.disagreement is None else self.disagreement.moved(x, y)
-        narrow = None if self.narrow is None else self.narrow.moved(x, y)
-        alike = None if self.alike is None else self.alike.moved(x, y)
-        bare = None if self.bare is None else self.bare.moved(x, y)
-        return replace(self, trace=self.trace.moved(first), disagreement=apart, narrow=narrow, alike=alike, bare=bare)
+        said = {name: getattr(self, name) for name in ("disagreement", "narrow", "alike", "bare")}
+        moved = {name: one.moved(x, y) for name, one in said.items() if one is not None}
+        return replace(self, trace=self.trace.moved(first), **moved)
 
 
 def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> CheckedTrace:

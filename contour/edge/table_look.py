@@ -113,10 +113,10 @@ def beside(look: TableLook) -> float:
     return _BESIDE_PITCHES * look.pitch_px + look.step
 
 
-def table_look(picture: Bytes, seen: BlockEvidence, before: TableLook | None = None) -> TableLook:
+def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> TableLook:
     """What is table and what is neither table nor comb in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `before`: what was seen when the block was taken to reach beneath things.
+    `plain`: the table is known to be a plain one, from a look at the block before anything of it was left out.
     """
     pitch_px = seen.pitch_px
     step = max(_FINEST_PX, int(pitch_px / _SAMPLES_PER_PITCH))
@@ -145,7 +145,7 @@ def table_look(picture: Bytes, seen: BlockEvidence, before: TableLook | None = N
     shade = np.all((off < 0) & (off > (_DEEPEST_SHADE - 1.0) * level), axis=2)
     every = foreign | beside_block
     look = TableLook(table, every, every, step, pitch_px, np.asarray(lighter), np.asarray(shade), _away(every, step))
-    if before is not None and before.plain:
+    if plain:
         return look
     exterior = seen.rings[0].points
     if np.count_nonzero(look.foreign_at(exterior) < beside(look)) > _MOST * len(exterior):

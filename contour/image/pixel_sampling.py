@@ -8,6 +8,8 @@ import numpy as np
 from contour.geometry.arrays import Bytes, Float32s, Float64s
 
 _ROW = 1024
+FULL_SCALE = 254
+"""Grey level from which light may be brighter than the sensor tells."""
 
 
 def planes_of(picture: Bytes) -> list[Bytes]:

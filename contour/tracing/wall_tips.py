@@ -99,18 +99,18 @@ def looked_at(
     picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage
 ) -> tuple[BlockEvidence, TableLook]:
     """What is seen of the block, and of what lies on it and around it: once more where that hides some of its edge."""
-    seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"))
-    look = table_look(picture, seen)
-    hidden = np.zeros_like(look.hiding)
-    for _ in range(_LOOKS - 1):
-        known, hidden = hidden, look.hiding
-        if seen.leaves_picture or not any(doubtful(ring, look).any() for ring in seen.rings):
+    hidden: Bytes | None = None
+    plain = False
+    for _ in range(_LOOKS):
+        seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=hidden)
+        look = table_look(picture, seen, plain=plain)
+        if not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
             break
+        known = np.zeros_like(look.hiding) if hidden is None else hidden
+        hidden, plain = look.hiding, look.plain
         # Where the pitch was told anew, so may be the maps' grid.
         if hidden.shape == known.shape and not (hidden > known).any():
             break
-        seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=hidden)
-        look = table_look(picture, seen, look)
     return seen, look
 
 

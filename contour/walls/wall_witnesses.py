@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.signed_distance import nearest
 from contour.image.pixel_grid import pixels_of, samples_of
-from contour.image.pixel_sampling import sample_at
+from contour.image.pixel_sampling import FULL_SCALE, sample_at
 from contour.walls.cell_scale import CellScale
 from contour.walls.coarse_rings import CoarseBlock
 from contour.walls.dark_material import dark_beyond
@@ -44,7 +44,7 @@ _WALL_POINTS_PER_PITCH = 8
 # Walls farther inside than this are no part of the boundary towards the table, the dents of open cells included.
 _WALLS_INSIDE = 1.1
 # How near to an end light tells whether its wall is at full scale.
-_BESIDE_PX, _FULL = np.array([-3.0, -1.5, 0.0, 1.5, 3.0]), 254.0
+_BESIDE_PX = np.array([-3.0, -1.5, 0.0, 1.5, 3.0])
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def _clipped(light: Bytes, points: Float64s) -> float:
         return 0.0
     across, down = np.meshgrid(_BESIDE_PX, _BESIDE_PX)
     around = sample_at(light, points[:, :1] + across.ravel(), points[:, 1:] + down.ravel())
-    return float(np.mean(around.max(axis=1) >= _FULL))
+    return float(np.mean(around.max(axis=1) >= FULL_SCALE))
 
 
 def _learnt(light: Bytes, ends: _Ends, cells: CellScale, wall: float, seen: WallMask) -> EndModel:

@@ -9,10 +9,11 @@ import shapely
 from numpy.typing import NDArray
 
 from contour.acceptance.acceptance import View, judge
-from contour.acceptance.bare_edge import BareEdge, bare_edge
+from contour.acceptance.bare_edge import bare_edge
 from contour.acceptance.disagreement import Disagreement
 from contour.acceptance.findings import Limits, Refusal
 from contour.acceptance.trace_check import CheckedTrace
+from contour.edge.edge_parts import EdgePart
 from contour.edge.stretches import Hider, State, Stretch
 from contour.geometry.rings import Contour, Ring, oriented
 from contour.polygon.polygon import Polygon
@@ -43,7 +44,7 @@ def traced(picture: NDArray[np.uint8], outline: shapely.Polygon, *evidence: Stre
     return Trace("wall-tips", "bright", PITCH, contour, picture, evidence=evidence)
 
 
-def found(picture: NDArray[np.uint8], outline: shapely.Polygon, *evidence: Stretch) -> BareEdge | None:
+def found(picture: NDArray[np.uint8], outline: shapely.Polygon, *evidence: Stretch) -> EdgePart | None:
     return bare_edge(traced(picture, outline, *evidence), PITCH)
 
 
@@ -102,7 +103,7 @@ def test_what_is_told_to_fill_or_to_hide_the_edge_is_left_out(state: State, by: 
 def test_such_a_contour_is_refused_with_the_place_and_the_next_step_where_the_picture_is_asked() -> None:
     block = traced(comb(BLOCK, 20), BLOCK)
     agrees = Disagreement(0.1, (0.0, 0.0), True, 0.0)
-    checked = CheckedTrace(block, disagreement=agrees, bare=BareEdge(3.2, (120.0, 80.0)))
+    checked = CheckedTrace(block, disagreement=agrees, bare=EdgePart(3.2, (120.0, 80.0)))
     polygon = Polygon(block.contour, None, 1e4, None, None)
     findings = judge(polygon, View((480, 480)), Limits(max_disagreement_pitches=2.0), traced=checked)
     (text,) = [finding.text for finding in findings if finding.refusal == Refusal.METHODS_DISAGREE]

@@ -9,9 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from contour.acceptance.acceptance import View, judge
-from contour.acceptance.edge_contrast import AlikeEdge, alike_edge
+from contour.acceptance.edge_contrast import alike_edge
 from contour.acceptance.findings import Limits, Refusal
 from contour.acceptance.trace_check import CheckedTrace, check_trace
+from contour.edge.edge_parts import EdgePart
 from contour.geometry.rings import Contour, oriented_contour
 from contour.polygon.polygon import Polygon
 from contour.synthetic import render
@@ -102,4 +103,4 @@ def test_on_a_dark_table_it_is_not_but_where_too_much_of_the_edge_is_alike() -> 
     one, view = checked(0.1)
     assert one.alike is None
     for length, count in ((4.0, 0), (4.25, 1)):
-        assert len(said(replace(one, alike=AlikeEdge(length, (10.0, 20.0))), view)) == count
+        assert len(said(replace(one, alike=EdgePart(length, (10.0, 20.0))), view)) == count

@@ -150,6 +150,6 @@ def test_borders_all_around_are_the_tables_own_but_not_around_what_a_thing_left_
     own = table_look(striped_around(picture), seen)
     assert not own.plain
     assert own.things.sum() > 2 * own.foreign.sum()
-    known = table_look(striped_around(picture), seen, look_at(lambda same: same))
+    known = table_look(striped_around(picture), seen, plain=look_at(lambda same: same).plain)
     assert known.plain
     assert (known.foreign == known.things).all()

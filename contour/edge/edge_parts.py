@@ -1,0 +1,46 @@
+"""Parts of an outline that the picture says something of, told by light beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from contour.edge.ring_places import runs_of
+from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.ring_lengths import RingLengths
+from contour.image.pixel_sampling import sample_at
+
+
+@dataclass(frozen=True)
+class EdgePart:
+    """A part of an outline: its length, cell pitches, and its middle, pixels (x, y)."""
+
+    length_pitches: float
+    place_px: tuple[float, float]
+
+    def moved(self, x: float, y: float) -> EdgePart:
+        """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
+        return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
+
+
+def longest_part(chosen: Bools, lengths: RingLengths, at: Float64s, spacing_pitches: float) -> EdgePart | None:
+    """The longest run of chosen places at lengths along a ring, so many pitches apart, (N,); None without any."""
+    if not chosen.any():
+        return None
+    run = max(runs_of(chosen), key=len)
+    x, y = lengths.at(at[run[len(run) // 2 :][:1]])[0].tolist()
+    return EdgePart(spacing_pitches * len(run), (x, y))
+
+
+def light_beside(plane: Bytes, place: Float64s, outward: Float64s, pitches: Float64s) -> Float64s:
+    """Light so many pitches, (K,), out of places (N, 2), pixels, by vectors of one pitch outwards (N, 2): (K, N)."""
+    x, y = (place[:, axis] + pitches[:, None] * outward[:, axis] for axis in (0, 1))
+    return sample_at(plane, x, y)
+
+
+def with_sides(values: Float64s, count: float) -> Float64s:
+    """Values at places around a ring, (..., N), with those of half so many places on each side, (..., N, M)."""
+    half = round(0.5 * count)
+    turned = np.take(values, np.arange(-half, values.shape[-1] + half), axis=-1, mode="wrap")
+    return np.lib.stride_tricks.sliding_window_view(turned, 2 * half + 1, axis=-1)

@@ -62,7 +62,7 @@ def judge(
     trace = traced.trace if traced else None
     # With a margin the polygon may well leave the picture; what was seen may not.
     outlines = [trace.contour.exterior] if trace else [polygon.pixels.exterior]
-    nothing = [finding for finding in (no_walls(traced, limits.quality), no_comb(trace)) if finding]
+    nothing = [finding for finding in (no_walls(traced, limits.quality), no_comb(traced)) if finding]
     covered = edge_covered(trace, to_mm, limits)
     findings = [
         *badly_seen(traced, limits.quality),

@@ -30,11 +30,11 @@ def no_walls(traced: CheckedTrace | None, limits: QualityLimits) -> Finding | No
     return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
 
 
-def no_comb(traced: Trace | None) -> Finding | None:
+def no_comb(traced: CheckedTrace | None) -> Finding | None:
     """Cells that look like something else than a cut comb."""
-    if traced is None or traced.comb is None:
+    if traced is None or traced.trace.comb is None:
         return None
-    why = unlike_comb(traced.comb)
+    why = unlike_comb(traced.trace.comb, 0.0 if traced.quality is None else traced.quality.blur_px)
     return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
 
 

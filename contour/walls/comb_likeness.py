@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -11,10 +12,10 @@ from contour.geometry.arrays import Float64s, Indices, Int32s
 
 # Walls of fine cells look wide; from this pitch on they look as wide as they are.
 _FINE_PITCH_PX = 15.0
-# Blur makes walls look wider by about this.
-_BLUR_PX = 1.5
-# Of 183 scenes with cells of more than 15 px only foam has walls wider than 0.28 of their pitch; of prints and boards
-# the narrowest are 0.34.
+# Full width at half maximum of blur over its standard deviation.
+_BLUR_WIDTH = 2.355
+# Of 183 scenes with cells of more than 15 px only foam has walls wider than 0.28 of their pitch, and of 60 that were
+# defocused or moved three have 0.31 to 0.32; of prints and boards the narrowest are 0.34.
 _WIDEST_WALL = 0.31
 _REGULAR = 0.5
 _FEW_CELLS = 18
@@ -58,9 +59,12 @@ def surely_comb(comb: Comb) -> bool:
     return many and comb.solid >= _CONVEX and comb.order >= _ORDER_OF_SCATTERED
 
 
-def unlike_comb(comb: Comb) -> str | None:
-    """Why this is no cut honeycomb, as a sentence with what was measured and what to do; None where it may be one."""
-    share = (comb.wall_px - _BLUR_PX) / comb.pitch_px
+def unlike_comb(comb: Comb, blur_px: float) -> str | None:
+    """Why this is no cut honeycomb, as a sentence with what was measured and what to do; None where it may be one.
+
+    `blur_px`: standard deviation of the picture's blur there; it makes walls look wider, and is taken off.
+    """
+    share = math.sqrt(max(comb.wall_px**2 - (_BLUR_WIDTH * blur_px) ** 2, 0.0)) / comb.pitch_px
     # Foam has wide bright walls, and cells of all sizes between them.
     even = not comb.bright or comb.regular > _REGULAR
     if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and even:

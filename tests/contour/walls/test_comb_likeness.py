@@ -28,13 +28,21 @@ from tests.support.pictures.small_scenes import block
         Comb(37.0, 17.0, True, 60, 0.21, 0.25),  # foam
         Comb(23.0, 7.6, True, 150, 0.3, 0.25),  # a perforated plate
         Comb(149.0, 6.0, True, 6, 0.4, 0.8),  # few cells, each large
-        Comb(17.0, 6.2, False, 300, 0.5, 0.5),  # dark walls under blur
         Comb(30.0, 7.8, True, 118, 0.3, 0.3, order=0.38, solid=0.82),  # foam
         Comb(31.0, 4.3, True, 37, 0.12, 0.18, order=0.22, solid=0.95),  # half of its walls broken
     ],
 )
 def test_combs_foams_and_plates_may_be_blocks(comb: Comb) -> None:
-    assert unlike_comb(comb) is None
+    assert unlike_comb(comb, 0.7) is None
+
+
+@pytest.mark.parametrize(
+    ("comb", "blur_px"),
+    [(Comb(17.0, 6.2, False, 300, 0.5, 0.5), 1.6), (Comb(20.0, 9.5, False, 300, 0.5, 0.6), 3.3)],
+)
+def test_blur_makes_walls_look_wider_and_is_taken_off(comb: Comb, blur_px: float) -> None:
+    assert unlike_comb(comb, blur_px) is None
+    assert unlike_comb(comb, 0.7) is not None
 
 
 @pytest.mark.parametrize(
@@ -48,7 +56,7 @@ def test_combs_foams_and_plates_may_be_blocks(comb: Comb) -> None:
     ],
 )
 def test_boards_prints_and_codes_are_none(comb: Comb) -> None:
-    assert unlike_comb(comb) is not None
+    assert unlike_comb(comb, 1.9) is not None
 
 
 def bold_print() -> NDArray[np.uint8]:
@@ -69,7 +77,7 @@ def test_letters_are_no_cells_although_thin_walls_part_them() -> None:
         return
     assert found.comb is not None
     hidden = [stretch for stretch in found.evidence or () if stretch.state == "covered"]
-    assert unlike_comb(found.comb) is not None or hidden, "the sheet's margin is neither cells nor table"
+    assert unlike_comb(found.comb, 0.7) is not None or hidden, "the sheet's margin is neither cells nor table"
 
 
 def test_three_small_blocks_are_found_though_they_fill_little_of_the_picture() -> None:
@@ -97,7 +105,7 @@ def test_a_chessboard_on_the_table_is_no_block(side: int) -> None:
 def test_a_block_looks_like_one() -> None:
     found = trace(block("rectangle", "shop").picture, TraceSettings())
     assert found.comb is not None
-    assert unlike_comb(found.comb) is None
+    assert unlike_comb(found.comb, 0.7) is None
 
 
 def honeycomb(pitch: float, count: int) -> NDArray[np.float64]:

@@ -22,6 +22,8 @@ from contour.walls.wall_evidence import BlockEvidence, RingEvidence
 _SAMPLES_PER_PITCH, _FINEST_PX = 5.5, 2
 # Of the gradient's usual size on the picture's flat parts; and in eighths of a grey level a sample.
 _SHARP, _LEAST_SHARP = 3.5, 10.0
+# A border that is nowhere narrower than so many samples is soft.
+_SOFT = 7
 # Of the gradient's usual size in comb: no border may be so much sharper than walls that comb itself looks flat.
 _OF_WALLS = 0.7
 # Shorter borders are specks, scratches and dust: no border of a thing that could hide an edge.
@@ -211,7 +213,10 @@ def _borders(slope: NDArray[np.int16], block: Bytes, samples: float) -> Bytes:
     level = max(_SHARP * usual, _LEAST_SHARP)
     if len(walls):
         level = min(level, _OF_WALLS * float(np.median(walls)))
-    sharp = slope > level
+    # Glare and half shadows on the table have borders as steep, but wide ones.
+    beside = np.where(block == 0, slope, np.int16(0))
+    wide = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((_SOFT, _SOFT), np.uint8))
+    sharp = slope - wide > level
     return _long(sharp, _SPECK_PITCHES * samples).astype(np.uint8)
 
 

@@ -1,8 +1,8 @@
 """Parts of an outline that have no cells behind them: there it runs over the table, over a label or along a cable.
 
 Just within a cut edge light changes from cell to cell as it does farther in. Where it does not, and what lies on both
-sides of the outline is alike, the outline has left the block. Where the two differ something may end there, a filled
-cell for one; but not over a few cells, for then what fills them is told as such.
+sides of the outline is alike, the outline has left the block. Where the two differ something ends there: filled cells,
+cut with those on both sides and in line with them, or a thing.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from contour.edge.edge_parts import EdgePart, light_beside, longest_part, with_sides
+from contour.edge.ring_places import runs_of
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import signed_area
@@ -25,8 +26,11 @@ _FARTHER_IN, _BEYOND = np.array([-1.5, -2.0]), np.array([0.4, 0.6, 0.8])
 _CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
 # Of the changes of light farther in: those where no cells are, and what both sides of the outline differ by where they
 # are alike; and over how much of it, pitches. The more bare and alike, the shorter: a corner drawn past the block's own
-# is no longer than that; and where both sides differ, filled cells are no shorter.
-_BARE = ((0.25, 0.2, 0.65), (0.45, 0.3, 1.0), (0.45, np.inf, 2.5))
+# is no longer than that.
+_BARE = ((0.25, 0.2, 0.65), (0.45, 0.3, 1.0))
+# The same where both sides differ, and the edge does not go on in line, up to a corner: most of it lies so little out
+# of the lines through so much of it on both sides or, on a curve, so little within.
+_UNEVEN, _FLANK, _FLUSH, _SUNK, _MOSTLY = (0.45, 2.5), (0.2, 3.0), 0.18, 0.5, 0.8
 
 
 def bare_edge(traced: Trace, pitch_px: float) -> EdgePart | None:
@@ -43,9 +47,11 @@ def bare_edge(traced: Trace, pitch_px: float) -> EdgePart | None:
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
         changes, apart = _within(light, lengths, at, out_px)
         judged = ~_known(traced, number, at, _BESIDE * pitch_px)
-        for quiet, alike, long in _BARE:
-            part = longest_part(judged & (changes < quiet) & (apart < alike), lengths, at, _SPACING)
-            if part is not None and part.length_pitches > long:
+        bare = [(judged & (changes < quiet) & (apart < alike), long) for quiet, alike, long in _BARE]
+        quiet, long = _UNEVEN
+        for chosen, least in [*bare, (_uneven(judged & (changes < quiet), lengths, at, out_px), long)]:
+            part = longest_part(chosen, lengths, at, _SPACING)
+            if part is not None and part.length_pitches > least:
                 found.append(part)
     return max(found, key=lambda one: one.length_pitches) if found else None
 
@@ -55,6 +61,20 @@ def _known(traced: Trace, ring: int, at: Float64s, beside_px: float) -> Bools:
     told = [one for one in traced.evidence or () if one.ring == ring and (one.state != "seen" or one.by is not None)]
     within = [(at > one.from_px - beside_px) & (at < one.to_px + beside_px) for one in told]
     return np.asarray(np.any(within, axis=0) if within else np.zeros(at.shape, np.bool_))
+
+
+def _uneven(chosen: Bools, lengths: RingLengths, at: Float64s, out_px: float) -> Bools:
+    """The runs of chosen places along a ring that are not in line with it on both sides, (N,)."""
+    kept = chosen.copy()
+    near, far = (reach * abs(out_px) for reach in _FLANK)
+    for run in runs_of(chosen) if chosen.any() else []:
+        stops = np.array([at[run[0]] - 0.5 * (near + far), at[run[-1]] + 0.5 * (near + far)])
+        outward = np.sign(out_px) * lengths.normals(stops, 0.5 * (far - near))
+        beyond = ((lengths.at(at[run])[:, None] - lengths.at(stops)) * outward).sum(axis=2) / abs(out_px)
+        in_line = (beyond < _FLUSH) & (beyond > -_SUNK)
+        both = np.mean(in_line[np.arange(len(run)), beyond.argmax(axis=1)]) > _MOSTLY
+        kept[run] = not (both and in_line[0, 0] and in_line[-1, 1])
+    return kept
 
 
 def _within(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s]:

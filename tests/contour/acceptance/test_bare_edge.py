@@ -78,26 +78,35 @@ def test_a_hole_drawn_too_small_is_told() -> None:
     assert shapely.Point(one.place_px).distance(HOLE.exterior) < 1.0
 
 
-def filled(height: float) -> NDArray[np.uint8]:
-    """A block with cells filled at its right edge, over so many pitches; they are as dark as nothing else is."""
+def filled(part: shapely.Polygon) -> NDArray[np.uint8]:
+    """A block whose cells are filled there, as dark as nothing else is."""
     picture = comb(BLOCK, 130)
-    half = round(0.5 * height * PITCH)
-    picture[208 - half : 208 + half, 340:400] = 15
+    cv2.fillPoly(picture, [np.rint(np.array(part.exterior.coords)).astype(np.int32)], 15)
     return picture
 
 
-def test_a_filled_cell_ends_as_the_edge_does_but_not_several() -> None:
-    assert found(filled(2.0), BLOCK) is None
-    assert found(filled(6.0), BLOCK) is not None
+@pytest.mark.parametrize(
+    "part",
+    [shapely.box(340, 180, 400, 230), shapely.box(340, 130, 400, 280), shapely.box(300, 250, 400, 336)],
+)
+def test_filled_cells_end_in_line_with_the_edge_and_at_a_corner_with_both(part: shapely.Polygon) -> None:
+    assert found(filled(part), BLOCK) is None
+
+
+LABEL = shapely.Polygon([(330, 130), (400 + 0.9 * PITCH, 130), (400 + 0.9 * PITCH, 280), (330, 280)])
+
+
+def test_a_thing_that_stands_out_of_the_edge_is_told() -> None:
+    one = found(filled(LABEL), BLOCK | LABEL)
+    assert one is not None
+    assert one.place_px[0] > 400
 
 
 @pytest.mark.parametrize(("state", "by"), [("seen", "compound"), ("bridged", "object"), ("covered", "object")])
 def test_what_is_told_to_fill_or_to_hide_the_edge_is_left_out(state: State, by: Hider) -> None:
-    outline = ring(BLOCK)
-    at = [float(np.abs(outline[:k] - np.roll(outline, -1, axis=0)[:k]).sum()) for k in range(5)]
-    right = next(k for k in range(4) if outline[k][0] == outline[(k + 1) % 4][0] == 400.0)
-    assert found(filled(6.0), BLOCK, Stretch(0, at[right], at[right + 1], state, by, 1.0)) is None
-    assert found(filled(6.0), BLOCK, Stretch(0, at[right], at[right + 1], "seen", None, 1.0)) is not None
+    whole = float((BLOCK | LABEL).length)
+    assert found(filled(LABEL), BLOCK | LABEL, Stretch(0, 0.0, whole, state, by, 1.0)) is None
+    assert found(filled(LABEL), BLOCK | LABEL, Stretch(0, 0.0, whole, "seen", None, 1.0)) is not None
 
 
 def test_such_a_contour_is_refused_with_the_place_and_the_next_step_where_the_picture_is_asked() -> None:

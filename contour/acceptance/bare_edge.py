@@ -27,10 +27,13 @@ _CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
 # Of the changes of light farther in: those where no cells are, and what both sides of the outline differ by where they
 # are alike; and over how much of it, pitches. The more bare and alike, the shorter: a corner drawn past the block's own
 # is no longer than that.
-_BARE = ((0.25, 0.2, 0.65), (0.45, 0.3, 1.0))
-# The same where both sides differ, and the edge does not go on in line, up to a corner: most of it lies so little out
-# of the lines through so much of it on both sides or, on a curve, so little within.
-_UNEVEN, _FLANK, _FLUSH, _SUNK, _MOSTLY = (0.45, 2.5), (0.2, 3.0), 0.18, 0.5, 0.8
+_BARE = ((0.25, 0.2, 0.65), (0.45, 0.3, 1.0), (0.45, np.inf, 2.5))
+# Lines on which the edge goes on on both sides run through so much of it. Where it is as straight as that in between,
+# cells are lost, but no more of them.
+_FLANK, _STRAIGHT, _LOST = (0.2, 3.0), 0.1, 2.5
+# Filled cells stand so little out of these lines, up to the corner where they meet, or, on a curve, lie so little
+# within; most of them.
+_FLUSH, _SUNK, _MOSTLY = 0.18, 0.5, 0.8
 
 
 def bare_edge(traced: Trace, pitch_px: float) -> EdgePart | None:
@@ -47,11 +50,14 @@ def bare_edge(traced: Trace, pitch_px: float) -> EdgePart | None:
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
         changes, apart = _within(light, lengths, at, out_px)
         judged = ~_known(traced, number, at, _BESIDE * pitch_px)
-        bare = [(judged & (changes < quiet) & (apart < alike), long) for quiet, alike, long in _BARE]
-        quiet, long = _UNEVEN
-        for chosen, least in [*bare, (_uneven(judged & (changes < quiet), lengths, at, out_px), long)]:
+        for quiet, alike, long in _BARE:
+            chosen = judged & (changes < quiet) & (apart < alike)
+            for run in runs_of(chosen) if chosen.any() else []:
+                out = _out_of_line(lengths, at[run], out_px)
+                lost = np.abs(out).max() < _STRAIGHT and _SPACING * len(run) < _LOST
+                chosen[run] = not (lost or (np.isinf(alike) and _in_line(out)))
             part = longest_part(chosen, lengths, at, _SPACING)
-            if part is not None and part.length_pitches > least:
+            if part is not None and part.length_pitches > long:
                 found.append(part)
     return max(found, key=lambda one: one.length_pitches) if found else None
 
@@ -63,18 +69,21 @@ def _known(traced: Trace, ring: int, at: Float64s, beside_px: float) -> Bools:
     return np.asarray(np.any(within, axis=0) if within else np.zeros(at.shape, np.bool_))
 
 
-def _uneven(chosen: Bools, lengths: RingLengths, at: Float64s, out_px: float) -> Bools:
-    """The runs of chosen places along a ring that are not in line with it on both sides, (N,)."""
-    kept = chosen.copy()
+def _out_of_line(lengths: RingLengths, at: Float64s, out_px: float) -> Float64s:
+    """How far places along a part of a ring lie out of the lines through it before and behind that part, (N, 2),
+    pitches.
+    """
     near, far = (reach * abs(out_px) for reach in _FLANK)
-    for run in runs_of(chosen) if chosen.any() else []:
-        stops = np.array([at[run[0]] - 0.5 * (near + far), at[run[-1]] + 0.5 * (near + far)])
-        outward = np.sign(out_px) * lengths.normals(stops, 0.5 * (far - near))
-        beyond = ((lengths.at(at[run])[:, None] - lengths.at(stops)) * outward).sum(axis=2) / abs(out_px)
-        in_line = (beyond < _FLUSH) & (beyond > -_SUNK)
-        both = np.mean(in_line[np.arange(len(run)), beyond.argmax(axis=1)]) > _MOSTLY
-        kept[run] = not (both and in_line[0, 0] and in_line[-1, 1])
-    return kept
+    stops = np.array([at[0] - 0.5 * (near + far), at[-1] + 0.5 * (near + far)])
+    outward = lengths.normals(stops, 0.5 * (far - near)) / out_px
+    return np.asarray(((lengths.at(at)[:, None] - lengths.at(stops)) * outward).sum(axis=2))
+
+
+def _in_line(out: Float64s) -> bool:
+    """Whether a part of a ring ends where the lines before and behind it do, up to the corner where these meet."""
+    near = (out < _FLUSH) & (out > -_SUNK)
+    most = np.mean(near[np.arange(len(out)), out.argmax(axis=1)]) > _MOSTLY
+    return bool(most and near[0, 0] and near[-1, 1])
 
 
 def _within(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s]:

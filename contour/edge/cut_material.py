@@ -15,6 +15,7 @@ from contour.edge.table_look import TableLook
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring, oriented
+from contour.geometry.signed_distance import depth_inside
 from contour.image.pixel_grid import pixels_of, samples_of
 from contour.image.pixel_sampling import planes_of, sample_at
 from contour.walls.wall_evidence import EdgePoints, RingEvidence
@@ -33,17 +34,20 @@ _STEP_PX = 0.5
 _LEAST_CONTRAST = 6.0
 
 
-def cut_material(picture: Bytes, clear: RingEvidence, distrusted: Float64s, look: TableLook) -> EdgePoints:
+def cut_material(
+    picture: Bytes, clear: RingEvidence, fitted: Ring, distrusted: Float64s, look: TableLook
+) -> EdgePoints:
     """The ends of what fills cells up to the edge, in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `clear`: the ring's witnesses that lie at nothing foreign. `distrusted`: ends of walls at something foreign, (N, 2).
+    `clear`: the ring's witnesses that lie at nothing foreign; `fitted`: the outline through them, pixels. `distrusted`:
+    ends of walls at something foreign, (N, 2).
     """
     ring = _with_things(clear, distrusted, look)
     at_thing = look.foreign_at(ring) < _EDGE_PITCHES * look.pitch_px + look.step
     if at_thing.all() or not at_thing.any():
         return EdgePoints()
     border = ring, _normals(ring, max(1, round(0.5 * look.pitch_px / look.step)))
-    found = [_cut(picture, clear, border, run, look) for run in runs_of(at_thing)]
+    found = [_cut(picture, (clear, fitted), border, run, look) for run in runs_of(at_thing)]
     return EdgePoints(
         np.concatenate([one.points for one in found]),
         np.concatenate([one.position for one in found]),
@@ -52,9 +56,12 @@ def cut_material(picture: Bytes, clear: RingEvidence, distrusted: Float64s, look
 
 
 def _cut(
-    picture: Bytes, clear: RingEvidence, border: tuple[Ring, Float64s], run: Indices, look: TableLook
+    picture: Bytes, seen: tuple[RingEvidence, Ring], border: tuple[Ring, Float64s], run: Indices, look: TableLook
 ) -> EdgePoints:
-    """The run of a border where it is cut material, flush with the edges on its two sides; none of it where not."""
+    """The run of a border where it is cut material, flush with the edges on its two sides, which go on straight or as
+    the outline does that was fitted to what is `seen` of them; none of it where not.
+    """
+    clear, fitted = seen
     place, normal = border[0][run], border[1][run]
     pitch_px = look.pitch_px
     off, sure = _steps(picture, place, normal, _EDGE_PITCHES * pitch_px)
@@ -63,12 +70,16 @@ def _cut(
     lengths = RingLengths.of(clear.coarse)
     nearest = [int(((clear.coarse - place[end]) ** 2).sum(axis=1).argmin()) for end in (0, -1)]
     first, last = lengths.starts[nearest].tolist()
-    out = out_of_flanks(clear, (first, last), ends, pitch_px)
-    if out is None:
-        return EdgePoints()
+    curved = (1.0 if clear.is_hole else -1.0) * depth_inside(fitted, ends)
+    straight = out_of_flanks(clear, (first, last), ends, pitch_px)
     # What is darker than the table may as well be a shadow beside the block.
     lit = look.lighter_at(place - _EDGE_PITCHES * pitch_px * normal)
-    cut = sure & beyond & lit & (out < _FLUSH_PITCHES * pitch_px) & (out > -_SUNK_PITCHES * pitch_px)
+    cuts = [
+        sure & beyond & lit & (out < _FLUSH_PITCHES * pitch_px) & (out > -_SUNK_PITCHES * pitch_px)
+        for out in (straight, curved)
+        if out is not None
+    ]
+    cut = max(cuts, key=np.count_nonzero)
     if np.count_nonzero(cut) < _CUT_SHARE * len(run):
         return EdgePoints()
     share = np.linspace(0.0, 1.0, len(run))[cut]

@@ -80,7 +80,7 @@ def fit_visible(
     distrusted = near & ((apart > _AGREE_PITCHES * look.pitch_px) | _at_corners(near, evidence, ring, look.pitch_px))
     if not distrusted.any():
         return _plain(evidence, fit(evidence))
-    fills = cut_material(picture, clear, evidence.points[distrusted], look)
+    fills = cut_material(picture, clear, ring, evidence.points[distrusted], look)
     walls = _without(evidence, distrusted, look)
     trusted, order = walls.joined_by(fills, _FILL_SIGMA_PX, WitnessKind.BLUNT)
     return VisibleRing(trusted, fit(trusted), evidence.points[distrusted], order >= len(walls.points))

@@ -42,7 +42,7 @@ def found(
     area: NDArray[np.float64], image: NDArray[np.uint8], there: TableLook, gap: tuple[float, float] = GAP
 ) -> EdgePoints:
     clear = replace(witnesses(BLOCK, seed=1, gaps=(gap,)), coarse=densified(BLOCK, 5.0))
-    return cut_material(image, clear, area[:2], there)
+    return cut_material(image, clear, BLOCK, area[:2], there)
 
 
 @pytest.mark.parametrize("colour", [False, True])
@@ -66,6 +66,17 @@ def test_what_ends_flush_around_a_corner_is_cut_too() -> None:
     assert distances(one.points, BLOCK).mean() < 0.05 * PITCH
 
 
+def test_what_ends_on_a_curve_that_goes_on_along_it_is_cut_too() -> None:
+    """Over so many cells the curve leaves the lines on both sides."""
+    round_block, gap = circle(15.0 * PITCH), (100.0, 340.0)
+    points, normal = along(round_block, np.linspace(*gap, 30))
+    area = np.vstack([points, (points - 3.0 * PITCH * normal)[::-1]])
+    clear = replace(witnesses(round_block, seed=1, gaps=(gap,)), coarse=densified(round_block, 5.0))
+    one = cut_material(picture(area), clear, round_block, area[[0, 29]], look(round_block, area))
+    assert len(one.points) > 20
+    assert distances(one.points, round_block).mean() < 0.05 * PITCH
+
+
 def test_a_label_over_a_small_round_block_is_none() -> None:
     """It ends inside of the lines of the edge on both sides, which meet far out; but not on either of them."""
     round_block = circle(5.0 * PITCH)
@@ -75,7 +86,7 @@ def test_a_label_over_a_small_round_block_is_none() -> None:
     label = np.array([inner - side, inner + side, outer + side, outer - side])
     gap = (200.0 - 3.0 * PITCH, 200.0 + 3.0 * PITCH)
     clear = replace(witnesses(round_block, seed=1, gaps=(gap,)), coarse=densified(round_block, 5.0))
-    assert not len(cut_material(picture(label), clear, label[:2], look(round_block, label)).points)
+    assert not len(cut_material(picture(label), clear, round_block, label[:2], look(round_block, label)).points)
 
 
 @pytest.mark.parametrize("out", [0.4, 1.0, 3.0])

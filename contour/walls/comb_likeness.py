@@ -12,8 +12,9 @@ from contour.geometry.arrays import Float64s, Indices, Int32s
 
 # Walls of fine cells look wide; from this pitch on they look as wide as they are.
 _FINE_PITCH_PX = 15.0
-# Full width at half maximum of blur over its standard deviation.
-_BLUR_WIDTH = 2.355
+# Walls look wider by about this, and, where blur is wider than that, by it: its full width at half maximum over its
+# standard deviation.
+_WIDER_PX, _BLUR_WIDTH = 1.5, 2.355
 # Of 183 scenes with cells of more than 15 px only foam has walls wider than 0.28 of their pitch, and of 60 that were
 # defocused or moved three have 0.31 to 0.32; of prints and boards the narrowest are 0.34.
 _WIDEST_WALL = 0.31
@@ -64,7 +65,8 @@ def unlike_comb(comb: Comb, blur_px: float) -> str | None:
 
     `blur_px`: standard deviation of the picture's blur there; it makes walls look wider, and is taken off.
     """
-    share = math.sqrt(max(comb.wall_px**2 - (_BLUR_WIDTH * blur_px) ** 2, 0.0)) / comb.pitch_px
+    sharp_px = math.sqrt(max(comb.wall_px**2 - (_BLUR_WIDTH * blur_px) ** 2, 0.0))
+    share = min(sharp_px, comb.wall_px - _WIDER_PX) / comb.pitch_px
     # Foam has wide bright walls, and cells of all sizes between them.
     even = not comb.bright or comb.regular > _REGULAR
     if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and even:

@@ -244,7 +244,7 @@ def test_what_is_no_comb_is_no_block() -> None:
     seen = traced(comb=Comb(86.0, 35.6, False, 42, 1.0, 1.0))
     (finding,) = judge(GOOD, FRAME, LIMITS, traced=seen)
     assert finding.refusal == Refusal.NO_BLOCK_FOUND
-    assert "41 % as wide" in finding.text
+    assert "40 % as wide" in finding.text
     assert judge(GOOD, FRAME, LIMITS, traced=traced(comb=Comb(24.0, 3.0, True, 300, 0.6, 0.6))) == ()
 
 

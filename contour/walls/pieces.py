@@ -23,6 +23,10 @@ _FEWEST_CELLS = 7
 # Bridges an open cell at the border.
 _CLOSING_PITCHES = 0.72
 _FRAME_PX = 2
+# A strip of swarf beside the block has closed cells of its own, and broken walls have none; but of a block that seems
+# to be in two, parts as large as this may be its own. No such strip has less wall, pitches times pixels.
+_LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
+_LEAST_CELL = 0.2
 _HEXAGON = 2 / np.sqrt(3)
 
 
@@ -68,6 +72,27 @@ def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) 
             ring = pixels_of(_outline(filled) + np.array([x, y]), whole)
             found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring))
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
+
+
+def without_loose_pieces(mask: Bytes, pitch_px: float) -> Bytes:
+    """A wall mask (H, W), uint8, 255 on walls, without small pieces of comb whose walls nowhere touch the block's,
+    however near they lie: strips of swarf, chips. Where no piece holds most of the walls, nothing is taken out.
+    """
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    area = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
+    area[0] = 0.0
+    if area.max() <= _MOST_WALLS * area.sum():
+        return mask
+    small = (area > _LEAST_WALL * pitch_px) & (area < _LOOSE_SHARE * area.max())
+    small &= np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > pitch_px
+    loose = np.zeros(len(area), np.bool_)
+    for number in np.flatnonzero(small):
+        x, y, w, h = (int(value) for value in stats[number, :4])
+        walls = (labels[y : y + h, x : x + w] == number).astype(np.uint8)
+        rings, around = cv2.findContours(walls, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+        holes = [ring for ring, outer in zip(rings, around[0, :, 3], strict=True) if outer >= 0]
+        loose[number] = sum(cv2.contourArea(hole) > _LEAST_CELL * pitch_px**2 for hole in holes) >= _LOOSE_CELLS
+    return np.where(loose[labels], np.uint8(0), mask) if loose.any() else mask
 
 
 def reaches_frame(mask: Bytes, block: CoarseBlock) -> bool:

@@ -17,7 +17,7 @@ from contour.walls.coarse_rings import CoarseBlock
 from contour.walls.dark_material import dark_edge, midway_to_table
 from contour.walls.faint_links import with_faint_links
 from contour.walls.lightness import light_from_table
-from contour.walls.pieces import pieces_beside, reaches_frame
+from contour.walls.pieces import pieces_beside, reaches_frame, without_loose_pieces
 from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import FINE_PITCH, WallMask, wall_mask, without_specks
 from contour.walls.wall_witnesses import block_evidence
@@ -75,8 +75,10 @@ def see_block(
     else:
         seen = replace(seen, mask=with_faint_links(seen.mask, seen.faint, cells.pitch_px / scale))
     on_mask()
+    every = seen.mask
+    seen = replace(seen, mask=without_loose_pieces(every, cells.pitch_px / scale))
     coarse = coarse_block(seen.mask, small, cells.pitch_px / scale)
-    others = pieces_beside(seen.mask, coarse.rings[0].vertices, cells.pitch_px / scale, scale)
+    others = pieces_beside(every, coarse.rings[0].vertices, cells.pitch_px / scale, scale)
     evidence = block_evidence(light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)

@@ -9,7 +9,7 @@ import pytest
 from contour.geometry.rings import Contour, area
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
-from contour.walls.pieces import pieces_beside
+from contour.walls.pieces import pieces_beside, without_loose_pieces
 from tests.support.pictures.small_scenes import block
 
 PITCH = 20.0
@@ -104,3 +104,40 @@ def test_a_traced_picture_tells_of_the_block_beside(method: str) -> None:
     two = np.concatenate([one, one[:, :420]], axis=1)
     (other,) = trace(two, TraceSettings(method=method)).others
     assert other.area_px2 > 5000
+
+
+def with_strip(columns: int, rows: int, gap_px: int) -> np.ndarray:
+    """A comb of 12 by 12 cells with a strip below it, its walls so far from the comb's."""
+    mask, strip = empty(), empty()
+    comb(mask, 100, 40, 12, 12)
+    comb(strip, 110, 100, columns, rows)
+    bottom, top = (int(np.flatnonzero(part.any(axis=1))[place]) for part, place in ((mask, -1), (strip, 0)))
+    return mask | np.roll(strip, bottom + gap_px + 1 - top, axis=0)
+
+
+def test_a_strip_of_swarf_is_taken_out_however_near_it_lies_and_the_block_stays() -> None:
+    alone = empty()
+    comb(alone, 100, 40, 12, 12)
+    found = without_loose_pieces(with_strip(8, 1, 1), PITCH)
+    assert (found == alone).all()
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "gap_px"),
+    [(8, 1, 0), (12, 4, 2), (1, 1, 2)],
+    ids=["one that touches it", "a part as large as a third of it", "a cell"],
+)
+def test_what_may_be_the_blocks_own_stays(columns: int, rows: int, gap_px: int) -> None:
+    mask = with_strip(columns, rows, gap_px)
+    assert without_loose_pieces(mask, PITCH) is mask
+
+
+def test_broken_walls_beside_the_block_stay_and_so_do_fragments_of_a_faint_one() -> None:
+    torn = empty()
+    comb(torn, 100, 40, 12, 12)
+    cv2.polylines(torn, [np.array([[110, 265], [180, 262], [260, 268]], np.int32)], False, 255, 3)
+    assert without_loose_pieces(torn, PITCH) is torn
+    fragments = empty()
+    for left in (40, 180, 320, 460):
+        comb(fragments, left, 60, 5, 5)
+    assert without_loose_pieces(fragments, PITCH) is fragments

@@ -39,5 +39,20 @@ def _line(
     _, vectors = np.linalg.eigh(spread.T @ spread)
     normal = vectors[:, 0]
     normal = normal if normal @ clear.normal[beside].mean(axis=0) >= 0 else -normal
+    normal = _straightened(spread, normal, pitch_px)
     # Broken walls lie inside: the line goes through the outer half.
     return middle + float(np.median(spread @ normal)) * normal, normal
+
+
+def _straightened(spread: Float64s, normal: Float64s, pitch_px: float) -> Float64s:
+    """The normal of the line that as many pairs of points rise from as fall (Theil and Sen): two broken walls in eight
+    turn the line of least squares by so much that it runs along the thing beside them.
+    """
+    along = np.array([normal[1], -normal[0]])
+    one, other = np.triu_indices(len(spread), 1)
+    across = spread[other] - spread[one]
+    far = np.abs(across @ along) > pitch_px / 2
+    if not far.any():
+        return normal
+    tilt = float(np.median((across[far] @ normal) / (across[far] @ along)))
+    return np.asarray((normal - tilt * along) / np.hypot(1.0, tilt), np.float64)

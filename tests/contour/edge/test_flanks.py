@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,16 @@ def test_it_is_the_distance_from_the_line_of_the_edge(out: float) -> None:
     found = out_of_flanks(CLEAR, STOPS, points + out * normal, PITCH)
     assert found is not None
     assert found == pytest.approx([out] * 3, abs=0.05 * PITCH)
+
+
+def test_two_broken_walls_beside_it_do_not_turn_the_line() -> None:
+    broken = np.isin(CLEAR.position, np.sort(CLEAR.position[CLEAR.position < STOPS[0]])[-3::2])
+    _, normal = along(BLOCK, CLEAR.position)
+    clear = replace(CLEAR, points=CLEAR.points - 0.8 * PITCH * broken[:, None] * normal)
+    points, _ = along(BLOCK, np.array([300.0, 350.0, 400.0]))
+    found = out_of_flanks(clear, STOPS, points, PITCH)
+    assert found is not None
+    assert np.abs(found).max() < 0.15 * PITCH
 
 
 def test_around_a_corner_what_lies_inside_of_both_edges_does_not_stand_out() -> None:

@@ -49,8 +49,9 @@ _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
 class Coefficients:
     """Standard deviation that one pixel of each cause stands for.
 
-    Fitted by `python -m benchmarks.accuracy.uncertainty --calibrate`, but for two things: the fit all but leaves `gap`
-    out, which is kept, for a longer gap must state more; and all are a tenth larger, for of a fresh set 90 % had held.
+    Fitted as `python -m benchmarks.accuracy.uncertainty --calibrate` does it, on fewer scenes, but for two things: the
+    fit all but leaves `gap` out, which is kept, for a longer gap must state more; and all are a tenth larger, for of a
+    fresh set 90 % had held.
     """
 
     blur: float = 0.374

@@ -2,7 +2,8 @@
 
 Pictures of `shop_floor_scenes`, measured as the service measures them, by a recipe that says nothing. An accepted
 outline is wrong where a visible place of the true outline lies farther than half a cell from it, or a place of it
-farther than half a cell from the true outline, hidden parts included.
+farther than half a cell from the true outline, hidden parts included. With `--taught` the empty table is taught first,
+from four pictures, and the usual kinds are those in which it is no plain dark one.
 """
 
 from __future__ import annotations
@@ -20,11 +21,14 @@ import cv2
 import numpy as np
 
 from benchmarks.page_section import put_section, table
+from contour.errors import PictureError
 from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.rings import Contour
-from contour.synthetic import Rendered, render
+from contour.image.taught_table import teach
+from contour.synthetic import Rendered, render, render_empty_table
 from service.config.recipes import Recipe
 from service.measuring.measure import Measurer
+from service.measuring.table_file import TableRecord
 from tests.support.scenes.metrics import distances, rectified_edges, samples
 from tests.support.scenes.shop_floor_scenes import KINDS, ShopFloorScene, shop_floor_scene
 from tests.support.scenes.trials import calibration_for
@@ -32,7 +36,23 @@ from tests.support.scenes.trials import calibration_for
 FIRST = 500_000
 WRONG_PITCHES = 0.5
 SPACING_PX = 1.0
+TAUGHT_FROM = 4
+STRUCTURED = ("light_table", "wood", "brushed", "slots", "old_cuts")
 TRUE, HIDDEN, FOUND = (80, 220, 60), (0, 200, 255), (60, 60, 255)
+
+_SAID = """\
+## When things lie on the block
+
+Scenes of `tests/support/scenes/shop_floor_scenes.py`, seeds {first} to {last} of each kind, through the same code as \
+the service's (`python -m benchmarks.accuracy.shop_floor --write`). Wrong: accepted, and off by more than half a cell \
+somewhere. Hidden: part of the edge is covered, and the outline was accepted all the same. Refused: how many by which \
+code. Bound broken: less than 95 % of the visible outline lie within the bound; its ratio to the true 95th percentile \
+is the median."""
+_SAID_OF_TAUGHT = """\
+### On a table that was taught
+
+Seeds {first} to {last} of the kinds in which the table is no plain dark one, taught before from pictures of it empty \
+(`python -m benchmarks.accuracy.shop_floor --taught --write`)."""
 
 
 @dataclass(frozen=True)
@@ -86,19 +106,29 @@ class Verdict:
         return " ".join([*parts, f"pitch {self.pitch_px:4.1f} px", cells, bound, broken, hidden]).strip()
 
 
-def judged(kind: str, seed: int, *, alone: bool = False, save: Path | None = None) -> Verdict:
+def judged(kind: str, seed: int, *, alone: bool = False, taught: bool = False, save: Path | None = None) -> Verdict:
     """The verdict on one picture; an overlay goes to the folder `save` where it is wrong."""
     scene = shop_floor_scene(kind, seed, alone=alone)
     rendered = render(scene.scene)
-    verdict, found = _measured(scene, rendered)
+    verdict, found = _measured(scene, rendered, _taught(scene) if taught else None)
     if save is not None and verdict.wrong:
         cv2.imwrite(str(save / f"{scene.name}.png"), overlay(rendered, found))
     return verdict
 
 
-def _measured(scene: ShopFloorScene, rendered: Rendered) -> tuple[Verdict, Contour | None]:
+def _taught(scene: ShopFloorScene) -> TableRecord | None:
+    """The scene's table as a user would teach it; None where that is refused, as of pictures hard compressed."""
+    try:
+        return TableRecord(teach(render_empty_table(scene.scene, TAUGHT_FROM)), "", TAUGHT_FROM, "")
+    except PictureError:
+        return None
+
+
+def _measured(
+    scene: ShopFloorScene, rendered: Rendered, empty: TableRecord | None = None
+) -> tuple[Verdict, Contour | None]:
     calibration = calibration_for(rendered.camera)
-    seen = Measurer(calibration).measure(rendered.picture, _recipe(), rendered.thickness_mm)
+    seen = Measurer(calibration, table=empty).measure(rendered.picture, _recipe(), rendered.thickness_mm)
     codes = tuple(int(reason) for reason in seen.reasons)
     places, clear = true_places(rendered)
     hidden_px = float(SPACING_PX * np.count_nonzero(~clear))
@@ -150,18 +180,12 @@ def overlay(rendered: Rendered, found: Contour | None) -> np.ndarray[tuple[int, 
     return np.asarray(drawn, dtype=np.uint8)
 
 
-def report(verdicts: Sequence[Verdict], seeds: Sequence[int]) -> str:
+def report(verdicts: Sequence[Verdict], seeds: Sequence[int], *, taught: bool = False) -> str:
     """The section of the accuracy page, its table with a row a kind."""
-    rows = [_row(name, [v for v in verdicts if v.row == name]) for name in dict.fromkeys(v.row for v in verdicts)]
     head = ["", "pictures", "right", "of them hidden", "wrong, accepted", "refused", "bound broken", "bound over true"]
-    return (
-        "## When things lie on the block\n\n"
-        f"Scenes of `tests/support/scenes/shop_floor_scenes.py`, seeds {seeds[0]} to {seeds[-1]} of each kind, through "
-        "the same code as the service's (`python -m benchmarks.accuracy.shop_floor --write`). Wrong: accepted, and off "
-        "by more than half a cell somewhere. Hidden: part of the edge is covered, and the outline was accepted all the "
-        "same. Refused: how many by which code. Bound broken: less than 95 % of the visible outline lie within the "
-        "bound; its ratio to the true 95th percentile is the median.\n\n" + table(head, [*rows, _row("all", verdicts)])
-    )
+    rows = [_row(name, [v for v in verdicts if v.row == name]) for name in dict.fromkeys(v.row for v in verdicts)]
+    said = _SAID_OF_TAUGHT if taught else _SAID
+    return f"{said.format(first=seeds[0], last=seeds[-1])}\n\n{table(head, [*rows, _row('all', verdicts)])}"
 
 
 def _row(name: str, some: Sequence[Verdict]) -> list[str]:
@@ -177,11 +201,11 @@ def _row(name: str, some: Sequence[Verdict]) -> list[str]:
 
 
 def run(
-    kinds: Iterable[str], seeds: Sequence[int], *, alone: bool, save: Path | None, workers: int
+    kinds: Iterable[str], seeds: Sequence[int], *, alone: bool, taught: bool, save: Path | None, workers: int
 ) -> Iterator[Verdict]:
     """The verdicts on all kinds and seeds, in order."""
     jobs = [(kind, seed) for kind in kinds for seed in seeds]
-    judge = partial(judged, alone=alone, save=save)
+    judge = partial(judged, alone=alone, taught=taught, save=save)
     if workers == 1:
         cv2.setNumThreads(1)
         yield from (judge(*job) for job in jobs)
@@ -193,16 +217,18 @@ def run(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when no wrong outline was accepted, else 1."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy.shop_floor", description=__doc__)
-    parser.add_argument("--kinds", default=",".join(KINDS), help="comma-separated; all if not given")
+    parser.add_argument("--kinds", help="comma-separated; all if not given (with --taught: tables that are not plain)")
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="pictures of each kind")
     parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="the first seed")
     parser.add_argument("--alone", action="store_true", help="never two kinds at once")
+    parser.add_argument("--taught", action="store_true", help="teach the empty table before each picture")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")
     parser.add_argument("--list", action="store_true", help="a line for each picture as well")
     parser.add_argument("--write", action="store_true", help="write the section of docs/reports/accuracy.md")
     parser.add_argument("--save", type=Path, metavar="DIR", help="overlays of wrong outlines go here")
     options = parser.parse_args(arguments)
-    kinds = options.kinds.split(",")
+    usual = STRUCTURED if options.taught else tuple(KINDS)
+    kinds = options.kinds.split(",") if options.kinds else usual
     unknown = [kind for kind in kinds if kind not in KINDS]
     if unknown:
         parser.error(f"unknown kinds {', '.join(unknown)}; expected some of {', '.join(KINDS)}")
@@ -210,14 +236,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.save.mkdir(parents=True, exist_ok=True)
     seeds = range(options.first, options.first + options.seeds)
     verdicts = []
-    for verdict in run(kinds, seeds, alone=options.alone, save=options.save, workers=options.workers):
+    how = {"alone": options.alone, "taught": options.taught, "save": options.save, "workers": options.workers}
+    for verdict in run(kinds, seeds, **how):
         verdicts.append(verdict)
         if options.list:
             print(verdict.line(), flush=True)
-    text = report(verdicts, seeds)
+    text = report(verdicts, seeds, taught=options.taught)
     print(text)
     if options.write:
-        put_section("shop-floor", text)
+        put_section("shop-floor-taught" if options.taught else "shop-floor", text)
     return int(any(verdict.wrong for verdict in verdicts))
 
 

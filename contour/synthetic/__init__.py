@@ -23,7 +23,7 @@ from contour.synthetic.outlines import (
     u_shape,
     with_holes,
 )
-from contour.synthetic.rendering import Rendered, pitch_px, render, truth_px
+from contour.synthetic.rendering import Rendered, pitch_px, render, render_empty_table, truth_px
 from contour.synthetic.scene import Clutter, Light, Material, Scene, Sensor, Table
 from contour.synthetic.things import (
     Cover,
@@ -77,6 +77,7 @@ __all__ = [
     "polygon",
     "rectangle",
     "render",
+    "render_empty_table",
     "signed_distance",
     "thick_line",
     "truth_px",

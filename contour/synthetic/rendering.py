@@ -17,8 +17,11 @@ from contour.synthetic.shop_floor.lights import add_flares, faded, shaded
 from contour.synthetic.shop_floor.marks import ink_tops, inked_table, mirrored, tints
 from contour.synthetic.shop_floor.structures import structured
 from contour.synthetic.surface import surface
-from contour.synthetic.table import smooth_noise, table_glare, table_light
+from contour.synthetic.table import bare_table, smooth_noise, table_glare, table_light
 from contour.synthetic.things import Strip
+
+# Far from the seeds of scenes: noise is not that of the picture with the block.
+_EMPTY_SEED = 2_000_000_000
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,14 @@ def render(scene: Scene) -> Rendered:
     truth = truth_px(scene)
     seen = visible(scene, truth)
     return Rendered(picture, truth, scene.outline, scene.camera, scene.thickness_mm, pitch_px(scene), seen)
+
+
+def render_empty_table(scene: Scene, count: int) -> list[Bytes]:
+    """Pictures of the scene's table with nothing on it, as `render` gives them, each with noise of its own."""
+    light = np.maximum(bare_table(scene), 0.0) * structured(scene) * illumination(scene)
+    tints = scene.table.colour if scene.sensor.colour else (1.0,)
+    planes = [np.asarray(light * np.float32(tint), dtype=np.float32) for tint in tints]
+    return [expose(scene.sensor, planes, _EMPTY_SEED + scene.seed + number) for number in range(count)]
 
 
 def truth_px(scene: Scene) -> Contour:

@@ -16,7 +16,15 @@ from contour.synthetic.scene import Scene
 
 
 def table_light(scene: Scene) -> Float32s:
-    """Light the table returns under light 1, shape (H, W), float32."""
+    """Light the table returns under light 1 with the block on it, shape (H, W), float32."""
+    picture = bare_table(scene)
+    _shade(scene, picture)
+    _chips(scene, picture)
+    return np.maximum(picture, 0.0, out=picture)
+
+
+def bare_table(scene: Scene) -> Float32s:
+    """Light the empty table returns under light 1, shape (H, W), float32."""
     camera, table = scene.camera, scene.table
     rng = np.random.default_rng([scene.seed, 31])
     picture = np.full((camera.height, camera.width), table.level, dtype=np.float32)
@@ -27,9 +35,7 @@ def table_light(scene: Scene) -> Float32s:
         _machined(scene, picture)
     for _ in range(table.scratches):
         _scratch(rng, picture, table.level)
-    _shade(scene, picture)
-    _chips(scene, picture)
-    return np.maximum(picture, 0.0, out=picture)
+    return picture
 
 
 def table_glare(scene: Scene) -> Float32s:

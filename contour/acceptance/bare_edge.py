@@ -28,9 +28,8 @@ _CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
 # are alike; and over how much of it, pitches. The more bare and alike, the shorter: a corner drawn past the block's own
 # is no longer than that.
 _BARE = ((0.25, 0.2, 0.65), (0.45, 0.3, 1.0), (0.45, np.inf, 2.5))
-# Lines on which the edge goes on on both sides run through so much of it. Where it is as straight as that in between,
-# cells are lost, but no more of them.
-_FLANK, _STRAIGHT, _LOST = (0.2, 3.0), 0.1, 2.5
+# Lines on which the edge goes on on both sides run through so much of it.
+_FLANK = (0.2, 3.0)
 # Filled cells stand so little out of these lines, up to the corner where they meet, or, on a curve, lie so little
 # within; most of them.
 _FLUSH, _SUNK, _MOSTLY = 0.18, 0.5, 0.8
@@ -52,10 +51,8 @@ def bare_edge(traced: Trace, pitch_px: float) -> EdgePart | None:
         judged = ~_known(traced, number, at, _BESIDE * pitch_px)
         for quiet, alike, long in _BARE:
             chosen = judged & (changes < quiet) & (apart < alike)
-            for run in runs_of(chosen) if chosen.any() else []:
-                out = _out_of_line(lengths, at[run], out_px)
-                lost = np.abs(out).max() < _STRAIGHT and _SPACING * len(run) < _LOST
-                chosen[run] = not (lost or (np.isinf(alike) and _in_line(out)))
+            for run in runs_of(chosen) if np.isinf(alike) and chosen.any() else []:
+                chosen[run] = not _in_line(_out_of_line(lengths, at[run], out_px))
             part = longest_part(chosen, lengths, at, _SPACING)
             if part is not None and part.length_pitches > long:
                 found.append(part)

@@ -63,7 +63,7 @@ class QualityLimits:
     cells of a few pixels cannot look sharper than the pixels are.
     """
 
-    max_blur_pitches: float = 0.13
+    max_blur_pitches: float = 0.12
     max_blur_px: float = 1.9
     max_clipped_share: float = 0.25
     min_level: float = 16.0

@@ -216,7 +216,7 @@ def _borders(slope: NDArray[np.int16], block: Bytes, samples: float) -> Bytes:
     # Glare and half shadows on the table have borders as steep, but wide ones.
     beside = np.where(block == 0, slope, np.int16(0))
     wide = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((_SOFT, _SOFT), np.uint8))
-    sharp = slope - wide > level
+    sharp = np.where(wide > level, slope - wide, slope) > level
     return _long(sharp, _SPECK_PITCHES * samples).astype(np.uint8)
 
 

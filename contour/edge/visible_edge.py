@@ -28,6 +28,8 @@ _FEWEST, _FEW = 8, 3
 # a wall at such a thing.
 _SUPPORT_PITCHES, _HIDES_PITCHES, _FOOT_PITCHES = 0.8, 0.5, 1.5
 _FILL_SIGMA_PX = 0.7
+# A wall that ends at a thing so far outside of the outline is left out by it.
+_OUT_PITCHES = 0.35
 # A shadow along less of the edge than this may be a dark thing over a corner; and a dent that a thing leaves turns in
 # by more than this, and out before and after, no farther from there.
 _SHADOW_PITCHES, _DENT_DEG, _OUT_DEG = 8.0, 60.0, 30.0
@@ -41,18 +43,22 @@ Fit = Callable[[RingEvidence], FittedRing]
 class VisibleRing:
     """A fitted ring, the witnesses it went through, and the places (N, 2), pixels, where walls ended at something that
     lies over the edge. `filled`: witnesses of the evidence that are ends of filled cells, not of walls, shape (N,).
+    `outside`: those of `distrusted` that lie outside of the ring, where the block goes on beyond it, shape (M, 2).
     """
 
     evidence: RingEvidence
     fitted: FittedRing
     distrusted: Float64s
     filled: Bools
+    outside: Float64s
 
     def hidden(self, points: Float64s, look: TableLook) -> Bools:
         """Which places on the ring (N, 2), pixels, something hides, shape (N,)."""
         unseen = nearest(points, self.on_line) > _SUPPORT_PITCHES * look.pitch_px
         at_thing = look.foreign_at(points) < _HIDES_PITCHES * look.pitch_px
-        return unseen & (at_thing | (nearest(points, self.distrusted) < _FOOT_PITCHES * look.pitch_px))
+        foot = _FOOT_PITCHES * look.pitch_px
+        known_of = unseen & (at_thing | (nearest(points, self.distrusted) < foot))
+        return np.asarray(known_of | (nearest(points, self.outside) < foot))
 
     @property
     def on_line(self) -> Float64s:
@@ -83,7 +89,9 @@ def fit_visible(
     fills = cut_material(picture, clear, ring, evidence.points[distrusted], look)
     walls = _without(evidence, distrusted, look)
     trusted, order = walls.joined_by(fills, _FILL_SIGMA_PX, WitnessKind.BLUNT)
-    return VisibleRing(trusted, fit(trusted), evidence.points[distrusted], order >= len(walls.points))
+    fitted, points = fit(trusted), evidence.points[distrusted]
+    out = (1.0 if evidence.is_hole else -1.0) * depth_inside(fitted.ring, points, rectifier)
+    return VisibleRing(trusted, fitted, points, order >= len(walls.points), points[out > _OUT_PITCHES * look.pitch_px])
 
 
 def doubtful(evidence: RingEvidence, look: TableLook) -> Bools:
@@ -161,7 +169,7 @@ def _is_own_edge(points: Float64s, ring: Ring, pitch_px: float) -> bool:
 
 
 def _plain(evidence: RingEvidence, fitted: FittedRing) -> VisibleRing:
-    return VisibleRing(evidence, fitted, np.empty((0, 2)), np.zeros(len(evidence.points), np.bool_))
+    return VisibleRing(evidence, fitted, np.empty((0, 2)), np.zeros(len(evidence.points), np.bool_), np.empty((0, 2)))
 
 
 def _without(evidence: RingEvidence, dropped: Bools, look: TableLook) -> RingEvidence:

@@ -65,13 +65,6 @@ def test_where_an_outline_bulges_over_the_table_it_is_told_with_its_place(table:
     assert one.moved(10.0, 20.0).place_px == (one.place_px[0] + 10.0, one.place_px[1] + 20.0)
 
 
-@pytest.mark.parametrize(("pitches", "told"), [(2.0, False), (4.0, True)])
-def test_a_cell_or_two_that_a_straight_edge_has_lost_are_not_told_but_more_are(pitches: float, told: bool) -> None:
-    half = 0.5 * pitches * PITCH
-    torn = BLOCK - shapely.box(400 - 1.2 * PITCH, 208 - half, 410, 208 + half)
-    assert (found(comb(torn, 20), BLOCK) is not None) == told
-
-
 def test_a_corner_drawn_where_the_block_is_rounded_is_told() -> None:
     rounded = BLOCK - (shapely.box(320, 256, 410, 346) - shapely.Point(320, 256).buffer(80))
     one = found(comb(rounded, 20), BLOCK)

@@ -15,7 +15,7 @@ from contour.edge.table_look import TableLook
 from contour.edge.visible_edge import VisibleRing, fit_visible
 from contour.errors import NoBlockFound
 from contour.outline.fit import fit_ring
-from contour.walls.wall_evidence import RingEvidence
+from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.hand_looks import HEIGHT, WIDTH, look
 from tests.support.pictures.outline_scenes import PITCH, along, blob, circle, distances, errors, rectangle, witnesses
 
@@ -186,6 +186,22 @@ def test_a_tape_from_corner_to_corner_bridges_nothing() -> None:
     there = look(BLOCK, tape)
     hidden = told(fitted(evidence, there), there)
     assert {stretch.state for stretch in hidden} == {"covered"}
+
+
+def test_an_outline_that_leaves_walls_out_that_reach_a_thing_is_covered_there() -> None:
+    """Ends that lie in a row by chance, across a corner that a thing hides."""
+    before, after = BLOCK[1] + 3.0 * PITCH * np.stack([one / np.hypot(*one) for one in BLOCK[[0, 2]] - BLOCK[1]])
+    cut = np.array([BLOCK[0], before, after, *BLOCK[2:]])
+    foot = np.hypot(*(before - BLOCK[0])) + 0.5 * np.hypot(*(after - before)) + np.array([-12.0, 0.0, 12.0])
+    place, normal = along(cut, foot)
+    more = EdgePoints(place + 0.9 * PITCH * normal, foot, normal)
+    both, _ = witnesses(cut, seed=5).joined_by(more, 0.2, WitnessKind.CLEAN)
+    there = look(BLOCK, patch(cut, float(foot[1]), -1.0, 3.0))
+    one = fitted(both, there)
+    assert errors(one.fitted.ring, cut).max() < 0.25 * PITCH
+    assert len(one.outside) >= 2
+    (stretch,) = told(one, there)
+    assert stretch.state != "seen"
 
 
 def test_hidden_places_are_those_far_from_all_ends_and_near_the_thing() -> None:

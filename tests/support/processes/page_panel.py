@@ -1,0 +1,68 @@
+"""The operator's page as a person has it before them: a daemon's page in a browser, as large as a panel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from playwright.sync_api import Page, Route, expect
+
+from tests.support.processes.cell import Cell
+from tests.support.processes.page_client import Client
+from tests.support.processes.processes import until
+
+BOUND_MS = 60_000  # a job on a busy machine
+expect.set_options(timeout=BOUND_MS)
+PANEL = {"width": 1280, "height": 800}
+FRAME = "#view image:not([visibility])"  # not the one that is still to come
+EXPECTED_NOISE = (  # of requests that a test has refused, held or broken off
+    "ERR_CONNECTION_REFUSED",
+    "ERR_FAILED",
+    "ERR_INCOMPLETE_CHUNKED_ENCODING",
+    "401",
+    "429",
+    "503",
+    "ERR_EMPTY_RESPONSE",
+    "409",
+)
+
+
+@dataclass
+class Panel:
+    """A daemon, its page in a browser, and all that the browser complained of or asked for."""
+
+    cell: Cell
+    client: Client
+    page: Page
+    complaints: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://127.0.0.1:{self.client.port}/"
+
+    def ordered(self, **content: Any) -> int:
+        """The number of a job that was ordered past the page, once its evidence is kept."""
+        until(lambda: self.client.get("/api/v1/state").json["link"]["not_ready"] is None, what="a ready controller")
+        reply = until(
+            lambda: (r := self.client.order("/api/v1/trigger", content=content)).status == 202 and r, what="it"
+        )
+        number = reply.json["job"]
+        until(lambda: self.client.get(f"/api/v1/jobs/{number}").json["files"], what="evidence")
+        return int(number)
+
+
+def settled_state(panel: Panel, kind: str) -> None:
+    """Wait until the banner tells a state of this kind."""
+    expect(panel.page.locator("#banner")).to_have_attribute("data-kind", kind)
+
+
+def holding(routes: list[Route]) -> Callable[[Route], None]:
+    """A handler of requests that lets them wait in the list."""
+
+    def hold(route: Route) -> None:
+        routes.append(route)
+
+    return hold

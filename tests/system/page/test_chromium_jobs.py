@@ -1,0 +1,204 @@
+"""The operator's page in a real browser: what a person sees of jobs, large and in the filmstrip."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Route, expect
+
+from service.reasons import Reason
+from tests.support.processes.page_panel import FRAME, Panel, holding
+
+# What was seen together at each change of the picture: numbers of jobs whose frames show, the contour.
+WATCH_PICTURE = """() => {
+  window.together = [];
+  const view = document.querySelector("#view");
+  const look = () => window.together.push([
+    [...view.querySelectorAll("image:not([visibility])")].map((image) => image.href.baseVal),
+    view.querySelector("path.exterior")?.getAttribute("d") ?? "",
+  ]);
+  new MutationObserver(look).observe(view, {childList: true, attributes: true, subtree: true});
+}"""
+WATCH_OUTCOME = """() => {
+  window.outcomes = [];
+  const outcome = document.querySelector("#outcome");
+  const watch = new MutationObserver(() => window.outcomes.push(outcome.textContent));
+  watch.observe(outcome, {childList: true, characterData: true, subtree: true});
+}"""
+
+
+def test_a_job_appears_by_itself_with_its_contour_and_values(panel: Panel) -> None:
+    page = panel.page
+    page.evaluate("window.sameDocument = true")
+    for _ in range(4):  # one of the four pictures shows a block with holes
+        number = panel.ordered()
+        if panel.client.get(f"/api/v1/jobs/{number}/drawing").json["holes"]:
+            break
+    expect(page.locator("#outcome")).to_have_text(f"job {number}: accepted")
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{number}\?width=1600"))
+    job = panel.client.get(f"/api/v1/jobs/{number}").json
+    drawn = page.locator("#view path.exterior").get_attribute("d") or ""
+    holes = [hole.get_attribute("d") or "" for hole in page.locator("#view path.hole").all()]
+    assert sum(len(re.findall(r"[ML]", path)) for path in (drawn, *holes)) == job["report"]["vertices"]
+    expect(page.locator("#values")).to_contain_text(f"{job['report']['area_mm2']:,.0f}")
+    expect(page.locator("#values")).to_contain_text("±")
+    expect(page.locator("#stages")).to_contain_text("contour")
+    expect(page.locator(f'#strip button[data-job="{number}"]')).to_have_attribute("aria-current", "true")
+    assert page.evaluate("window.sameDocument") is True
+
+
+def frames_of(panel: Panel, contour: str) -> set[str]:
+    """Addresses of the frames that one contour was seen with since `WATCH_PICTURE`."""
+    together: list[tuple[list[str], str]] = panel.page.evaluate("window.together")
+    assert all(len(frames) < 2 for frames, _ in together)
+    return {frame for frames, drawn in together for frame in frames if drawn == contour}
+
+
+def test_a_contour_is_never_seen_over_another_jobs_frame(panel: Panel) -> None:
+    page = panel.page
+    first = panel.ordered()
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{first}\?"))
+    page.evaluate(WATCH_PICTURE)
+    numbers = [panel.ordered() for _ in range(2)]
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{numbers[-1]}\?"))
+    contour = page.locator("#view path.exterior").get_attribute("d") or ""
+    assert {re.search(r"/frames/(\d+)", frame)[1] for frame in frames_of(panel, contour)} == {str(numbers[-1])}  # type: ignore[index]
+
+
+@pytest.mark.parametrize("how", ["never comes", "is not there"])
+def test_a_contour_whose_frame_does_not_come_is_shown_without_one(panel: Panel, how: str) -> None:
+    page = panel.page
+    first = panel.ordered()
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{first}\?"))
+    before = page.locator("#view path.exterior").get_attribute("d") or ""
+    held: list[Route] = []
+    page.route("**/frames/*width=1600*", lambda route: held.append(route) if how == "never comes" else route.abort())
+    number = panel.ordered()
+    expect(page.locator("#outcome")).to_have_text(f"job {number}: accepted")
+    expect(page.locator("#view path.exterior")).not_to_have_attribute("d", before)
+    expect(page.locator(FRAME)).to_have_count(1)
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{number}\?"))
+    for route in held:
+        route.abort()
+
+
+def test_hidden_parts_of_the_edge_are_told_from_what_was_seen(panel: Panel) -> None:
+    """Seen is solid, bridged dashed, covered red, also where the contour was refused for it."""
+    page = panel.page
+    parts = [{"covered": covered, "points": [[300, y], [500, y]]} for covered, y in ((False, 200), (True, 300))]
+
+    def with_parts(route: Route) -> None:
+        drawing = route.fetch().json()
+        route.fulfill(json={**drawing, "refused": True, "hidden": parts})
+
+    page.route("**/drawing", with_parts)
+    panel.ordered()
+    expect(page.locator("#view path.covered")).to_have_attribute("d", "M300 300L500 300")
+    expect(page.locator("#view path.covered")).to_have_css("stroke", "rgb(242, 32, 46)")
+    expect(page.locator("#view path.bridged")).to_have_attribute("d", "M300 200L500 200")
+    expect(page.locator("#view path.bridged")).to_have_css("stroke-dasharray", "6px, 6px")
+    expect(page.locator("#view path.exterior")).to_have_css("stroke-dasharray", "none")
+    page.unroute_all(behavior="wait")
+
+
+def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:
+    page = panel.page
+    number = panel.ordered()
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{number}\?"))
+    document = panel.client.get(f"/api/v1/jobs/{number}/files/document.json").json["measurement"]
+    (x, y), (x_mm, y_mm) = document["pixels"]["exterior"][0], document["millimetres"]["exterior"][0]
+    to_screen = "([x, y]) => { const p = new DOMPoint(x, y).matrixTransform(view.getScreenCTM()); return [p.x, p.y]; }"
+    for _ in range(3):
+        place = page.evaluate(to_screen, [x, y])
+        page.mouse.move(*place)
+        told = re.fullmatch(r"x (-?[\d.,]+)  y (-?[\d.,]+) mm", page.locator("#cursor").text_content() or "")
+        assert told is not None
+        assert abs(float(told[1].replace(",", "")) - x_mm) < 0.6
+        assert abs(float(told[2].replace(",", "")) - y_mm) < 0.6
+        page.mouse.wheel(0, -100)
+        page.wait_for_timeout(50)
+    whole = page.locator("#view").get_attribute("viewBox")
+    page.mouse.move(500, 350)
+    page.mouse.wheel(0, -300)
+    assert page.locator("#view").get_attribute("viewBox") != whole
+    before = page.locator("#view").get_attribute("viewBox")
+    page.mouse.down()
+    page.mouse.move(450, 330)
+    page.mouse.up()
+    assert page.locator("#view").get_attribute("viewBox") != before
+    page.locator("#frame").press("0")
+    assert (page.locator("#view").get_attribute("viewBox") or "").startswith("-0.5 -0.5 ")
+
+
+def test_the_filmstrip_freezes_filters_and_opens_one_with_all_its_values(panel: Panel, tmp_path: Path) -> None:
+    page = panel.page
+    good = panel.ordered()
+    bad = panel.ordered(recipe=77)
+    expect(page.locator("#outcome")).to_have_text(f"job {bad}: refused")
+    expect(page.locator("#because")).to_contain_text(Reason.UNKNOWN_RECIPE.explained().next_action)
+    expect(page.locator("#no-picture")).to_be_visible()
+    page.locator(f'#strip button[data-job="{good}"]').click()
+    expect(page.locator("#outcome")).to_have_text(f"job {good}: accepted")
+    later = panel.ordered()
+    expect(page.locator(f'#strip button[data-job="{later}"]')).to_be_visible()
+    expect(page.locator("#outcome")).to_have_text(f"job {good}: accepted")
+    expect(page.locator("#seen-note")).to_contain_text("frozen")
+    with page.expect_download() as download:
+        page.locator("#downloads a", has_text="document.json").click()
+    download.value.save_as(tmp_path / "saved.json")
+    assert (tmp_path / "saved.json").read_bytes() == panel.client.get(f"/api/v1/jobs/{good}/files/document.json").body
+    page.locator("#freeze").click()
+    expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
+    page.locator("#count-refused").tap()
+    expect(page.locator("#counts")).to_contain_text(Reason.UNKNOWN_RECIPE.explained().sentence)
+    page.keyboard.press("Escape")
+    page.keyboard.press("r")
+    expect(page.locator("#strip button")).to_have_count(len(page.locator("#strip [data-kind=refused]").all()))
+    expect(page.locator("#outcome")).to_contain_text("refused")
+    page.keyboard.press("r")
+    expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("#outcome")).to_have_text(f"job {bad}: refused")
+    page.keyboard.press("Escape")
+    expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
+
+
+def test_a_job_that_comes_late_is_not_shown_in_place_of_the_one_opened_since(panel: Panel) -> None:
+    page = panel.page
+    slow, quick, newest = panel.ordered(), panel.ordered(), panel.ordered()
+    expect(page.locator("#outcome")).to_have_text(f"job {newest}: accepted")
+    held: list[Route] = []
+    page.route(f"**/jobs/{slow}/drawing", holding(held))
+    with page.expect_request(f"**/jobs/{slow}/drawing"):
+        page.locator(f'#strip button[data-job="{slow}"]').click()
+    page.locator(f'#strip button[data-job="{quick}"]').click()
+    expect(page.locator("#outcome")).to_have_text(f"job {quick}: accepted")
+    page.evaluate(WATCH_OUTCOME)
+    with page.expect_response(f"**/jobs/{slow}/drawing"):
+        held.pop().continue_()
+    page.wait_for_timeout(200)
+    assert page.evaluate("window.outcomes") == []
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{quick}\?"))
+
+
+def test_older_jobs_are_shown_and_where_there_are_none_nothing_changes(panel: Panel) -> None:
+    page = panel.page
+    while len(panel.client.get("/api/v1/jobs?limit=17").json["jobs"]) < 17:
+        panel.ordered(recipe=77)
+    jobs = [job["job_id"] for job in panel.client.get("/api/v1/jobs?limit=200").json["jobs"]]
+    expect(page.locator("#strip button").first).to_have_attribute("data-job", str(jobs[0]))
+    page.locator("#older").click()
+    expect(page.locator("#strip button").first).to_have_attribute("data-job", str(jobs[16]))
+    expect(page.locator("#outcome")).to_contain_text(f"job {jobs[16]}:")
+    page.locator("#newest").click()
+    expect(page.locator("#strip button").first).to_have_attribute("data-job", str(jobs[0]))
+    page.route("**/jobs?limit=16&before=*", lambda route: route.fulfill(json={"jobs": []}))
+    with page.expect_response("**/jobs?limit=16&before=*"):
+        page.locator("#older").click()
+    page.wait_for_timeout(200)
+    expect(page.locator("#strip button")).to_have_count(16)
+    expect(page.locator("#outcome")).to_contain_text(f"job {jobs[0]}:")
+    later = panel.ordered()
+    expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")

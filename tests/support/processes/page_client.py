@@ -32,6 +32,11 @@ class Client:
     port: int
     source: str = "127.0.0.1"  # another address of loopback counts as another computer
 
+    @property
+    def url(self) -> str:
+        """Where a browser finds the page."""
+        return f"http://127.0.0.1:{self.port}/"
+
     def ask(self, method: str, path: str, *, body: bytes | None = None, **headers: str) -> Reply:
         """Header names with _ for -; each request by a connection of its own."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60, source_address=(self.source, 0))

@@ -13,6 +13,7 @@ from tests.support.processes.page_client import Client
 from tests.support.processes.processes import until
 
 BOUND_MS = 60_000  # a job on a busy machine
+LOOK_S = 0.1  # asked without a pause, the daemon answers instead of measuring
 expect.set_options(timeout=BOUND_MS)
 PANEL = {"width": 1280, "height": 800}
 FRAME = "#view image:not([visibility])"  # not the one that is still to come
@@ -38,20 +39,22 @@ class Panel:
     complaints: list[str] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
 
-    @property
-    def url(self) -> str:
-        """Where the page is."""
-        return f"http://127.0.0.1:{self.client.port}/"
-
     def ordered(self, **content: Any) -> int:
         """The number of a job that was ordered past the page, once its evidence is kept."""
         until(lambda: self.client.get("/api/v1/state").json["link"]["not_ready"] is None, what="a ready controller")
         reply = until(
             lambda: (r := self.client.order("/api/v1/trigger", content=content)).status == 202 and r, what="it"
         )
-        number = reply.json["job"]
-        until(lambda: self.client.get(f"/api/v1/jobs/{number}").json["files"], what="evidence")
-        return int(number)
+        path = f"/api/v1/jobs/{reply.json['job']}"
+        until(lambda: self.client.get(path).json["files"], what="evidence", pause_s=LOOK_S)
+        return int(reply.json["job"])
+
+    def accepted(self, count: int) -> list[int]:
+        """Numbers of the last jobs, which are accepted ones; where others are among them, so many are ordered."""
+        last = self.client.get(f"/api/v1/jobs?limit={count}").json["jobs"]
+        if [job["outcome"] for job in last if job["files"]] == ["accepted"] * count:
+            return [job["job_id"] for job in reversed(last)]
+        return [self.ordered() for _ in range(count)]
 
 
 def settled_state(panel: Panel, kind: str) -> None:

@@ -100,12 +100,12 @@ class Process:
         return self.log.read_text(errors="replace")
 
 
-def until(condition: Callable[[], Any], bound_s: float = 60, what: str = "it") -> Any:
-    """What `condition` gives once it is true."""
+def until(condition: Callable[[], Any], bound_s: float = 60, what: str = "it", pause_s: float = 0.02) -> Any:
+    """What `condition` gives once it is true; it is asked again after each pause."""
     give_up_at = time.monotonic() + bound_s
     while not (result := condition()):
         assert time.monotonic() < give_up_at, f"{what} did not come within {bound_s:g} s"
-        time.sleep(0.02)
+        time.sleep(pause_s)
     return result
 
 

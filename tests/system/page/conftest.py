@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
-from tests.support.processes.cell import ON_SAMPLES, Cell
+from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import Client, token_file
 from tests.support.processes.page_panel import BOUND_MS, EXPECTED_NOISE, PANEL, Panel
 from tests.support.processes.processes import free_port
@@ -15,27 +15,33 @@ from tests.support.real_parts import need_program
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """Debian's Chromium, or the tests skip and say how to get it."""
-    path = need_program("chromium", "apt-get install chromium")
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield started
-        started.close()
+def camera() -> str:
+    """What the daemon sees: small drawn combs, where a file of tests has no camera of its own."""
+    return ""
 
 
 @pytest.fixture(scope="module")
-def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cell, Client]]:
-    """A daemon on the sample pictures that measures when it is asked by its page; and who asks past a browser."""
+def cell(tmp_path_factory: pytest.TempPathFactory, camera: str) -> Iterator[tuple[Cell, Client]]:
+    """A daemon that is starting, and measures when its page asks; and who asks past a browser."""
     folder, port = tmp_path_factory.mktemp("page"), free_port()
     token_file(folder)
     more = f"page: {{port: {port}, token_file: tokens}}\n"
-    started = Cell(folder, triggers="[]", camera=ON_SAMPLES, trigger_every_s=None, more=more)
+    started = Cell(folder, triggers="[]", camera=camera, trigger_every_s=None, more=more)
     try:
-        started.ready()
         yield started, Client(port)
     finally:
         started.stop()
+
+
+@pytest.fixture(scope="module")
+def browser(cell: tuple[Cell, Client]) -> Iterator[Browser]:
+    """Debian's Chromium, or the tests skip and say how to get it; it starts beside the daemon, which is ready then."""
+    path = need_program("chromium", "apt-get install chromium")
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        cell[0].ready()
+        yield started
+        started.close()
 
 
 @pytest.fixture
@@ -44,11 +50,12 @@ def panel(cell: tuple[Cell, Client], browser: Browser) -> Iterator[Panel]:
     page = browser.new_page(viewport=PANEL, has_touch=True, locale="en-GB")
     page.set_default_timeout(BOUND_MS)
     opened = Panel(*cell, page)
+    url = opened.client.url
     page.on("console", lambda message: message.type == "error" and opened.complaints.append(message.text))
     page.on("pageerror", lambda error: opened.complaints.append(str(error)))
     page.on("request", lambda request: opened.asked.append(request.url))
-    page.goto(opened.url)
+    page.goto(url)
     yield opened
     page.close()
     assert [one for one in opened.complaints if not any(noise in one for noise in EXPECTED_NOISE)] == []
-    assert [url for url in opened.asked if not url.startswith(opened.url)] == [], "nothing is loaded from elsewhere"
+    assert [one for one in opened.asked if not one.startswith(url)] == [], "nothing is loaded from elsewhere"

@@ -9,6 +9,8 @@ import time
 from playwright.sync_api import Browser, Route, expect
 
 from service.reasons import Language, Reason
+from tests.support.processes.cell import Cell
+from tests.support.processes.page_client import Client
 from tests.support.processes.page_panel import Panel, holding, settled_state
 from tests.support.processes.processes import until
 
@@ -27,10 +29,10 @@ def test_the_first_view_tells_state_in_words_colour_and_shape_and_every_part(pan
     assert page.evaluate(small) == []
 
 
-def test_the_server_says_the_state_before_any_script_runs(panel: Panel, browser: Browser) -> None:
+def test_the_server_says_the_state_before_any_script_runs(cell: tuple[Cell, Client], browser: Browser) -> None:
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
-    page.goto(panel.url)
+    page.goto(cell[1].url)
     expect(page.locator("#state")).to_have_text("Ready")
     expect(page.locator("#trigger")).to_have_text("Measure")
     context.close()
@@ -60,11 +62,11 @@ def test_a_service_that_answers_too_late_while_the_page_loads_is_told_and_asked_
     expect(page.locator("#trigger")).to_be_enabled()
 
 
-def test_the_page_weighs_less_than_150_kb_without_the_frame(panel: Panel, browser: Browser) -> None:
+def test_the_page_weighs_less_than_150_kb_without_the_frame(cell: tuple[Cell, Client], browser: Browser) -> None:
     page = browser.new_page()
     weights: dict[str, int] = {}
     page.on("response", lambda r: "/frames/" in r.url or "/events" in r.url or weights.update({r.url: len(r.body())}))
-    page.goto(panel.url)
+    page.goto(cell[1].url)
     expect(page.locator("#glance li")).to_have_count(4)
     page.wait_for_timeout(300)
     page.close()

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Route, expect
 
 from service.reasons import Reason
+from tests.support.processes.cell import SAMPLES
 from tests.support.processes.page_panel import FRAME, Panel, holding
 
 # What was seen together at each change of the picture: numbers of jobs whose frames show, the contour.
@@ -27,6 +28,16 @@ WATCH_OUTCOME = """() => {
   const watch = new MutationObserver(() => window.outcomes.push(outcome.textContent));
   watch.observe(outcome, {childList: true, characterData: true, subtree: true});
 }"""
+
+
+@pytest.fixture(scope="module")
+def camera(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The sample pictures; the last one, a block with holes, comes first."""
+    folder = tmp_path_factory.mktemp("camera")
+    *others, with_holes = sorted(SAMPLES.glob("*.jpg"))
+    for number, sample in enumerate([with_holes, *others]):
+        (folder / f"{number}.jpg").symlink_to(sample)
+    return f"{{kind: files, path: {folder}, loop: true}}"
 
 
 def test_a_job_appears_by_itself_with_its_contour_and_values(panel: Panel) -> None:
@@ -58,7 +69,7 @@ def frames_of(panel: Panel, contour: str) -> set[str]:
 
 def test_a_contour_is_never_seen_over_another_jobs_frame(panel: Panel) -> None:
     page = panel.page
-    first = panel.ordered()
+    (first,) = panel.accepted(1)
     expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{first}\?"))
     page.evaluate(WATCH_PICTURE)
     numbers = [panel.ordered() for _ in range(2)]
@@ -70,7 +81,7 @@ def test_a_contour_is_never_seen_over_another_jobs_frame(panel: Panel) -> None:
 @pytest.mark.parametrize("how", ["never comes", "is not there"])
 def test_a_contour_whose_frame_does_not_come_is_shown_without_one(panel: Panel, how: str) -> None:
     page = panel.page
-    first = panel.ordered()
+    (first,) = panel.accepted(1)
     expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{first}\?"))
     before = page.locator("#view path.exterior").get_attribute("d") or ""
     held: list[Route] = []
@@ -105,7 +116,7 @@ def test_hidden_parts_of_the_edge_are_told_from_what_was_seen(panel: Panel) -> N
 
 def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:
     page = panel.page
-    number = panel.ordered()
+    (number,) = panel.accepted(1)
     expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{number}\?"))
     document = panel.client.get(f"/api/v1/jobs/{number}/files/document.json").json["measurement"]
     (x, y), (x_mm, y_mm) = document["pixels"]["exterior"][0], document["millimetres"]["exterior"][0]
@@ -132,9 +143,27 @@ def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Pa
     assert (page.locator("#view").get_attribute("viewBox") or "").startswith("-0.5 -0.5 ")
 
 
+def test_a_job_that_comes_late_is_not_shown_in_place_of_the_one_opened_since(panel: Panel) -> None:
+    page = panel.page
+    slow, quick, newest = panel.accepted(3)
+    expect(page.locator("#outcome")).to_have_text(f"job {newest}: accepted")
+    held: list[Route] = []
+    page.route(f"**/jobs/{slow}/drawing", holding(held))
+    with page.expect_request(f"**/jobs/{slow}/drawing"):
+        page.locator(f'#strip button[data-job="{slow}"]').click()
+    page.locator(f'#strip button[data-job="{quick}"]').click()
+    expect(page.locator("#outcome")).to_have_text(f"job {quick}: accepted")
+    page.evaluate(WATCH_OUTCOME)
+    with page.expect_response(f"**/jobs/{slow}/drawing"):
+        held.pop().continue_()
+    page.wait_for_timeout(200)
+    assert page.evaluate("window.outcomes") == []
+    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{quick}\?"))
+
+
 def test_the_filmstrip_freezes_filters_and_opens_one_with_all_its_values(panel: Panel, tmp_path: Path) -> None:
     page = panel.page
-    good = panel.ordered()
+    (good,) = panel.accepted(1)
     bad = panel.ordered(recipe=77)
     expect(page.locator("#outcome")).to_have_text(f"job {bad}: refused")
     expect(page.locator("#because")).to_contain_text(Reason.UNKNOWN_RECIPE.explained().next_action)
@@ -163,24 +192,6 @@ def test_the_filmstrip_freezes_filters_and_opens_one_with_all_its_values(panel: 
     expect(page.locator("#outcome")).to_have_text(f"job {bad}: refused")
     page.keyboard.press("Escape")
     expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
-
-
-def test_a_job_that_comes_late_is_not_shown_in_place_of_the_one_opened_since(panel: Panel) -> None:
-    page = panel.page
-    slow, quick, newest = panel.ordered(), panel.ordered(), panel.ordered()
-    expect(page.locator("#outcome")).to_have_text(f"job {newest}: accepted")
-    held: list[Route] = []
-    page.route(f"**/jobs/{slow}/drawing", holding(held))
-    with page.expect_request(f"**/jobs/{slow}/drawing"):
-        page.locator(f'#strip button[data-job="{slow}"]').click()
-    page.locator(f'#strip button[data-job="{quick}"]').click()
-    expect(page.locator("#outcome")).to_have_text(f"job {quick}: accepted")
-    page.evaluate(WATCH_OUTCOME)
-    with page.expect_response(f"**/jobs/{slow}/drawing"):
-        held.pop().continue_()
-    page.wait_for_timeout(200)
-    assert page.evaluate("window.outcomes") == []
-    expect(page.locator(FRAME)).to_have_attribute("href", re.compile(rf"/frames/{quick}\?"))
 
 
 def test_older_jobs_are_shown_and_where_there_are_none_nothing_changes(panel: Panel) -> None:

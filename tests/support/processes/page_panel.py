@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Browser, Page, Playwright, Route, expect
 
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import Client
 from tests.support.processes.processes import until
+from tests.support.real_parts import need_program
 
 BOUND_MS = 60_000  # a job on a busy machine
 LOOK_S = 0.1  # asked without a pause, the daemon answers instead of measuring
 expect.set_options(timeout=BOUND_MS)
+CHROMIUM = Path(__file__).with_name("chromium.sh")
 PANEL = {"width": 1280, "height": 800}
 FRAME = "#view image:not([visibility])"  # not the one that is still to come
 EXPECTED_NOISE = (  # of requests that a test has refused, held or broken off
@@ -55,6 +58,12 @@ class Panel:
         if [job["outcome"] for job in last if job["files"]] == ["accepted"] * count:
             return [job["job_id"] for job in reversed(last)]
         return [self.ordered() for _ in range(count)]
+
+
+def chromium(playwright: Playwright) -> Browser:
+    """Debian's Chromium, started; without it the test skips."""
+    need_program("chromium", "apt-get install chromium")
+    return playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
 
 
 def settled_state(panel: Panel, kind: str) -> None:

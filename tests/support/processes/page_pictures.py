@@ -16,10 +16,9 @@ from playwright.sync_api import Page, sync_playwright
 
 from tests.support.processes.cell import SAMPLES, Cell
 from tests.support.processes.page_client import Client, token_file
+from tests.support.processes.page_panel import PANEL, chromium
 from tests.support.processes.processes import free_port, until
-from tests.support.real_parts import need_program
 
-SIZE = {"width": 1280, "height": 800}
 QUALITY = 82
 # An image in SVG tells nothing of itself; the frame is there once its resource is.
 ALL_LOADED = """() => {
@@ -74,10 +73,9 @@ def main(to: Path) -> None:
         for _ in range(6):
             ordered(client)
         with sync_playwright() as playwright:
-            path = need_program("chromium", "apt-get install chromium")
-            browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-            page = browser.new_page(viewport=SIZE, locale="en-GB")
-            page.goto(f"http://127.0.0.1:{port}/")
+            browser = chromium(playwright)
+            page = browser.new_page(viewport=PANEL, locale="en-GB")
+            page.goto(client.url)
             page.locator('#strip button[data-job="6"][aria-current="true"]').wait_for()
             take(page, to, "ready")
             page.locator('#strip button[data-job="3"]').click()

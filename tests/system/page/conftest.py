@@ -9,9 +9,8 @@ from playwright.sync_api import Browser, sync_playwright
 
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import Client, token_file
-from tests.support.processes.page_panel import BOUND_MS, EXPECTED_NOISE, PANEL, Panel
+from tests.support.processes.page_panel import BOUND_MS, EXPECTED_NOISE, PANEL, Panel, chromium
 from tests.support.processes.processes import free_port
-from tests.support.real_parts import need_program
 
 
 @pytest.fixture(scope="module")
@@ -35,10 +34,9 @@ def cell(tmp_path_factory: pytest.TempPathFactory, camera: str) -> Iterator[tupl
 
 @pytest.fixture(scope="module")
 def browser(cell: tuple[Cell, Client]) -> Iterator[Browser]:
-    """Debian's Chromium, or the tests skip and say how to get it; it starts beside the daemon, which is ready then."""
-    path = need_program("chromium", "apt-get install chromium")
+    """Chromium, which starts beside the daemon; both are ready then."""
     with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        started = chromium(playwright)
         cell[0].ready()
         yield started
         started.close()

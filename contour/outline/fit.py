@@ -58,7 +58,8 @@ class FittedRing:
 def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None) -> FittedRing:
     """The outline through a ring's witnesses, fitted in the rectified plane where `rectifier` is given.
 
-    Raises NoBlockFound where there are fewer than six witnesses, or no few of them lie on any line or arc.
+    Raises NoBlockFound where there are fewer than six witnesses, or no few of them lie on any line or arc, or all on one
+    line.
     """
     if len(evidence.points) < _FEWEST:
         raise NoBlockFound(
@@ -96,6 +97,11 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
     inlier = _inlying(witnesses, residual)
     found = bevelled(witnesses, segments, found, inlier, _material(evidence, rectifier))
     vertices = _vertices(witnesses, segments, found, chains)
+    if len(vertices.ring) < 3:
+        raise NoBlockFound(
+            f"no outline: of {len(witnesses)} wall ends along a ring those that agree lie on a single line; "
+            "check that the block is in view, and that nothing lies around it"
+        )
     spread = _spread(residual[inlier], wall_px)
     given = _given_leverage(segments, inlier, arcs, chains)
     sigma = vertex_sigma(witnesses, segments, inlier, vertices, given=given, spread=spread)

@@ -160,6 +160,11 @@ def test_too_few_witnesses_are_refused_with_their_number() -> None:
         fitted(evidence)
 
 
+def test_witnesses_of_one_side_only_are_no_outline() -> None:
+    with pytest.raises(NoBlockFound, match="on a single line"):
+        fitted(witnesses(rectangle(900.0, 600.0), seed=1, sigma=0.5, gaps=((450.0, 3000.0),)))
+
+
 def moved(evidence: RingEvidence, turn: NDArray[np.float64], scale: float, mirror: bool) -> RingEvidence:
     """The evidence in a turned (and mirrored) picture; a mirrored ring runs the other way round."""
     matrix = turn * scale

@@ -44,6 +44,12 @@ def test_an_undisturbed_block_is_right_and_what_a_tape_hides_is_told(tmp_path):
     assert shop_floor.judged("tape", 7, alone=True, save=tmp_path).hidden_px > 5.0
 
 
+def test_a_block_on_wood_is_right_where_the_table_was_taught():
+    taught = shop_floor.judged("wood", 968_007, alone=True, taught=True)
+    assert taught.accepted
+    assert not taught.wrong
+
+
 def test_places_under_a_cover_are_not_visible_and_drawn_apart():
     camera = camera_above(200, 150, 1.0, plane_mm=0.0)
     tape = Cover(rectangle((100.0, 120.0), 30.0, 20.0), 0.9)

@@ -19,7 +19,8 @@ from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
 
-_SAMPLES_PER_PITCH, _FINEST_PX = 5.5, 2
+# Comb of finer cells than that shows at full size only: else here and there it looks flat.
+_SAMPLES_PER_PITCH, _FINEST_PX, _FINE_PITCH_PX = 5.5, 2, 7.5
 # Of the gradient's usual size on the picture's flat parts; and in eighths of a grey level a sample.
 _SHARP, _LEAST_SHARP = 3.5, 10.0
 # A border that is nowhere narrower than so many samples is soft.
@@ -38,7 +39,7 @@ _CAST_PITCHES = 2.5
 # Apart from the table around by so many grey levels, and so many of its spreads.
 _APART, _APART_SPREADS = 4.0, 1.0
 _RIM = 1.5
-_ROUNDS, _FEW_SAMPLES = 4, 20.0
+_ROUNDS, _FEW_SAMPLES = 4, 5.0
 _THIN = 1.5
 _NOWHERE_PX = 1e6
 _BESIDE_PITCHES = 0.6
@@ -121,7 +122,7 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     `plain`: the table is known to be a plain one, from a look at the block before anything of it was left out.
     """
     pitch_px = seen.pitch_px
-    step = max(_FINEST_PX, int(pitch_px / _SAMPLES_PER_PITCH))
+    step = max(_FINEST_PX if pitch_px > _FINE_PITCH_PX else 1, int(pitch_px / _SAMPLES_PER_PITCH))
     small = whole_averaged(picture, step)
     samples = pitch_px / step
     block = _block(seen, small.shape[:2], step)
@@ -259,10 +260,11 @@ def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, F
         here = plane[some][main[some]]
         lowest, highest = np.percentile(here, (2, 98)) if len(here) else (0.0, 0.0)
         local = np.asarray(cv2.blur(plane * main, (size, size)), np.float32) / np.maximum(share, 1e-3)
-        # Far from any of it, in a hole, the table may be as light as it is anywhere.
-        level[:, :, k] = np.where(share > _SHARE_KNOWN, local, np.clip(plane, lowest, highest))
         if len(here):
-            spread[k] = 1.4826 * float(np.median(np.abs(here - level[:, :, k][some][main[some]])))
+            spread[k] = 1.4826 * float(np.median(np.abs(here - local[some][main[some]])))
+        # Far from any of it, in a hole, the table may be as light as it is anywhere, and a little more so.
+        anywhere = np.clip(plane, lowest - spread[k], highest + spread[k])
+        level[:, :, k] = np.where(share > _SHARE_KNOWN, local, anywhere)
     return level, spread
 
 

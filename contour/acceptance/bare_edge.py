@@ -27,7 +27,7 @@ _CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
 # Of the changes of light farther in: those where no cells are, and what both sides of the outline differ by where they
 # are alike; and over how much of it, pitches. The more bare and alike, the shorter: a corner drawn past the block's own
 # is no longer than that.
-_BARE = ((0.25, 0.2, 0.65), (0.45, 0.3, 1.0), (0.45, np.inf, 2.5))
+_BARE = ((0.25, 0.2, 0.75), (0.45, 0.3, 1.25), (0.45, np.inf, 2.5))
 # Lines on which the edge goes on on both sides run through so much of it.
 _FLANK = (0.2, 3.0)
 # Filled cells stand so little out of these lines, up to the corner where they meet, or, on a curve, lie so little

@@ -7,6 +7,7 @@ as light as the table around it. Comb is nowhere flat: no point of it is farther
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -24,7 +25,7 @@ _SAMPLES_PER_PITCH, _FINEST_PX, _FINE_PITCH_PX = 5.5, 2, 7.5
 # Of the gradient's usual size on the picture's flat parts; and in eighths of a grey level a sample.
 _SHARP, _LEAST_SHARP = 3.5, 10.0
 # A border that is nowhere narrower than so many samples is soft.
-_SOFT = 7
+_SOFT, _SOFT_SHARE = 7, 0.35
 # Of the gradient's usual size in comb: no border may be so much sharper than walls that comb itself looks flat.
 _OF_WALLS = 0.7
 # Shorter borders are specks, scratches and dust: no border of a thing that could hide an edge.
@@ -125,9 +126,9 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     step = max(_FINEST_PX if pitch_px > _FINE_PITCH_PX else 1, int(pitch_px / _SAMPLES_PER_PITCH))
     small = whole_averaged(picture, step)
     samples = pitch_px / step
-    block = _block(seen, small.shape[:2], step)
+    block = _drawn(seen.rings, small.shape, step)
     slope = _slope(small)
-    border = _borders(slope, block, samples)
+    border = _borders(small, slope, (block, _drawn(seen.rings[:1], small.shape, step)), samples)
     room = np.asarray(cv2.distanceTransform(1 - border, cv2.DIST_L2, 3), np.float32)
     inside = cv2.erode(block, np.ones((3, 3), np.uint8)) > 0
     reach = np.where(inside, _CELL_ROOM * samples - _RIM, _GAP * samples)
@@ -173,9 +174,10 @@ def _away(foreign: Bools, step: int) -> Float32s:
     return np.asarray(cv2.distanceTransform((~foreign).astype(np.uint8), cv2.DIST_L2, 3) * step, np.float32)
 
 
-def _block(seen: BlockEvidence, shape: tuple[int, ...], step: int) -> Bytes:
+def _drawn(rings: Sequence[RingEvidence], shape: tuple[int, ...], step: int) -> Bytes:
+    """1 inside of coarse rings, exterior first, and not in their holes, (h, w)."""
     block = np.zeros(shape[:2], np.uint8)
-    for ring in seen.rings:
+    for ring in rings:
         cv2.fillPoly(block, [np.rint(samples_of(ring.coarse, step)).astype(np.int32)], 0 if ring.is_hole else 1)
     return block
 
@@ -207,18 +209,23 @@ def _opened(part: Bools, radius: float) -> Bools:
     return np.asarray(part & (cv2.distanceTransform(1 - core, cv2.DIST_L2, 3) <= radius + 1), np.bool_)
 
 
-def _borders(slope: NDArray[np.int16], block: Bytes, samples: float) -> Bytes:
-    """1 where light changes sharply, along lines longer than specks."""
-    far, walls = (slope[::2, ::2][block[::2, ::2] == part] for part in (0, 1))
+def _borders(small: Bytes, slope: NDArray[np.int16], block: tuple[Bytes, Bytes], samples: float) -> Bytes:
+    """1 where light changes sharply, along lines longer than specks; `block` without its holes, and with them."""
+    material, whole = block
+    far, walls = (slope[::2, ::2][material[::2, ::2] == part] for part in (0, 1))
     usual = float(np.median(far)) if len(far) else 0.0
     level = max(_SHARP * usual, _LEAST_SHARP)
     if len(walls):
         level = min(level, _OF_WALLS * float(np.median(walls)))
-    # Glare and half shadows on the table have borders as steep, but wide ones.
-    beside = np.where(block == 0, slope, np.int16(0))
+    # Glare and half shadows have borders as steep, but wide ones.
+    beside = np.where(material == 0, slope, np.int16(0))
     wide = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((_SOFT, _SOFT), np.uint8))
-    sharp = np.where(wide > level, slope - wide, slope) > level
-    return _long(sharp, _SPECK_PITCHES * samples).astype(np.uint8)
+    light = small if small.ndim == 2 else small.max(axis=2)
+    table = light[::2, ::2][material[::2, ::2] == 0]
+    lit = light > np.median(table) if len(table) else np.zeros(light.shape, np.bool_)
+    # Dark things on a table have soft sides, too.
+    soft = (whole > material) | (lit & (wide > _SOFT_SHARE * level)) | (wide > level)
+    return _long(np.where(soft, slope - wide, slope) > level, _SPECK_PITCHES * samples).astype(np.uint8)
 
 
 def _long(part: Bools, least: float) -> Bools:

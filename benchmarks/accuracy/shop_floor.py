@@ -22,6 +22,7 @@ import numpy as np
 
 from benchmarks.page_section import put_section, table
 from contour.errors import PictureError
+from contour.geometry.agreement import distances_to, places_along, rectified_edges
 from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.rings import Contour
 from contour.image.taught_table import teach
@@ -29,7 +30,6 @@ from contour.synthetic import Rendered, render, render_empty_table
 from service.config.recipes import Recipe
 from service.measuring.measure import Measurer
 from service.measuring.table_file import TableRecord
-from tests.support.scenes.metrics import distances, rectified_edges, samples
 from tests.support.scenes.shop_floor_scenes import KINDS, ShopFloorScene, shop_floor_scene
 from tests.support.scenes.trials import calibration_for
 
@@ -136,8 +136,8 @@ def _measured(
     if seen.pixels is None or seen.uncertainty_px is None:
         return verdict, seen.pixels
     outline = rectified_edges(seen.pixels, calibration.rectifier(rendered.thickness_mm))
-    to_found = distances(places[clear], outline)
-    to_truth = distances(samples(outline, SPACING_PX), rendered.truth_px)
+    to_found = distances_to(places[clear], outline)
+    to_truth = distances_to(places_along(outline, SPACING_PX), rendered.truth_px)
     return Verdict(
         scene.kinds,
         scene.scene.seed,

@@ -24,6 +24,7 @@ from benchmarks.accuracy.uncertainty_plot import PLOT, write_plot
 from benchmarks.page_section import put_section, table
 from contour.edge.visible_edge import VisibleRing
 from contour.errors import ContourError
+from contour.geometry.agreement import distances_to, rectified_edges
 from contour.outline.uncertainty import LEAST_PX, Coefficients, Stretches, bound, ring_stretches
 from contour.synthetic import Rendered, render
 from contour.tracing.trace import TraceSettings
@@ -32,7 +33,6 @@ from contour.tracing.wall_tips import looked_at, visible_rings
 from contour.walls.lightness import wall_light
 from contour.walls.wall_evidence import BlockEvidence
 from tests.support.scenes.bench_scenes import BenchScene, measured_scenes
-from tests.support.scenes.metrics import distances, rectified_edges
 from tests.support.scenes.random_scenes import random_scene
 from tests.support.scenes.shop_floor_scenes import KINDS, ShopFloorScene, shop_floor_scene
 from tests.support.scenes.trials import calibration_for
@@ -128,7 +128,7 @@ def case_of(scene: BenchScene | ShopFloorScene, rendered: Rendered) -> Case | st
     seen, look = looked_at(rendered.picture, wall_light(rendered.picture), TraceSettings(), lambda _name: None)
     rings = visible_rings(rendered.picture, seen, look, rectifier)
     places, clear = true_places(rendered)
-    off = distances(places[clear], rectified_edges(traced.contour, rectifier))
+    off = distances_to(places[clear], rectified_edges(traced.contour, rectifier))
     return Case(
         scene.name,
         rendered.pitch_px,

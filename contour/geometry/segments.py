@@ -216,7 +216,11 @@ def distances_to_segments(points: Float64s, start: Float64s, end: Float64s) -> F
 
 def distances_to_ring(points: Float64s, ring: Float64s) -> Float64s:
     """Distance of each point to the nearest point of the closed ring, shape (P,)."""
-    tree = BoxTree.of_ring(ring)
+    return distances_to_tree(points, BoxTree.of_ring(ring))
+
+
+def distances_to_tree(points: Float64s, tree: BoxTree) -> Float64s:
+    """Distance of each point to the nearest of the tree's segments, shape (P,)."""
     parts = [_distances(points[k : k + _POINTS_AT_ONCE], tree) for k in range(0, len(points), _POINTS_AT_ONCE)]
     return np.concatenate(parts) if parts else np.zeros(0)
 

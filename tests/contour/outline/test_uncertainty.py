@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from contour.geometry.agreement import distances_to, places_along
 from contour.outline.fit import fit_ring
 from contour.outline.uncertainty import LEAST_PX, Coefficients, bound, ring_stretches, uncertainty
 from contour.tracing.trace import TraceSettings
@@ -17,7 +18,6 @@ from contour.tracing.wall_tips import wall_tips
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, blob, circle, perimeter, rectangle, witnesses
 from tests.support.pictures.small_scenes import block
-from tests.support.scenes.metrics import distances, samples
 
 WIDE = rectangle(500.0, 320.0)
 shapes = st.sampled_from([WIDE, circle(180.0), blob(170.0)])
@@ -198,6 +198,6 @@ def test_the_true_outline_lies_within_it(kind: str) -> None:
     scene = block("rectangle", kind)
     found = wall_tips(scene.picture, TraceSettings())
     assert found.uncertainty_px is not None
-    off = distances(samples(scene.truth_px, 1.0), found.contour)
+    off = distances_to(places_along(scene.truth_px, 1.0), found.contour)
     assert np.mean(off <= found.uncertainty_px) >= 0.95
     assert found.uncertainty_px < 0.2 * scene.pitch_px

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from contour.geometry.agreement import distances_to
 from contour.geometry.rings import Contour
 from contour.synthetic import (
     CameraModel,
@@ -19,7 +20,6 @@ from contour.synthetic import (
 from contour.walls.lightness import wall_light
 from contour.walls.see_block import see_block
 from contour.walls.wall_evidence import WitnessKind
-from tests.support.scenes.metrics import distances
 
 
 def test_ribbons_thicker_than_other_walls_are_no_parallax_that_moves_wall_ends_inwards() -> None:
@@ -59,5 +59,5 @@ def test_ribbons_thicker_than_other_walls_are_no_parallax_that_moves_wall_ends_i
     )
     seen = render(scene)
     ring = see_block(seen.picture, wall_light(seen.picture), "auto").rings[0]
-    off = distances(ring.points[ring.kind == WitnessKind.CLEAN], seen.truth_px)
+    off = distances_to(ring.points[ring.kind == WitnessKind.CLEAN], seen.truth_px)
     assert sorted(off)[int(0.8 * len(off))] < 0.8

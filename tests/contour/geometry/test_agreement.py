@@ -1,13 +1,16 @@
-"""The bench's metrics give what a person computes by hand."""
+"""How well outlines agree: what a person computes by hand, and what shapely does."""
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from contour.geometry.agreement import agreement as figures
+from contour.geometry.agreement import distances_to, intersection_over_union, places_along, rectified_edges
 from contour.geometry.rings import Contour
 from contour.synthetic import blob, densified, disc_ring, rectangle, with_holes
-from tests.support.scenes.metrics import agreement, distances, rectified_edges, samples
+from tests.support.scenes.metrics import agreement
 from tests.support.scenes.sample_scenes import CAMERA, THICKNESS_MM
 
 
@@ -74,12 +77,12 @@ def test_one_spike_moves_the_hausdorff_distance_and_little_else():
 
 def test_distances_are_those_to_the_nearest_edge_not_vertex():
     points = np.array([[50.0, -7.0], [50.0, 30.0], [110.0, 110.0]])
-    assert np.allclose(distances(points, Contour(square(0, 0, 100))), [7.0, 30.0, np.sqrt(200.0)])
+    assert np.allclose(distances_to(points, Contour(square(0, 0, 100))), [7.0, 30.0, np.sqrt(200.0)])
 
 
 def test_samples_count_every_ring_by_its_length():
     contour = Contour(square(0, 0, 100), (square(40, 40, 20)[::-1],))
-    assert len(samples(contour, 0.5)) == 800 + 160
+    assert len(places_along(contour, 0.5)) == 800 + 160
 
 
 @settings(max_examples=25, deadline=None)
@@ -131,3 +134,28 @@ def test_a_contour_that_crosses_itself_is_still_measured():
     bow = np.array([[0.0, 0.0], [100.0, 100.0], [100.0, 0.0], [0.0, 100.0]])
     found = agreement(Contour(bow), Contour(square(0, 0, 100)))
     assert found.iou == pytest.approx(0.5, abs=0.01)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 1000), st.integers(0, 1000), st.floats(-80.0, 80.0), st.booleans())
+def test_the_overlap_is_that_of_shapely(a, b, right, holed):
+    one, two = blob((100.0, 100.0), 60.0, a), blob((100.0 + right, 99.0), 58.0, b)
+    if holed:
+        one = with_holes(one, disc_ring((100.0, 100.0), 20.0)[::-1])
+    polygons = [shapely.Polygon(contour.exterior, contour.holes) for contour in (one, two)]
+    expected = shapely.area(shapely.intersection(*polygons)) / shapely.area(shapely.union(*polygons))
+    assert intersection_over_union(one, two) == pytest.approx(expected, abs=1e-9)
+
+
+def test_outlines_apart_from_each_other_or_without_area_have_nothing_in_common():
+    assert intersection_over_union(Contour(square(0, 0, 10)), Contour(square(20, 0, 10))) == 0.0
+    assert intersection_over_union(Contour(square(0, 0, 0)), Contour(square(0, 0, 0))) == 0.0
+
+
+def test_a_bound_holds_where_95_per_cent_of_the_truth_lie_within_it():
+    truth = square(0, 0, 100)
+    notched = np.insert(truth, 1, [[0, 40], [10, 40], [10, 52], [0, 52]], axis=0)  # 12 of 400 px of truth are lost
+    found = figures(Contour(notched), Contour(truth))
+    assert (found.holds(0.01), found.hausdorff_px) == (True, pytest.approx(10.0, abs=0.3))
+    moved = figures(Contour(square(1, 0, 100)), Contour(truth))
+    assert (moved.holds(0.99), moved.holds(1.01)) == (False, True)

@@ -18,6 +18,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "The outline at the top of a block of 20 mm, for CAD.",
         ),
     ),
+    "judge": (
+        ("combtrace judge pictures/ --page judged.html", "How well your own blocks are traced."),
+        ("combtrace judge pictures/ --config config.yaml --recipe 2 --json -", "With a recipe, for a script."),
+    ),
     "demo": (("combtrace demo --output demo-output", "The whole way once; the picture's path comes last."),),
     "check": (
         ("combtrace check --config config.yaml", "All there is to check, devices too."),

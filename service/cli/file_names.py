@@ -46,7 +46,7 @@ def check_outputs(images: Iterable[Path], outputs: Sequence[tuple[str, Path]], *
     options: dict[Path, str] = {}
     for option, path in outputs:
         if path.is_file() and _identity(path) in pictures:
-            raise UserError(f"{option} {path}: is a picture that is read. Name another file")
+            raise UserError(f"{option} {path}: is a file that is read. Name another file")
         if option != drawn and path.suffix.lower() in PICTURE_ENDINGS:
             raise UserError(f"{option} {path}: is called as a picture is, and holds none. Name another file")
         other = options.setdefault(path.resolve(), option)

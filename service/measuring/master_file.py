@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from contour.geometry.rings import Contour, contour_defect, oriented_contour
+from contour.geometry.rings import Contour, Ring, contour_defect, oriented_contour
 
 LARGEST_FILE = 50_000_000
 
@@ -36,7 +36,7 @@ def read_master(path: Path) -> Contour:
     if not isinstance(data, dict) or "exterior" not in data:
         raise MasterFileError(f"{path}: holds no outline in millimetres, expected the keys exterior and holes")
     try:
-        contour = Contour(_ring(data["exterior"]), tuple(_ring(hole) for hole in data.get("holes") or ()))
+        contour = Contour(ring_of(data["exterior"]), tuple(ring_of(hole) for hole in data.get("holes") or ()))
     except (TypeError, ValueError) as error:
         raise MasterFileError(f"{path}: a ring is {error}, expected three or more points [x, y] in mm") from error
     defect = contour_defect(contour)
@@ -52,7 +52,8 @@ def _first(text: str) -> Any:
         return json.loads(text.splitlines()[0] if text else "")
 
 
-def _ring(points: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+def ring_of(points: Any) -> Ring:
+    """The ring of a JSON list of points [x, y]; raise TypeError or ValueError where it is none."""
     ring = np.array(points, dtype=np.float64)
     if ring.ndim != 2 or ring.shape[1] != 2 or len(ring) < 3 or not np.isfinite(ring).all():
         raise ValueError(f"of shape {ring.shape}" if np.isfinite(ring).all() else "not finite")

@@ -1,4 +1,4 @@
-"""The calibration report's pictures, as SVG: residual arrows, coverage, maps in millimetres, the work frame."""
+"""Pictures of reports, as SVG: residual arrows, coverage, maps in millimetres, the work frame."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from contour.geometry.arrays import Float64s
 
 WIDTH = 640
 """Width of a picture in the report's own units; its height follows the camera's."""
+
+EMBEDDED_WIDTH = 1280
 
 ARROW_SHARE = 0.05
 """The longest typical residual (99 %) is drawn as this share of the picture's width."""
@@ -82,16 +84,12 @@ def work_frame(
 ) -> str:
     """The plane view with the work frame's axes drawn into it, and the corners that were found."""
     height, width = picture.shape[:2]
-    factor = min(1.0, 1280 / width)
-    small = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
-    _, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])
-    encoded = base64.b64encode(data.tobytes()).decode()
     k = WIDTH / width
     ends = np.array([[0.0, 0.0], [reach_mm, 0.0], [0.0, reach_mm]])
     (ox, oy), (ax, ay), (bx, by) = (_drawn(calibration, ends) * k).tolist()
     marks = "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2"/>' for x, y in corners_px * k)
     body = (
-        f'<image href="data:image/jpeg;base64,{encoded}" width="{WIDTH}" height="{WIDTH * height / width:.1f}"/>'
+        f'<image href="{embedded(picture)}" width="{WIDTH}" height="{WIDTH * height / width:.1f}"/>'
         f'<g class="seen">{marks}</g>'
         f'<path class="x" d="M{ox:.1f} {oy:.1f}L{ax:.1f} {ay:.1f}"/>'
         f'<path class="y" d="M{ox:.1f} {oy:.1f}L{bx:.1f} {by:.1f}"/>'
@@ -99,6 +97,14 @@ def work_frame(
         f"{_label(ax, ay, 'x')}{_label(bx, by, 'y')}{_label(ox, oy + 18, '0')}"
     )
     return _svg((width, height), body, "The plane view: origin, x and y axis of the work frame, and the corners found")
+
+
+def embedded(picture: NDArray[np.uint8]) -> str:
+    """The picture as a data URL of a JPEG, at most EMBEDDED_WIDTH wide: a report is one file."""
+    factor = min(1.0, EMBEDDED_WIDTH / picture.shape[1])
+    small = cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])
+    return f"data:image/jpeg;base64,{base64.b64encode(data.tobytes()).decode()}"
 
 
 def _drawn(calibration: CameraCalibration, work_mm: Float64s) -> Float64s:

@@ -21,10 +21,20 @@ def pictures_of(given: list[Path]) -> list[Path]:
 
     What else lies in a folder is passed over and counted on standard error; its folders are not entered.
     """
-    return [picture for path in given for picture in (_pictures_in(path) if path.is_dir() else [path])]
+    pictures = []
+    for path in given:
+        if not path.is_dir():
+            pictures.append(path)
+            continue
+        found, others = pictures_in(path)
+        passed_over = f", {others} other files are passed over" if others > 0 else ""
+        print(f"{path}: {len(found)} pictures{passed_over}", file=sys.stderr)
+        pictures += found
+    return pictures
 
 
-def _pictures_in(folder: Path) -> list[Path]:
+def pictures_in(folder: Path) -> tuple[list[Path], int]:
+    """The folder's pictures in the order that people sort them, and how many other files it holds; raise UserError."""
     from drivers.camera.files.folder import is_video, list_versions, natural_order
 
     try:
@@ -35,6 +45,4 @@ def _pictures_in(folder: Path) -> list[Path]:
     if not pictures:
         held = f"{others} other files" if others > 0 else "nothing"
         raise UserError(f"{folder}: holds no picture, but {held}. Name a folder of .png, .jpg or other picture files")
-    passed_over = f", {others} other files are passed over" if others > 0 else ""
-    print(f"{folder}: {len(pictures)} pictures{passed_over}", file=sys.stderr)
-    return pictures
+    return pictures, others

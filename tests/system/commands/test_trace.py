@@ -141,7 +141,7 @@ def test_an_overlay_never_replaces_the_picture_it_is_of(tmp_path: Path) -> None:
     picture.write_bytes(RECTANGLE.read_bytes())
     done = called("trace", picture, "--overlay", picture)
     assert done.returncode == 2
-    assert "is a picture that is read" in done.stderr
+    assert "is a file that is read" in done.stderr
     assert picture.read_bytes() == RECTANGLE.read_bytes()
 
 
@@ -159,7 +159,7 @@ def test_pictures_of_one_name_from_several_folders_get_an_overlay_each(tmp_path:
     (tmp_path / "left" / "b-contour.png").write_bytes(comb.read_bytes())
     done = called("trace", pictures[2], tmp_path / "left" / "b-contour.png", "--overlay", tmp_path / "left")
     assert done.returncode == 2
-    assert "is a picture that is read" in done.stderr
+    assert "is a file that is read" in done.stderr
 
 
 def test_a_json_file_stays_as_it_was_where_the_command_cannot_go_on(tmp_path: Path, comb: Path) -> None:
@@ -176,9 +176,9 @@ def test_a_json_file_stays_as_it_was_where_the_command_cannot_go_on(tmp_path: Pa
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["a.jpg", "--json", "a.jpg"], "--json a.jpg: is a picture that is read"),
+        (["a.jpg", "--json", "a.jpg"], "--json a.jpg: is a file that is read"),
         (["--json", "a.jpg", "b.jpg"], "--json a.jpg: is called as a picture is"),  # what a shell makes of --json *.jpg
-        (["a.jpg", "--calibration", CALIBRATION, "--svg", "link.svg"], "--svg link.svg: is a picture that is read"),
+        (["a.jpg", "--calibration", CALIBRATION, "--svg", "link.svg"], "--svg link.svg: is a file that is read"),
         (["a.jpg", "--overlay", "o.png", "--json", "o.png"], "--json o.png: is called as a picture is"),
         (["a.jpg", "--calibration", CALIBRATION, "--json", "o", "--svg", "./o"], "--svg o: --json has the same file"),
     ],

@@ -32,15 +32,16 @@ HEADERS = {
 
 
 class BodyTooLarge(Exception):
-    """A request's body is beyond LARGEST_BODY."""
+    """A request's body is beyond what is allowed."""
 
 
 class Guard:
     """ASGI: refuses what is not for us before the application sees it."""
 
-    def __init__(self, app: ASGIApp, names: Iterable[str]) -> None:
+    def __init__(self, app: ASGIApp, names: Iterable[str], largest_body: int = LARGEST_BODY) -> None:
         """names: host names that are ours besides the address that was called and localhost."""
         self._app = app
+        self._largest_body = largest_body
         self._names = {name.lower() for name in names}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -60,7 +61,7 @@ class Guard:
         if refused is not None:
             await _answer(send_with_headers, *refused)
             return
-        await self._app(scope, _bounded(receive), send_with_headers)
+        await self._app(scope, _bounded(receive, self._largest_body), send_with_headers)
 
     def _refused(self, scope: Scope) -> tuple[int, str] | None:
         headers = Headers(scope=scope)
@@ -72,7 +73,7 @@ class Guard:
             return 403, "Origin is another site's"
         if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and not _navigates(scope, headers):
             return 403, "asked for by another site's page"
-        return None if scope["method"] in READING else _unfit_body(headers)
+        return None if scope["method"] in READING else _unfit_body(headers, self._largest_body)
 
     def _ours(self, host: str, scope: Scope) -> bool:
         name = _without_port(host)
@@ -88,12 +89,12 @@ def plain_address(address: str) -> str:
     return rest if prefix == "::ffff" and "." in rest else address
 
 
-def _unfit_body(headers: Headers) -> tuple[int, str] | None:
+def _unfit_body(headers: Headers, largest: int) -> tuple[int, str] | None:
     if headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
         return 415, "expected Content-Type: application/json; there is nothing to upload here"
     length = headers.get("content-length")
-    if length is not None and not (length.isdecimal() and int(length) <= LARGEST_BODY):
-        return 413, f"a body of {length} bytes, {LARGEST_BODY} are allowed"
+    if length is not None and not (length.isdecimal() and int(length) <= largest):
+        return 413, f"a body of {length} bytes, {largest} are allowed"
     return None
 
 
@@ -115,15 +116,15 @@ def _is_loopback(address: str) -> bool:
         return False
 
 
-def _bounded(receive: Receive) -> Receive:
-    """The same, up to LARGEST_BODY; raise BodyTooLarge."""
+def _bounded(receive: Receive, largest: int) -> Receive:
+    """The same, up to so many bytes; raise BodyTooLarge."""
     seen = 0
 
     async def bounded() -> Message:
         nonlocal seen
         message = await receive()
         seen += len(message.get("body", b""))
-        if seen > LARGEST_BODY:
+        if seen > largest:
             raise BodyTooLarge
         return message
 

@@ -7,7 +7,6 @@ import importlib.metadata
 import logging
 import socket
 import ssl
-from asyncio import Transport
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -15,54 +14,24 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import Response
-from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.config.config import Page as PageSettings
-from service.daemon.listening_socket import bound
 from service.daemon.operations import Operations
 from service.web.api import Api, problem
 from service.web.commands import Commands
 from service.web.daemon_access import DaemonAccess, PageSources
 from service.web.guard import Guard
 from service.web.html import Pages
+from service.web.http_server import http_server, listening
 from service.web.tokens import TokenFile, TokenFileError
 
 log = logging.getLogger("combtrace.page")
 
-MOST_CONNECTIONS = 64  # beyond, a new one is closed: a flood must not use up the descriptors that jobs need
-FIRST_REQUEST_S = 10.0
-KEEP_ALIVE_S = 10
-LARGEST_HEAD = 16_384
-STOP_S = 1
 THREAD_ENDS_S = 5.0
 
 
 class PageError(Exception):
     """The page cannot be served: where, why, what to do."""
-
-
-class _BoundedHttp(H11Protocol):
-    """HTTP/1.1 for a bounded number of connections, each of which has to ask for something soon."""
-
-    _soon: asyncio.TimerHandle | None = None
-
-    def connection_made(self, transport: Transport) -> None:  # type: ignore[override]
-        """A connection, closed at once where there are too many."""
-        if len(self.connections) >= MOST_CONNECTIONS:
-            transport.abort()
-            return
-        super().connection_made(transport)
-        self._soon = self.loop.call_later(FIRST_REQUEST_S, self._close_unless_asked)
-
-    def _close_unless_asked(self) -> None:
-        if not self.cycle:  # of a request; there has been none
-            self.transport.abort()
-
-    def connection_lost(self, exc: Exception | None) -> None:
-        """Its end."""
-        if self._soon is not None:
-            self._soon.cancel()
-            super().connection_lost(exc)
 
 
 class PageServer:
@@ -91,7 +60,9 @@ class PageServer:
             self._socket = _bound(self._settings.host, self._settings.port)
         listener, self._socket = self._socket, None
         api = self._make_api()
-        server = uvicorn.Server(self._server_settings(api))
+        settings = self._settings
+        guarded = Guard(application(api, self._pages), settings.names)
+        server = http_server(guarded, settings.certificate, settings.key)
         thread = ThreadPoolExecutor(1, "page")
         serving = asyncio.get_running_loop().run_in_executor(thread, _serve, server, listener)
         log.info("page: %s", self.address)
@@ -109,26 +80,6 @@ class PageServer:
         """Where it is, for people."""
         host = f"[{self._settings.host}]" if ":" in self._settings.host else self._settings.host
         return f"http{'s' if self._settings.certificate else ''}://{host}:{self._settings.port}/"
-
-    def _server_settings(self, api: Api) -> uvicorn.Config:
-        settings = self._settings
-        return uvicorn.Config(
-            Guard(application(api, self._pages), settings.names),
-            loop="asyncio",
-            http=_BoundedHttp,
-            ws="none",
-            lifespan="off",
-            log_config=None,
-            log_level="warning",
-            access_log=False,
-            proxy_headers=False,  # else a header could say from where a command comes
-            server_header=False,
-            timeout_keep_alive=KEEP_ALIVE_S,
-            timeout_graceful_shutdown=STOP_S,
-            h11_max_incomplete_event_size=LARGEST_HEAD,
-            ssl_certfile=settings.certificate,
-            ssl_keyfile=settings.key,
-        )
 
 
 def application(api: Api, pages: Pages) -> Starlette:
@@ -153,17 +104,11 @@ def _serve(server: uvicorn.Server, listener: socket.socket) -> None:
 def _bound(host: str, port: int) -> socket.socket:
     """A listening socket; raise PageError."""
     try:
-        listener = bound(host, port)
-        try:
-            listener.listen(MOST_CONNECTIONS)
-        except OSError:
-            listener.close()
-            raise
+        return listening(host, port)
     except OSError as error:
         raise PageError(
             f"page: {host}:{port} cannot be listened on: {error.strerror or error}. Set another page.host or page.port"
         ) from error
-    return listener
 
 
 def check_certificate(settings: PageSettings) -> None:

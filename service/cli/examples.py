@@ -21,6 +21,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "judge": (
         ("combtrace judge pictures/ --page judged.html", "How well your own blocks are traced."),
         ("combtrace judge pictures/ --config config.yaml --recipe 2 --json -", "With a recipe, for a script."),
+        ("combtrace judge --annotate pictures/", "Draw the true outlines of the pictures first."),
     ),
     "demo": (("combtrace demo --output demo-output", "The whole way once; the picture's path comes last."),),
     "check": (

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from contour.geometry.rings import Contour, contour_defect
+from drivers.camera.files.folder import shown
+from service.atomic_file import write_whole
 from service.measuring.master_file import ring_of
 
 LARGEST_FILE = 10_000_000
 SUFFIX = ".json"
+DECIMALS = 2  # of a pixel, in what is saved: nobody draws finer
 EDGES = ("cut", "cells", "mixed")
-DRAW = "docs/how-to/judging.md says how to make one"
+DRAW = "Draw it: combtrace judge --annotate FOLDER"
 
 
 class TruthFileError(Exception):
@@ -40,6 +43,21 @@ def read_truth(path: Path) -> Truth:
     if defect:
         raise TruthFileError(f"{path}: is no outline of a block: {defect}. {DRAW}")
     return truth
+
+
+def save_truth(image: Path, truth: Truth) -> None:
+    """Put the truth beside its picture in one step, and keep what else stands there; raise TruthFileError."""
+    path = truth_path(image)
+    outer, *holes = (ring.round(DECIMALS) for ring in truth.outline.rings)
+    defect = contour_defect(Contour(outer, tuple(holes)))
+    if defect:
+        raise TruthFileError(f"not saved: {defect}. Move the vertices there")
+    data = read_object(path) if path.exists() else {"image": shown(image.name)}
+    data |= {"outer": outer.tolist(), "holes": [hole.tolist() for hole in holes], "edge": truth.edge}
+    try:
+        write_whole(path, (json.dumps(data, ensure_ascii=False) + "\n").encode())
+    except OSError as error:
+        raise TruthFileError(f"{path}: cannot be written: {error.strerror}. Check the folder's permissions") from error
 
 
 def parsed_truth(data: dict[str, Any], path: Path) -> Truth:

@@ -16,6 +16,7 @@ from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.file_names import check_outputs
 from service.cli.json_output import json_output
 from service.cli.options.tracing import Tracing, add_tracing_arguments
+from service.cli.pictures.annotate import annotate
 from service.cli.pictures.given_pictures import pictures_in
 
 if TYPE_CHECKING:
@@ -29,6 +30,9 @@ outline beside it: NAME.json for the picture NAME.png, with the rings `outer` an
 `edge`: cut, cells or mixed. Distances run both ways, the worse is told. A bound holds
 where 95 % of the true outline lie within it; a refused outline is compared too.
 
+With --annotate nothing is judged: a page is served to this machine alone, on which true
+outlines are drawn with the mouse and saved as NAME.json, until Ctrl-C.
+
 Exit status: 0 every picture accepted within its bound, 3 one refused or outside of it,
 2 one could not be judged, unusable input or usage; the worst counts (0 < 3 < 2)."""
 
@@ -41,6 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--json", metavar="FILE", help="JSON Lines, an object a picture and a summary; - is standard output"
     )
     parser.add_argument("--page", metavar="FILE", help="HTML with the table, and both outlines over each picture")
+    parser.add_argument("--annotate", action="store_true", help="serve a page to draw true outlines on")
+    parser.add_argument("--port", type=int, metavar="N", help="--annotate: the page's port; else any that is free")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -49,6 +55,10 @@ def run(args: argparse.Namespace) -> int:
     from service.judging.report import report
     from service.judging.table import COLUMNS, cells, line, sentence
 
+    if args.annotate:
+        return annotate(args)
+    if args.port is not None:
+        raise UserError("--port: is of the page that --annotate serves. Leave it out, or add --annotate")
     images, lone_truths = _pairs(args.folder)
     outputs = (("--json", args.json), ("--page", args.page))
     read = [*images, *(image.with_suffix(".json") for image in images), *lone_truths]
@@ -78,14 +88,12 @@ def _pairs(folder: Path) -> tuple[list[Path], list[Path]]:
     """The folder's pictures, and its truth files that no picture lies beside; raise UserError."""
     from service.judging.truth_file import SUFFIX, TruthFileError, read_object, truth_path
 
-    if not folder.is_dir():
-        raise UserError(f"{folder}: is no folder, expected one of pictures beside their NAME.json. Name another")
     images, _ = pictures_in(folder)
     truths = {truth_path(image) for image in images}
     if not any(truth.exists() for truth in truths):
         raise UserError(
             f"{folder}: holds {len(images)} pictures and beside none a NAME.json with its true outline. "
-            "docs/how-to/judging.md says how to make one"
+            f"Draw them: combtrace judge --annotate {folder}"
         )
     lone = []
     for path in sorted(folder.glob(f"*{SUFFIX}")):

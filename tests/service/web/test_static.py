@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import service.judging
 import service.web
 from service.state import State
 from service.web.html import KINDS
@@ -50,14 +51,17 @@ def test_the_server_and_the_script_tell_the_same_shape_of_each_state() -> None:
     assert symbols >= {*KINDS.values(), "lost", "waiting", *outcomes}
 
 
-def test_nothing_in_the_page_is_inline_or_from_elsewhere() -> None:
-    assert re.findall(r"\sstyle=|\son\w+=|<style|javascript:", PAGE) == []
-    assert re.findall(r"<script(?![^>]*\ssrc=)", PAGE) == []
-    for name, text in {**SCRIPTS, "page.html": PAGE, "page.css": CSS}.items():
+@pytest.mark.parametrize("folder", [STATIC, Path(service.judging.__file__).parent / "static"])
+def test_nothing_in_a_page_is_inline_or_from_elsewhere(folder: Path) -> None:
+    texts = {path.name: path.read_text() for path in folder.iterdir() if path.suffix in (".html", ".js", ".css")}
+    for name, text in texts.items():
         outside = [url for url in re.findall(r"(?:https?:)?//[\w.-]+\.\w+[^\s\"']*", text) if "www.w3.org" not in url]
         assert [url for url in outside if not url.startswith("//")] == [], name
-    for text in SCRIPTS.values():
-        assert re.findall(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(", text) == []
+        if name.endswith(".html"):
+            assert re.findall(r"\sstyle=|\son\w+=|<style|javascript:", text) == []
+            assert re.findall(r"<script(?![^>]*\ssrc=)", text) == []
+        if name.endswith(".js"):
+            assert re.findall(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(", text) == []
 
 
 def themes() -> list[dict[str, str]]:

@@ -128,7 +128,7 @@ def test_what_cannot_be_judged_is_told_and_the_rest_is_judged(combs: Path) -> No
     (combs / "notes.json").write_text('{"mood": "good"}')
     records, summary, told = judged(combs, status=2)
     expected = {
-        "alone.png": "alone.json: is not there, expected the picture's true outline. ",
+        "alone.png": "alone.json: is not there, expected the picture's true outline. Draw it: combtrace judge",
         "broken.png": "broken.json: is no JSON",
         "crossing.png": "crossing.json: is no outline of a block: the exterior meets itself: edges 0 and 2",
         "half.png": "half.json: a ring is of shape (2, 2), expected three or more points",
@@ -150,8 +150,11 @@ def test_a_folder_without_pictures_or_truth_is_told(tmp_path: Path, combs: Path)
     (combs / "0.json").unlink()
     for folder, told in (
         (tmp_path / "empty", "holds no picture, but nothing"),
-        (tmp_path / "none", "is no folder, expected one of pictures"),
-        (combs, "holds 1 pictures and beside none a NAME.json with its true outline. "),
+        (tmp_path / "none", "cannot be looked into: No such file"),
+        (
+            combs,
+            "holds 1 pictures and beside none a NAME.json with its true outline. Draw them",
+        ),
     ):
         done = called("judge", folder)
         assert (done.returncode, told in done.stderr) == (2, True), done.stderr

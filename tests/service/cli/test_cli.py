@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import argparse
+import io
 import re
 import shlex
 import subprocess
 import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import pytest
@@ -51,16 +54,34 @@ def test_every_example_of_the_main_help_is_too() -> None:
         build_parser().parse_args(shlex.split(line))
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["trace", "--help"], ["run", "--help"], ["--version"]])
-def test_help_loads_neither_numpy_nor_cv2_nor_pydantic_nor_pymodbus(arguments: list[str]) -> None:
+def loaded(*arguments: str) -> set[str]:
+    """The modules that a process of the command has loaded at its end."""
     code = (
         "import sys\nfrom service.cli.main import main\n"
         "try:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
-        "heavy = {'numpy', 'cv2', 'pydantic', 'pymodbus', 'yaml', 'serial'} & set(sys.modules)\n"
-        "sys.exit(f'loaded: {heavy}' if heavy else 0)"
+        "print(*sys.modules, file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True)
+    return set(done.stderr.split())
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["trace", "--help"], ["run", "--help"], ["--version"]])
+def test_help_loads_neither_numpy_nor_cv2_nor_pydantic_nor_pymodbus(arguments: list[str]) -> None:
+    assert not loaded(*arguments) & {"numpy", "cv2", "pydantic", "pymodbus", "yaml", "serial"}
+
+
+def test_a_parser_of_one_command_says_what_the_parser_of_all_says() -> None:
+    every = build_parser()
+    for command in COMMANDS:
+        alone = build_parser([command])
+        assert alone.format_usage() == every.format_usage()
+        assert _help(alone, command) == _help(every, command)
+
+
+def _help(parser: argparse.ArgumentParser, command: str) -> str:
+    with redirect_stdout(io.StringIO()) as out, pytest.raises(SystemExit):
+        parser.parse_args([command, "--help"])
+    return out.getvalue()
 
 
 def test_without_a_command_help_is_shown_and_the_status_is_2() -> None:

@@ -76,6 +76,10 @@ class Reason(IntEnum):
         return _TABLE[self][0 if language is Language.ENGLISH else 1]
 
 
+Rejection = tuple[Reason, str]
+"""A reason to refuse a picture, and the sentence with the measured value and the limit."""
+
+
 @dataclass(frozen=True)
 class Explanation:
     """What a reason means, in one sentence, and the next action for the person at the machine."""

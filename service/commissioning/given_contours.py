@@ -21,7 +21,7 @@ from contour.acceptance.acceptance import judge_millimetres
 from contour.acceptance.error_budget import ErrorBudget
 from contour.geometry.rings import Contour, Ring, area, oriented_contour
 from drivers.camera import Frame
-from service.config.recipes import Recipe
+from service.config.recipes import AnyRecipe
 from service.measuring.measure import Measurer, rejections
 from service.measuring.measurement import Measurement
 
@@ -55,7 +55,9 @@ class GivenContours(Measurer):
         self._turn = itertools.cycle(contours)
         self._aligned = aligned
 
-    def measure(self, picture: NDArray[np.uint8], recipe: Recipe, thickness_mm: float, camera: str = "") -> Measurement:
+    def measure(
+        self, picture: NDArray[np.uint8], recipe: AnyRecipe, thickness_mm: float, camera: str = ""
+    ) -> Measurement:
         """The next contour as if it had been measured; the picture is not looked at."""
         given = next(self._turn)
         sure = given.uncertainty_mm

@@ -8,6 +8,7 @@ from pydantic import Field, field_validator, model_validator
 
 from contour.polygon.start_vertex import Start
 from contour.tracing.trace import Method
+from service.config.plain_recipe import PlainRecipe
 from service.config.values import FilePath, Model, Number, Point
 
 DEFAULT_METHOD: Method = "wall-tips"
@@ -171,3 +172,6 @@ class Recipe(Model):
                 f"is {list(value)}, expected four numbers, the third above the first and the fourth above the second"
             )
         return value
+
+
+AnyRecipe = Recipe | PlainRecipe

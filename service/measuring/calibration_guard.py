@@ -11,14 +11,11 @@ from numpy.typing import NDArray
 
 from contour.calibration.fixed_marks import SentinelCheck, check_sentinels
 from service.measuring.calibration_file import CalibrationRecord
-from service.reasons import Reason
+from service.reasons import Reason, Rejection
 
 SECONDS_A_DAY = 86_400.0
 CLOCK_SLACK_DAYS = 1.0
 """A file may have been written on a computer whose clock is set otherwise; a day is no such difference."""
-
-Rejection = tuple[Reason, str]
-"""A reason to refuse a picture, and the sentence with the measured value and the limit."""
 
 
 def utc_now() -> datetime:

@@ -6,6 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +30,13 @@ from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
-from service.config.recipes import Recipe
-from service.measuring.calibration_guard import CalibrationGuard, Rejection
 from service.measuring.measurement import Measurement
-from service.measuring.table_file import TableRecord
-from service.reasons import Reason
+from service.reasons import Reason, Rejection
+
+if TYPE_CHECKING:
+    from service.config.recipes import AnyRecipe
+    from service.measuring.calibration_guard import CalibrationGuard
+    from service.measuring.table_file import TableRecord
 
 log = logging.getLogger("combtrace.measure")
 
@@ -99,7 +102,9 @@ class Measurer:
         """True where pixels become millimetres."""
         return self._calibration is not None
 
-    def measure(self, picture: NDArray[np.uint8], recipe: Recipe, thickness_mm: float, camera: str = "") -> Measurement:
+    def measure(
+        self, picture: NDArray[np.uint8], recipe: AnyRecipe, thickness_mm: float, camera: str = ""
+    ) -> Measurement:
         """The measurement of one picture of a camera ("" = not told).
 
         Raises PictureError or ParameterError where the picture or the recipe is unusable.
@@ -131,7 +136,7 @@ class Measurer:
     def _traced(
         self,
         picture: NDArray[np.uint8],
-        recipe: Recipe,
+        recipe: AnyRecipe,
         thickness_mm: float,
         result: Measurement,
         watch: _Stopwatch,
@@ -187,7 +192,7 @@ class Measurer:
             )
         return look_at(picture, record.table)
 
-    def _polygon(self, contour: Contour, recipe: Recipe, thickness_mm: float, watch: _Stopwatch) -> Polygon:
+    def _polygon(self, contour: Contour, recipe: AnyRecipe, thickness_mm: float, watch: _Stopwatch) -> Polygon:
         return cutting_polygon(
             contour,
             self._calibration,
@@ -197,7 +202,7 @@ class Measurer:
             on_stage=watch.lap,
         )
 
-    def _region(self, recipe: Recipe, thickness_mm: float) -> Region | None:
+    def _region(self, recipe: AnyRecipe, thickness_mm: float) -> Region | None:
         if recipe.roi_px:
             return Region.of_box(*recipe.roi_px)
         if not recipe.roi_mm:
@@ -211,7 +216,7 @@ class Measurer:
         return Region(self._calibration.to_pixels(ring, thickness_mm))
 
     def _budget(
-        self, polygon: Polygon, recipe: Recipe, thickness_mm: float, uncertainty_px: float | None
+        self, polygon: Polygon, recipe: AnyRecipe, thickness_mm: float, uncertainty_px: float | None
     ) -> ErrorBudget | None:
         if self._calibration is None or polygon.mm_per_px is None:
             return None
@@ -230,7 +235,7 @@ class Measurer:
             return None
         return lambda pixels: calibration.to_machine(calibration.to_work(pixels, thickness_mm))
 
-    def _limits(self, recipe: Recipe) -> Limits:
+    def _limits(self, recipe: AnyRecipe) -> Limits:
         return Limits(
             min_area_mm2=recipe.min_area_mm2,
             max_area_mm2=recipe.max_area_mm2,
@@ -246,7 +251,7 @@ class Measurer:
 
 
 def _checked_trace(
-    picture: NDArray[np.uint8], recipe: Recipe, region: Region | None, rectifier: Rectifier | None, watch: _Stopwatch
+    picture: NDArray[np.uint8], recipe: AnyRecipe, region: Region | None, rectifier: Rectifier | None, watch: _Stopwatch
 ) -> CheckedTrace:
     """The block traced in the region alone, and checked there, in pixels of the whole picture."""
     if region is None:
@@ -264,7 +269,7 @@ def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:
     return tuple((Reason(int(finding.refusal)), finding.text) for finding in findings)
 
 
-def trace_settings(recipe: Recipe) -> TraceSettings:
+def trace_settings(recipe: AnyRecipe) -> TraceSettings:
     """The recipe's part that tracing needs."""
     sizes = {name: int(value) for name, value in recipe.parameters.items() if name.endswith("_px")}
     return TraceSettings(
@@ -277,7 +282,7 @@ def trace_settings(recipe: Recipe) -> TraceSettings:
     )
 
 
-def step_doubt(recipe: Recipe, pitch_px: float | None = None) -> str | None:
+def step_doubt(recipe: AnyRecipe, pitch_px: float | None = None) -> str | None:
     """What speaks against the recipe's step; None where nothing does, or where the core follows from a pitch."""
     step, core = recipe.parameters.get("step_px"), recipe.parameters.get("core_px")
     if core is None and pitch_px is not None:

@@ -12,8 +12,7 @@ from contour.acceptance.quality import Quality
 from contour.acceptance.sent_evidence import SentStretch
 from contour.geometry.rings import Contour, Ring
 from contour.image.overlay import Hidden
-from service.measuring.calibration_guard import Rejection
-from service.reasons import Reason
+from service.reasons import Reason, Rejection
 
 _STRETCH_FIELDS = ("ring", "from_px", "to_px", "from_mm", "to_mm", "state", "by", "bound_px", "bound_mm")
 

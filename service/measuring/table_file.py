@@ -50,6 +50,17 @@ def save_table(path: Path, record: TableRecord) -> None:
         raise TableFileError(f"{path}: cannot be written: {error.strerror}. Name another file") from error
 
 
+def find_table(path: Path) -> TableRecord | None:
+    """The taught table of a file; None where there is no file. Raises TableFileError where it cannot be used."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return None
+    except OSError as error:  # it may well be there, and what it would refuse must not pass
+        raise TableFileError(f"{path}: cannot be looked at: {error.strerror}. Check its permissions") from error
+    return load_table(path)
+
+
 def load_table(path: Path) -> TableRecord:
     """The taught table of a file. Raises TableFileError."""
     try:

@@ -10,10 +10,11 @@ from service.config.controllers import NoController
 from service.daemon.reload import BadPlan
 from service.jobs.cycle_terms import Plan
 from service.jobs.health import Fault
+from service.measuring import table_file
 from service.measuring.calibration_file import CalibrationChanged, CalibrationFileError, load_record
 from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
 from service.measuring.measure import Measurer
-from service.measuring.table_file import TableFileError, TableRecord, load_table
+from service.measuring.table_file import TableFileError, TableRecord
 from service.reasons import Reason
 from service.wiring.errors import WiringError
 
@@ -62,17 +63,8 @@ def find_guard(config: Config) -> tuple[CalibrationGuard | None, Fault | None]:
 
 def find_table(config: Config) -> TableRecord | None:
     """The taught table, where there is one; raise WiringError where its file cannot be used."""
-    if config.table is None:
-        return None
     try:
-        config.table.file.stat()
-    except FileNotFoundError:
-        return None
-    except OSError as error:  # it may well be there, and what it would refuse must not pass
-        text = f"{config.table.file}: cannot be looked at: {error.strerror}. Check its permissions"
-        raise WiringError(text) from error
-    try:
-        return load_table(config.table.file)
+        return None if config.table is None else table_file.find_table(config.table.file)
     except TableFileError as error:
         raise WiringError(str(error)) from error
 

@@ -32,8 +32,8 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
 class Exports:
     """Where the contours of accepted pictures go. paths: form, and the file of each picture."""
 
-    paths: tuple[tuple[str, dict[Path, Path]], ...]
-    gcode: GcodeSettings
+    paths: tuple[tuple[str, dict[Path, Path]], ...] = ()
+    gcode: GcodeSettings | None = None
 
     @classmethod
     def of(cls, args: argparse.Namespace, recipe: Recipe, *, calibrated: bool) -> Exports:
@@ -65,11 +65,12 @@ class Exports:
 
     def write(self, image: Path, measurement: Measurement) -> list[str]:
         """Write what is asked for, and say where; a refused contour is not written, and an older file stays."""
+        gcode = self.gcode
+        if not self.paths or gcode is None:
+            return []
         from service.export.document import ExportDocument, ExportError
         from service.export.files import exported, write_export
 
-        if not self.paths:
-            return []
         if measurement.findings or measurement.millimetres is None or measurement.thickness_mm is None:
             return ["refused: nothing exported, files of before are as they were"]
         document = ExportDocument(
@@ -79,7 +80,7 @@ class Exports:
         for form, files in self.paths:
             file = files[image]
             try:
-                write_export(file, exported(form, document, lambda: self.gcode))
+                write_export(file, exported(form, document, lambda: gcode))
             except ExportError as error:
                 raise UserError(f"--{form}: {error}") from error
             told.append(str(file))

@@ -12,7 +12,7 @@ from service.cli.errors import UserError
 
 if TYPE_CHECKING:
     from service.config.config import Config
-    from service.config.recipes import Recipe
+    from service.config.recipes import AnyRecipe, Recipe
     from service.measuring.calibration_guard import CalibrationGuard
     from service.measuring.measure import Measurer
     from service.measuring.trend_file import TrendLine
@@ -31,15 +31,15 @@ def load_config_or_default(path: Path | None) -> Config:
         raise UserError(str(error)) from error
 
 
-def guard_of(config: Config, args: argparse.Namespace) -> CalibrationGuard | None:
+def guard_of(config: Config | None, args: argparse.Namespace) -> CalibrationGuard | None:
     """The calibration that the command line or a given configuration names, with its limits; None where none is."""
-    from service.measuring.calibration_file import CalibrationFileError, load_record
-    from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
-
-    settings = config.calibration if args.config is not None else None
+    settings = config.calibration if config is not None and args.config is not None else None
     path = args.calibration or (settings.file if settings is not None else None)
     if path is None:
         return None
+    from service.measuring.calibration_file import CalibrationFileError, load_record
+    from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
+
     limits = GuardLimits()
     if settings is not None:
         limits = GuardLimits(settings.max_age_days, settings.sentinel_tolerance_px, settings.sentinels_required)
@@ -59,7 +59,7 @@ def find_recipe(config: Config, wanted: str | None) -> Recipe:
     return found
 
 
-def thickness_of(args: argparse.Namespace, recipe: Recipe) -> float:
+def thickness_of(args: argparse.Namespace, recipe: AnyRecipe) -> float:
     """The thickness by --thickness-mm, or else the recipe's; raise UserError."""
     if args.thickness_mm is None:
         return recipe.thickness_mm

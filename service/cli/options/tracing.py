@@ -11,15 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 from service.cli.errors import UserError
 from service.cli.options.measuring import find_recipe, guard_of, load_config_or_default, thickness_of
+from service.config.plain_recipe import PlainRecipe
+from service.export.forms import ENDINGS
 
 if TYPE_CHECKING:
     from contour.geometry.arrays import Bytes
     from service.config.config import Config
-    from service.config.recipes import Recipe
+    from service.config.recipes import AnyRecipe, Recipe
     from service.measuring.measure import Measurer
     from service.measuring.measurement import Measurement
     from service.measuring.table_file import TableRecord
 
+_RECIPE_KEYS = ("method", "polarity", "binarize", "edge")
+_PARAMETERS = ("core_px", "step_px", "threshold", "max_gap_px", "min_width_px")
 METHODS = ("wall-tips", "sliding-matrix", "direct-scan", "find-contours")
 
 
@@ -48,7 +52,7 @@ class Tracing:
     """A measurer, with the recipe and the thickness that it measures by."""
 
     measurer: Measurer
-    recipe: Recipe
+    recipe: AnyRecipe
     thickness_mm: float
 
     @classmethod
@@ -58,8 +62,8 @@ class Tracing:
 
         from service.measuring.measure import Measurer
 
-        config = load_config_or_default(args.config)
-        recipe = _recipe(config, args)
+        config = None if _all_is_plain(args) else load_config_or_default(args.config)
+        recipe = PlainRecipe() if config is None else _recipe(config, args)
         guard = guard_of(config, args)
         thickness_mm = thickness_of(args, recipe)
         if guard is None and args.thickness_mm is not None:
@@ -68,7 +72,7 @@ class Tracing:
                 "contours stay in pixels. Name one by --calibration or --config",
                 file=sys.stderr,
             )
-        work_area = np.array(config.work_area_mm, dtype=np.float64) if config.work_area_mm else None
+        work_area = np.array(config.work_area_mm, dtype=np.float64) if config and config.work_area_mm else None
         calibration = guard.record.calibration if guard else None
         measurer = Measurer(calibration, guard=guard, work_area_mm=work_area, table=_table(config))
         return cls(measurer, recipe, thickness_mm)
@@ -86,21 +90,22 @@ class Tracing:
         return picture, replace(measurement, timings_ms=times)
 
 
+def _all_is_plain(args: argparse.Namespace) -> bool:
+    """True where no option asks for anything of a configuration, nor changes a recipe, which would have to be checked.
+
+    What checks them takes longer to load than a picture to trace.
+    """
+    changing = ("config", "recipe", "roi_px", *_RECIPE_KEYS, *_PARAMETERS, *ENDINGS)
+    return all(getattr(args, name, None) is None for name in changing)
+
+
 def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
     """The recipe, by name, number or default, with what the command line says otherwise."""
     from service.config.recipes import Recipe
 
     found = find_recipe(config, args.recipe)
-    changes: dict[str, Any] = {
-        name: getattr(args, name)
-        for name in ("method", "polarity", "binarize", "edge")
-        if getattr(args, name) is not None
-    }
-    given = {
-        name: getattr(args, name)
-        for name in ("core_px", "step_px", "threshold", "max_gap_px", "min_width_px")
-        if getattr(args, name) is not None
-    }
+    changes: dict[str, Any] = {name: getattr(args, name) for name in _RECIPE_KEYS if getattr(args, name) is not None}
+    given = {name: getattr(args, name) for name in _PARAMETERS if getattr(args, name) is not None}
     method_changed = changes.get("method", found.method) != found.method
     if args.roi_px is not None:
         changes.update(roi_px=args.roi_px, roi_mm=())
@@ -119,13 +124,14 @@ def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
         raise UserError("; ".join(describe(error, Recipe))) from error
 
 
-def _table(config: Config) -> TableRecord | None:
-    from service.wiring.errors import WiringError
-    from service.wiring.plan import find_table
+def _table(config: Config | None) -> TableRecord | None:
+    if config is None or config.table is None:
+        return None
+    from service.measuring.table_file import TableFileError, find_table
 
     try:
-        return find_table(config)
-    except WiringError as error:
+        return find_table(config.table.file)
+    except TableFileError as error:
         raise UserError(str(error)) from error
 
 

@@ -17,6 +17,7 @@ from service.cli.options.export import Exports, add_export_arguments
 from service.cli.options.tracing import Tracing, add_tracing_arguments
 from service.cli.pictures.given_pictures import add_pictures_argument, pictures_of
 from service.cli.pictures.trace_record import record_of, sentence, unusable_record
+from service.config.plain_recipe import PlainRecipe
 
 if TYPE_CHECKING:
     from service.measuring.measurement import Measurement
@@ -81,7 +82,9 @@ class _Setup:
     def of(cls, args: argparse.Namespace) -> _Setup:
         tracing = Tracing.of(args)
         overlays = {} if args.overlay is None else _overlays(args.overlay, args.images, several=args.several)
-        exports = Exports.of(args, tracing.recipe, calibrated=tracing.measurer.calibrated)
+        exports = Exports()
+        if not isinstance(tracing.recipe, PlainRecipe):
+            exports = Exports.of(args, tracing.recipe, calibrated=tracing.measurer.calibrated)
         told = [] if args.json in (None, "-") else [("--json", Path(args.json))]
         check_outputs(args.images, [*told, *(("--overlay", file) for file in overlays.values()), *exports.outputs])
         return cls(tracing, overlays, args.language, exports)

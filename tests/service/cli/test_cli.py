@@ -15,6 +15,7 @@ import pytest
 
 from service.cli.examples import EXAMPLES, examples_of
 from service.cli.main import COMMANDS, EPILOG, build_parser, main
+from tests.support.pictures.combs import write_combs
 from tests.support.processes.processes import called, combtrace
 
 
@@ -54,7 +55,7 @@ def test_every_example_of_the_main_help_is_too() -> None:
         build_parser().parse_args(shlex.split(line))
 
 
-def loaded(*arguments: str) -> set[str]:
+def loaded(*arguments: str | Path) -> set[str]:
     """The modules that a process of the command has loaded at its end."""
     code = (
         "import sys\nfrom service.cli.main import main\n"
@@ -68,6 +69,19 @@ def loaded(*arguments: str) -> set[str]:
 @pytest.mark.parametrize("arguments", [["--help"], ["trace", "--help"], ["run", "--help"], ["--version"]])
 def test_help_loads_neither_numpy_nor_cv2_nor_pydantic_nor_pymodbus(arguments: list[str]) -> None:
     assert not loaded(*arguments) & {"numpy", "cv2", "pydantic", "pymodbus", "yaml", "serial"}
+
+
+def test_a_trace_loads_nothing_of_configurations_controllers_and_the_daemon(tmp_path: Path) -> None:
+    """They would take longer than the tracing does."""
+    modules = loaded("trace", write_combs(tmp_path / "combs") / "0.png")
+    assert {"cv2", "contour.tracing.wall_tips"} <= modules
+    assert not modules & {"asyncio", "http", "pydantic", "pymodbus", "serial", "socket", "sqlite3", "ssl", "yaml"}
+    parts = {tuple(name.split(".")[:2]) for name in modules}
+    assert {room for part, *rooms in parts for room in rooms if part == "drivers"} == {"camera"}
+    assert {room for part, *rooms in parts for room in rooms if part == "service"} == {
+        *("cli", "config", "export", "measuring", "atomic_file", "reasons")
+    }
+    assert {name for name in modules if name.startswith("service.config.")} == {"service.config.plain_recipe"}
 
 
 def test_a_parser_of_one_command_says_what_the_parser_of_all_says() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from service.config.cameras import FilesCamera
 from service.config.config import Config
 from service.config.config_file import ConfigError, config_schema, default_config, load_config
 from service.config.controllers import ModbusTcp, NoController
+from service.config.plain_recipe import PlainRecipe
 from service.config.triggers import SerialTrigger
 
 ROOT = Path(__file__).parents[3]
@@ -56,6 +58,13 @@ def test_every_default_of_the_shipped_config_is_the_models_default() -> None:
     assert shown.recipes == default.recipes
     assert shown.controller == default.controller
     assert shown.default_recipe == default.default_recipe
+
+
+def test_the_plain_recipe_is_the_default_one() -> None:
+    (recipe,) = default_config().recipes
+    plain = PlainRecipe()
+    for key in fields(PlainRecipe):  # by repr: 20 is told otherwise than 20.0
+        assert (key.name, repr(getattr(plain, key.name))) == (key.name, repr(getattr(recipe, key.name)))
 
 
 def test_line_1_of_the_shipped_config_names_the_schema() -> None:

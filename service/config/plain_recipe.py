@@ -1,0 +1,38 @@
+"""The recipe of those who name no configuration: told without pydantic, which takes longer to load than a trace."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from contour.polygon.start_vertex import Start
+    from contour.tracing.trace import Method
+
+
+@dataclass(frozen=True)
+class PlainRecipe:
+    """What a picture is measured by, each at the default of `Recipe`; a test holds them to it."""
+
+    number: int = 1
+    method: Method = "wall-tips"
+    thickness_mm: float = 20.0
+    tolerance_mm: float = 0.1
+    thickness_tolerance_mm: float = 0.0
+    max_uncertainty_mm: float = 0.0
+    max_disagreement_pitches: float = 2.0
+    margin_mm: float = 0.0
+    first_vertex: Start | None = None
+    max_vertices: int = 4000
+    budget_mm: float = 0.0
+    min_area_mm2: float = 100.0
+    max_area_mm2: float = 4_000_000.0
+    polarity: Literal["auto", "bright", "dark"] = "auto"
+    binarize: Literal["flat", "otsu"] | int = "flat"
+    edge: Literal["cut", "cells"] = "cut"
+    pieces: Literal["one", "largest"] = "one"
+    max_bridged_mm: float = 0.0
+    bridge: Literal["straight", "arcs"] = "straight"
+    roi_px: tuple[float, ...] = ()
+    roi_mm: tuple[float, ...] = ()
+    parameters: dict[str, float] = field(default_factory=dict)

@@ -76,6 +76,7 @@ class Parts:
     serial_pool: ThreadPoolExecutor | None = None
     lines: list[SerialTrigger] = field(default_factory=list)
     warm_up_s: float = 0.0
+    rehearse: Callable[[], None] = lambda: None  # before the first job, beside the start
     notifier: Notifier = field(default_factory=Notifier)
     watchdog: Watchdog = field(default_factory=lambda: Watchdog(Notifier({})))
     archive: ArchiveWriter | None = None
@@ -118,7 +119,7 @@ class Daemon:
         self._add_control()
         notifier = self._parts.notifier
         self._parts.health.listen(lambda state, reason: notifier.send(STATUS=_status(state, reason)))
-        keeping = self._start(self._parts.triggers)
+        keeping = self._start(self._parts.triggers, once_open=self._parts.rehearse)
         notifier.send(READY=1, STATUS=_status(self._parts.health.state, self._parts.health.reason))
         try:
             await self._stopped_or_dead(keeping)
@@ -167,7 +168,12 @@ class Daemon:
 
     # --- parts --------------------------------------------------------------------------------------------------
 
-    def _start(self, triggers: Iterable[tuple[str, Callable[[], Awaitable[None]]]]) -> asyncio.Task[None]:
+    def _start(
+        self,
+        triggers: Iterable[tuple[str, Callable[[], Awaitable[None]]]],
+        *,
+        once_open: Callable[[], None] = lambda: None,
+    ) -> asyncio.Task[None]:
         parts = self._parts
         watch = CameraWatch(
             parts.camera,
@@ -175,6 +181,7 @@ class Daemon:
             parts.health,
             warm_up_s=parts.warm_up_s,
             feed_watchdog=partial(parts.watchdog.feed, "camera"),
+            once_open=once_open,
         )
         watch.start()
         add = self.supervisor.add

@@ -29,7 +29,8 @@ class CameraWatch:
     """Reports the camera's fault to `health`, under "camera", where jobs report theirs too.
 
     warm_up_s: time after opening in which no trigger is taken. A camera that was away needs as long as it was away, as
-    it cools about as fast as it warms.
+    it cools about as fast as it warms. once_open: done in the camera's thread after it was opened for the first time,
+    without waiting for it; must not raise.
     """
 
     def __init__(
@@ -40,6 +41,7 @@ class CameraWatch:
         *,
         warm_up_s: float = 0.0,
         feed_watchdog: Callable[[], None] = lambda: None,
+        once_open: Callable[[], None] = lambda: None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._camera = camera
@@ -47,6 +49,7 @@ class CameraWatch:
         self._health = health
         self._warm_up_s = warm_up_s
         self._feed_watchdog = feed_watchdog
+        self._once_open = once_open
         self._now = now
         self._logged: str | None = None
         self._lost_at_s: float | None = None
@@ -87,6 +90,8 @@ class CameraWatch:
         if await self._tried(self._close_and_open):
             away_s = 0.0 if self._lost_at_s is None else self._now() - self._lost_at_s
             needed_s = min(self._warm_up_s, away_s) if self._ever_open else self._warm_up_s
+            if not self._ever_open:
+                self._pool.submit(self._once_open)
             self._ever_open, self._lost_at_s, self._logged = True, None, None
             self._checked_at_s = self._now()
             self._warm_at_s = self._now() + needed_s

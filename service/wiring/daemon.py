@@ -27,6 +27,7 @@ from service.jobs.cycle import Cycle
 from service.jobs.cycle_terms import Devices, Observation, Records
 from service.jobs.executor import Executor, Intake
 from service.jobs.health import Fault, Health, journal_fault
+from service.jobs.rehearsal import rehearse
 from service.jobs.trigger_queue import TriggerQueue
 from service.link.link import Link, LinkSettings
 from service.link.transfer_terms import TransferCounter
@@ -98,6 +99,8 @@ def build(
         limits = StorageLimits(config.journal.min_free_bytes, config.journal.max_jobs)
         parts.storage = StorageWatch(journal, config.journal.path, health, archive, limits)
         parts.warm_up_s = getattr(config.camera, "warm_up_s", 0.0)
+        if stand_ins is None:
+            parts.rehearse = rehearse
         if path is not None:
             parts.reloader = Reloader(path, config, health, sound_plan, cycle.use)
         add_triggers(config, parts, opened)

@@ -135,6 +135,20 @@ async def running(
         await asyncio.wait([task])
 
 
+async def test_it_rehearses_once_the_camera_is_open_but_not_before_a_single_job(tmp_path: Path) -> None:
+    (tmp_path / "once").mkdir()
+    rehearsed = []
+    once = Built(tmp_path / "once", None)
+    once.parts.rehearse = lambda: rehearsed.append("once")
+    await once.daemon.run_once(10.0)
+    built = Built(tmp_path, None)
+    built.parts.rehearse = lambda: rehearsed.append("daemon")
+    task = asyncio.ensure_future(built.daemon.run())
+    await built.until(lambda: rehearsed)
+    await built.stop(task)
+    assert rehearsed == ["daemon"]
+
+
 async def test_without_a_controller_it_runs_until_it_is_stopped(tmp_path: Path) -> None:
     async with running(tmp_path, None) as (built, task):
         await built.ready()

@@ -117,3 +117,15 @@ async def test_a_camera_that_goes_while_it_warms_up_is_an_error_and_is_opened_ag
     bench.camera.plugged = True
     await bench.run(1.0)
     assert bench.camera.is_open
+
+
+async def test_what_is_done_once_it_is_open_is_not_done_again_when_it_comes_back():
+    opened_times = []
+    bench = Bench(once_open=lambda: opened_times.append(bench.camera.opened_times))
+    await bench.run(2)
+    bench.camera.plugged = False
+    await bench.run(2)
+    bench.camera.plugged = True
+    await bench.run(2)
+    bench.pool.shutdown()
+    assert (opened_times, bench.camera.opened_times) == ([1], 2)

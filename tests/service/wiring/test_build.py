@@ -9,12 +9,14 @@ from typing import Any
 
 import pytest
 
+from service.commissioning.given_contours import GivenContours, NoCamera
 from service.config.config import Config
+from service.jobs.rehearsal import rehearse
 from service.records.archive_writer import ArchiveWriter
 from service.records.journal_file import JournalError
 from service.wiring import daemon as wiring
 from service.wiring import triggers
-from service.wiring.daemon import build, opening_of
+from service.wiring.daemon import StandIns, build, opening_of
 from service.wiring.errors import WiringError
 
 IN_TURN = ("_make_link", "_make_archive", "_make_executor", "add_triggers", "add_metrics", "add_page")
@@ -115,6 +117,18 @@ async def test_a_port_that_is_taken_leaves_nothing_open(tmp_path: Path) -> None:
     assert parts.metrics is not None
     parts.metrics.close()
     parts.lock.release()
+
+
+async def test_the_daemon_rehearses_and_one_with_given_contours_does_not(tmp_path: Path) -> None:
+    config = configured(tmp_path, metrics=None)
+    for stand_ins in (None, StandIns(NoCamera(), GivenContours([], aligned=False))):
+        parts = build(config, stand_ins=stand_ins)
+        assert (parts.rehearse is rehearse) == (stand_ins is None)
+        parts.journal.close()
+        parts.lock.release()
+        parts.pool.shutdown()
+        if parts.archive is not None:
+            parts.archive.close()
 
 
 async def test_a_page_that_cannot_be_served_leaves_no_metrics_behind(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page accuracy methods refusals rules soak soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page bench-start accuracy methods refusals rules soak soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -46,6 +46,10 @@ bench-daemon: install
 # First paint and weight of the operator's page, and what a viewer costs a job.
 bench-page: install
 	$(BIN)/python -m benchmarks.daemon.page --write
+
+# A command's start and a first trace, over what they cannot be without.
+bench-start: install
+	$(BIN)/python -m benchmarks.start --write
 
 accuracy: install
 	$(BIN)/python -m benchmarks.accuracy --random 300 --first 998000 --write

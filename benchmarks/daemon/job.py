@@ -10,7 +10,7 @@ import asyncio
 import logging
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -94,8 +94,8 @@ async def one(parts: Parts, archive: Path) -> JobTimes:
     return JobTimes(*times, 1000 * (time.perf_counter() - ended))
 
 
-async def measured(folder: Path, jobs: int = JOBS) -> JobTimes:
-    """The median job, each figure for itself; a first one warms up."""
+async def in_turn(folder: Path, jobs: int) -> list[JobTimes]:
+    """So many jobs of a daemon that has just begun, one after another."""
     logging.getLogger("combtrace").setLevel(logging.ERROR)
     path, port = prepare(folder), free_port()
     path.write_text(CONFIG.format(port=port))
@@ -105,12 +105,16 @@ async def measured(folder: Path, jobs: int = JOBS) -> JobTimes:
         daemon = Daemon(parts)
         task = asyncio.ensure_future(daemon.run())
         try:
-            found = [await one(parts, folder / "archive") for _ in range(jobs + 1)][1:]
+            return [await one(parts, folder / "archive") for _ in range(jobs)]
         finally:
             daemon.stop()
             await asyncio.wait([task])
     finally:
         controller.stop()
+
+
+def median_job(found: Sequence[JobTimes]) -> JobTimes:
+    """Each figure for itself."""
     # The rest is taken of each job: medians of its parts would not add up.
     rest = median(job.rest for job in found)
     decoding, tracing = median(job.decoding for job in found), median(job.tracing for job in found)
@@ -118,8 +122,8 @@ async def measured(folder: Path, jobs: int = JOBS) -> JobTimes:
 
 
 def job_times(folder: Path, jobs: int = JOBS) -> JobTimes:
-    """As `measured`, in a folder that is left empty."""
+    """The median job but for a first one, which warms up; the folder is left empty."""
     try:
-        return asyncio.run(measured(folder, jobs))
+        return median_job(asyncio.run(in_turn(folder, jobs + 1))[1:])
     finally:
         shutil.rmtree(folder, ignore_errors=True)

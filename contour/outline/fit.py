@@ -58,8 +58,7 @@ class FittedRing:
 def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None) -> FittedRing:
     """The outline through a ring's witnesses, fitted in the rectified plane where `rectifier` is given.
 
-    Raises NoBlockFound where there are fewer than six witnesses, or no few of them lie on any line or arc, or all on one
-    line.
+    Raises NoBlockFound where there are fewer than six witnesses, few lie on any line or arc, or all on one line.
     """
     if len(evidence.points) < _FEWEST:
         raise NoBlockFound(

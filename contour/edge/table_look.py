@@ -47,6 +47,8 @@ _BESIDE_PITCHES = 0.6
 # Of the gradient's usual mean over a cell of comb.
 _QUIET, _SMOOTH, _GOOD_SHARE = 0.45, 0.3, 0.3
 _MOST = 0.5
+# Pitches into what may fill a hole: its rim, and its middle (or so much of the deepest); how light that rim is.
+_HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT = (0.5, 0.9), (1.0, 0.6), 0.92
 # Shadows, sides of the block and its mirror image make a band beside it that has no room for a disc of this radius, or
 # for few here and there; where walls are lost in a cell or two, the cells are flat.
 _BAND, _LONG_PITCHES = 0.55, 2.0
@@ -68,6 +70,8 @@ class TableLook:
     """Where it is darker in all channels, as a shadow makes a table."""
     away: Float32s
     """Distance of each sample from what is foreign, pixels."""
+    light: Bytes
+    """The picture itself, the mean of its channels."""
     plain: bool = True
     """Whether what lies beside the block is judged: not where the table mirrors it, or has borders of its own."""
 
@@ -104,12 +108,22 @@ class TableLook:
         return np.asarray(cv2.dilate(self.lit.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
 
     def fills(self, hole: RingEvidence) -> bool:
-        """Whether a hole is none: most of it is foreign, and lighter than the table ever is in a block's shade."""
+        """Whether a hole is none: most of it is foreign, lighter than the table ever is in a block's shade, and nearly
+        as light along its rim as amidst it. A block shades the table along a hole's rim, also where a lamp lights it.
+        """
         drawn = np.zeros(self.foreign.shape[:2], np.uint8)
         cv2.fillPoly(drawn, [np.rint(samples_of(hole.coarse, self.step)).astype(np.int32)], 1)
         inside = cv2.erode(drawn, np.ones((3, 3), np.uint8)) > 0
         filled = self.foreign & self.lighter & inside
-        return bool(np.count_nonzero(filled) > _MOST * np.count_nonzero(inside))
+        if np.count_nonzero(filled) <= _MOST * np.count_nonzero(inside):
+            return False
+        away = cv2.distanceTransform((self.foreign & inside).astype(np.uint8), cv2.DIST_L2, 3)
+        deep = np.asarray(away, np.float64) * (self.step / self.pitch_px)
+        rim = (deep > _HOLE_RIM[0]) & (deep < _HOLE_RIM[1])
+        middle = deep > max(_HOLE_MIDDLE[0], _HOLE_MIDDLE[1] * float(deep.max()))
+        if not (rim.any() and middle.any()):
+            return True
+        return bool(np.median(self.light[rim]) > _RIM_LIGHT * np.median(self.light[middle]))
 
 
 def beside(look: TableLook) -> float:
@@ -148,7 +162,9 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     lighter = np.any(off > _APART + _APART_SPREADS * spread, axis=2)
     shade = np.all((off < 0) & (off > (_DEEPEST_SHADE - 1.0) * level), axis=2)
     every = foreign | beside_block
-    look = TableLook(table, every, every, step, pitch_px, np.asarray(lighter), np.asarray(shade), _away(every, step))
+    light = small if small.ndim == 2 else small.mean(axis=2).astype(np.uint8)
+    maps = np.asarray(lighter), np.asarray(shade), _away(every, step), light
+    look = TableLook(table, every, every, step, pitch_px, *maps)
     if plain:
         return look
     exterior = seen.rings[0].points

@@ -37,5 +37,6 @@ def look(
         pitch_px=PITCH,
         lighter=foreign & lighter,
         shade=foreign & shade,
+        light=np.where(foreign, np.uint8(150 if lighter else 20), np.uint8(40)),
         away=np.full(foreign.shape, 1e6, np.float32) if away is None else np.asarray(away, np.float32),
     )

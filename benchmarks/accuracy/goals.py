@@ -105,11 +105,12 @@ def _vertices(ours: Sequence[Trial]) -> list[Goal]:
 def _photographs(method: str, photo_trials: Sequence[PhotographTrial]) -> list[Goal]:
     rows = []
     for trial in photo_trials:
-        if trial.method != method:
+        photograph = trial.photograph
+        if trial.method != method or not photograph.sure:
             continue
-        must, aim = (0.94, "0.96") if trial.photograph.startswith("lattice") else (0.96, "0.98")
+        must, aim = (0.94, "0.96") if photograph.name.startswith("lattice") else (0.96, "0.98")
         iou = trial.agreement.iou if trial.agreement else None
-        what = f"IoU, photograph {trial.photograph}, --edge {trial.edge}"
+        what = f"IoU, photograph {photograph.name}, --edge {photograph.edge}"
         told = "no contour" if iou is None else f"{iou:.3f}"
         rows.append(Goal(what, f"≥ {must}", aim, told, iou is not None and iou >= must))
     return rows

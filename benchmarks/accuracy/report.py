@@ -123,12 +123,12 @@ def photos(trials: Sequence[PhotographTrial]) -> str:
     """One line a photograph and method."""
     lines = []
     for trial in trials:
-        found = trial.agreement
+        found, head = trial.agreement, [trial.photograph.name, trial.photograph.edge, trial.method]
         if found is None:
-            lines.append([trial.photograph, trial.edge, trial.method, *["–"] * 4, trial.failure.split(".")[0]])
+            lines.append([*head, *["–"] * 4, trial.failure.split(".")[0]])
             continue
         numbers = [_f(found.iou, ".4f"), _f(found.mean_px), _f(found.hausdorff_px, ".1f"), _f(found.bias_px, "+.2f")]
-        lines.append([trial.photograph, trial.edge, trial.method, *numbers, _f(trial.total_ms, ".0f")])
+        lines.append([*head, *numbers, _f(trial.total_ms, ".0f")])
     return table(["photograph", "--edge", "method", "IoU", "mean (px)", "Hausdorff (px)", "bias (px)", "ms"], lines)
 
 

@@ -1,11 +1,10 @@
 """Photographs with outlines drawn by hand: a folder of NAME.png beside NAME.json, which is not part of the project.
 
-The JSON holds `outer` and `holes`, rings of [x, y] in pixels. `EDGE` says with which edge each known one is traced.
+The JSON is as `combtrace judge` reads it, with `polarity` besides, by which the ready-made ways go.
 """
 
 from __future__ import annotations
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,40 +18,35 @@ from contour.errors import ContourError
 from contour.geometry.rings import Contour
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
+from service.judging.truth_file import parsed_truth, read_object
 from tests.support.scenes.metrics import Agreement, agreement
 from tests.support.scenes.rivals import RIVALS, Hints, RivalFailed
 from tests.support.scenes.trials import OWN_METHODS, Stopwatch
 
 ROOT = Path(__file__).resolve().parents[3]
-EDGE: dict[str, Literal["cut", "cells"]] = {
-    "lattice_rpu": "cells",
-    "protoboard_10x5": "cells",
-    "alfoam_closed": "cut",
-}
 
 
 @dataclass(frozen=True)
 class Photograph:
-    """A picture, its outline drawn by hand (about 1 % sure), and the edge it is traced with."""
+    """A picture, its outline drawn by hand, and the edge it is traced with. sure: to about 1 % of the size."""
 
     name: str
     picture: NDArray[np.uint8]
     outline: Contour
     dark: bool
     edge: Literal["cut", "cells"]
+    sure: bool
 
 
 @dataclass(frozen=True)
 class PhotographTrial:
     """What a method made of a photograph."""
 
-    photograph: str
+    photograph: Photograph
     method: str
-    edge: str
     agreement: Agreement | None
     total_ms: float
     failure: str = ""
-    contour: Contour | None = None
 
 
 def photographs() -> tuple[list[Photograph], Path]:
@@ -60,20 +54,15 @@ def photographs() -> tuple[list[Photograph], Path]:
     folder = Path(os.environ.get("COMBTRACE_PHOTOS", ROOT.parent / "shared" / "real"))
     found = []
     for description in sorted(folder.glob("*.json")) if folder.is_dir() else []:
-        data = json.loads(description.read_text(encoding="utf-8"))
-        picture = cv2.imread(str(folder / data["image"]), cv2.IMREAD_COLOR)
+        picture = cv2.imread(str(description.with_suffix(".png")), cv2.IMREAD_COLOR)
         if picture is None:
             continue
-        outer, *holes = (np.array(ring, dtype=np.float64) for ring in (data["outer"], *data["holes"]))
-        found.append(
-            Photograph(
-                description.stem,
-                np.asarray(picture, dtype=np.uint8),
-                Contour(outer, tuple(holes)),
-                data["polarity"] == "dark-on-bright",
-                EDGE.get(description.stem, "cut"),
-            )
-        )
+        data = read_object(description)
+        truth = parsed_truth(data, description)
+        dark = data["polarity"] == "dark-on-bright"
+        edge: Literal["cut", "cells"] = "cells" if truth.edge == "cells" else "cut"
+        pixels, sure = np.asarray(picture, np.uint8), data.get("tier") == "A"
+        found.append(Photograph(description.stem, pixels, truth.outline, dark, edge, sure))
     return found, folder
 
 
@@ -89,17 +78,10 @@ def run_photograph(photograph: Photograph, method: str, pitch_px: float) -> Phot
             contour = trace(photograph.picture, TraceSettings(method=own, edge=photograph.edge)).contour
     except (ContourError, RivalFailed) as error:
         watch.lap("trace")
-        spent = watch.milliseconds["trace"]
-        return PhotographTrial(photograph.name, method, photograph.edge, None, spent, str(error))
+        return PhotographTrial(photograph, method, None, watch.milliseconds["trace"], str(error))
     watch.lap("trace")
-    return PhotographTrial(
-        photograph.name,
-        method,
-        photograph.edge,
-        agreement(contour, photograph.outline),
-        watch.milliseconds["trace"],
-        contour=contour,
-    )
+    found = agreement(contour, photograph.outline)
+    return PhotographTrial(photograph, method, found, watch.milliseconds["trace"])
 
 
 def cell_pitch_px(photograph: Photograph) -> float:

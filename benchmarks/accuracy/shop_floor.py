@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -24,6 +24,7 @@ from benchmarks.page_section import put_section, table
 from contour.errors import PictureError
 from contour.geometry.agreement import distances_to, places_along, rectified_edges
 from contour.geometry.arrays import Bools, Float64s
+from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour
 from contour.image.taught_table import teach
 from contour.synthetic import Rendered, render, render_empty_table
@@ -160,11 +161,10 @@ def true_places(rendered: Rendered) -> tuple[Float64s, Bools]:
     """Places along the true outline at equal spacing, pixels, shape (N, 2), and whether each is visible."""
     places, clear = [], []
     for ring, seen in zip(rendered.truth_px.rings, rendered.visible, strict=True):
-        closed = np.concatenate((ring, ring[:1]))
-        reached = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(closed, axis=0).T))))
-        at = np.arange(0.0, reached[-1], SPACING_PX)
-        places.append(np.column_stack([np.interp(at, reached, closed[:, axis]) for axis in (0, 1)]))
-        clear.append(np.interp(at, reached, np.append(seen, seen[0]).astype(np.float64)) > 0.99)
+        lengths = RingLengths.of(ring)
+        at = np.arange(0.0, lengths.length, SPACING_PX)
+        places.append(lengths.at(at))
+        clear.append(np.interp(at, lengths.starts, seen, period=lengths.length) > 0.99)
     return np.concatenate(places), np.concatenate(clear)
 
 
@@ -201,11 +201,10 @@ def _row(name: str, some: Sequence[Verdict]) -> list[str]:
 
 
 def run(
-    kinds: Iterable[str], seeds: Sequence[int], *, alone: bool, taught: bool, save: Path | None, workers: int
+    kinds: Iterable[str], seeds: Sequence[int], judge: Callable[[str, int], Verdict], *, workers: int
 ) -> Iterator[Verdict]:
     """The verdicts on all kinds and seeds, in order."""
     jobs = [(kind, seed) for kind in kinds for seed in seeds]
-    judge = partial(judged, alone=alone, taught=taught, save=save)
     if workers == 1:
         cv2.setNumThreads(1)
         yield from (judge(*job) for job in jobs)
@@ -236,8 +235,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.save.mkdir(parents=True, exist_ok=True)
     seeds = range(options.first, options.first + options.seeds)
     verdicts = []
-    how = {"alone": options.alone, "taught": options.taught, "save": options.save, "workers": options.workers}
-    for verdict in run(kinds, seeds, **how):
+    judge = partial(judged, alone=options.alone, taught=options.taught, save=options.save)
+    for verdict in run(kinds, seeds, judge, workers=options.workers):
         verdicts.append(verdict)
         if options.list:
             print(verdict.line(), flush=True)

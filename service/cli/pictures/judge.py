@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from service.judging.judgement import summary
     from service.judging.report import report
     from service.judging.table import COLUMNS, cells, line, sentence
+    from service.judging.truth_file import truth_path
 
     if args.annotate:
         return annotate(args)
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         raise UserError("--port: is of the page that --annotate serves. Leave it out, or add --annotate")
     images, lone_truths = _pairs(args.folder)
     outputs = (("--json", args.json), ("--page", args.page))
-    read = [*images, *(image.with_suffix(".json") for image in images), *lone_truths]
+    read = [*images, *map(truth_path, images), *lone_truths]
     check_outputs(read, [(option, Path(name)) for option, name in outputs if name not in (None, "-")])
     if args.page == "-":
         raise UserError("--page -: the table goes to standard output. Name a file")

@@ -4,7 +4,7 @@ What it does not model: a lens's blur beyond a Gaussian, interreflection between
 mosaics.
 """
 
-from contour.synthetic.camera import CameraModel, camera_above, densified
+from contour.synthetic.camera import CameraModel, camera_above
 from contour.synthetic.cells import CellGeometry
 from contour.synthetic.closed_border import closed_border
 from contour.synthetic.coverage import area_coverage
@@ -69,7 +69,6 @@ __all__ = [
     "closed_border",
     "convex",
     "crescent",
-    "densified",
     "disc_ring",
     "l_shape",
     "moved",

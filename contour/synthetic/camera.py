@@ -9,7 +9,7 @@ import numpy as np
 
 from contour.errors import ParameterError
 from contour.geometry.arrays import Float64s
-from contour.geometry.rings import Contour, Ring
+from contour.geometry.rings import Contour, densified
 
 
 @dataclass(frozen=True)
@@ -128,16 +128,6 @@ def camera_above(
     return CameraModel(
         width, height, (focal, focal), ((width - 1) / 2.0, (height - 1) / 2.0), distortion, rows, (tx, ty, tz)
     )
-
-
-def densified(ring: Ring, step: float) -> Ring:
-    """The same ring with vertices at most `step` apart, shape (M, 2); the given vertices stay."""
-    ends = np.roll(ring, -1, axis=0)
-    counts = np.maximum(1, np.ceil(np.linalg.norm(ends - ring, axis=1) / step)).astype(np.int64)
-    edge = np.repeat(np.arange(len(ring)), counts)
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    share = ((np.arange(len(edge)) - first) / counts[edge])[:, None]
-    return np.asarray(ring[edge] * (1.0 - share) + ends[edge] * share, dtype=np.float64)
 
 
 def _turn_x(angle: float) -> Float64s:

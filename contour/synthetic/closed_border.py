@@ -8,8 +8,7 @@ import numpy as np
 
 from contour.errors import ParameterError
 from contour.geometry.arrays import Float64s
-from contour.geometry.rings import Contour, Ring
-from contour.synthetic.camera import densified
+from contour.geometry.rings import Contour, Ring, densified
 from contour.synthetic.cells import CellGeometry, draw_lattice, lattice_centres, lattice_coordinates
 from contour.synthetic.outlines import signed_distance
 

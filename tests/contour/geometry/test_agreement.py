@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from contour.geometry.agreement import agreement as figures
 from contour.geometry.agreement import distances_to, intersection_over_union, places_along, rectified_edges
-from contour.geometry.rings import Contour
-from contour.synthetic import blob, densified, disc_ring, rectangle, with_holes
+from contour.geometry.rings import Contour, densified
+from contour.synthetic import blob, disc_ring, rectangle, with_holes
 from tests.support.scenes.metrics import agreement
 from tests.support.scenes.sample_scenes import CAMERA, THICKNESS_MM
 

@@ -22,7 +22,6 @@ from contour.synthetic import (
     camera_above,
     convex,
     crescent,
-    densified,
     disc_ring,
     l_shape,
     rectangle,
@@ -305,13 +304,6 @@ def test_the_mean_cell_area_of_an_over_expanded_honeycomb_follows_from_its_const
     assert regular.cell_area_mm2 == pytest.approx(10.0**2 * np.sqrt(3.0) / 2.0)
     side = 10.0 / np.sqrt(3.0)
     assert over.cell_area_mm2 == pytest.approx(2 * side * np.sin(np.radians(80)) * side * (1 + np.cos(np.radians(80))))
-
-
-def test_densified_keeps_the_vertices_and_the_bound():
-    ring = rectangle((0.0, 0.0), 10.0, 7.0, 5.0).exterior
-    dense = densified(ring, 0.5)
-    assert all((np.abs(dense - vertex).sum(axis=1) < 1e-12).any() for vertex in ring)
-    assert np.linalg.norm(np.roll(dense, -1, axis=0) - dense, axis=1).max() <= 0.5 + 1e-12
 
 
 def test_parameters_out_of_range_are_refused_by_name():

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contour.geometry.rings import Contour
+from contour.geometry.rings import Contour, densified
 from contour.synthetic import (
     Crush,
     Filling,
@@ -17,7 +17,6 @@ from contour.synthetic import (
     Strip,
     Thing,
     blob,
-    densified,
     moved,
     rectangle,
     signed_distance,

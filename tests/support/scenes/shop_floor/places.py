@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contour.geometry.arrays import Float64s
+from contour.geometry.rings import densified
 from contour.synthetic import (
     Scene,
     Thing,
-    densified,
 )
 
 NEAR = 12.0

@@ -104,11 +104,6 @@ def save_record(path: Path, record: CalibrationRecord) -> None:
         raise CalibrationFileError(f"{path}: cannot be written: {error.strerror}. The old file is unchanged") from error
 
 
-def calibration_hash(path: Path) -> str:
-    """The hash of a file's content, whether it states one or not; raise CalibrationFileError."""
-    return content_hash(_read(path))
-
-
 def content_hash(data: dict[str, Any]) -> str:
     """`sha256:` and the digest of all keys but `hash`, as JSON with sorted keys; layout does not count."""
     content = {key: value for key, value in data.items() if key != "hash"}

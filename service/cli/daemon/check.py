@@ -38,10 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check, print, and tell by the exit status."""
-    from service.cli.json_output import json_output
+    from service.cli.text_output import text_output
     from service.commissioning.check_result import Level
 
-    with json_output(args.json) as write:
+    with text_output(args.json) as write:
         text = sys.stderr if args.json == "-" else sys.stdout
         found = []
         unusable = False

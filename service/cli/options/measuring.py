@@ -93,7 +93,6 @@ class Measuring:
     @classmethod
     def of(cls, args: argparse.Namespace) -> Measuring:
         """By the arguments of `add_measuring_arguments`; raise UserError, also where there is no calibration."""
-        from service.measuring.calibration_file import calibration_hash
         from service.measuring.measure import Measurer
 
         if not 0 < args.tolerance_mm < 1e4:
@@ -105,11 +104,8 @@ class Measuring:
         guard = guard_of(config, args)
         if guard is None:
             raise UserError("deviations are in millimetres: name the calibration by --calibration or --config")
-        settings = config.calibration
-        path = args.calibration or (settings.file if settings is not None else None)
-        assert path is not None
         measurer = Measurer(guard.record.calibration, guard=guard)
-        return cls(config, measurer, recipe, thickness_of(args, recipe), calibration_hash(path)[:15])
+        return cls(config, measurer, recipe, thickness_of(args, recipe), guard.record.digest[:15])
 
 
 def note_trend(path: Path | None, line: TrendLine) -> None:

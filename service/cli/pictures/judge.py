@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.file_names import check_outputs
-from service.cli.json_output import json_output
 from service.cli.options.tracing import Tracing, add_tracing_arguments
 from service.cli.pictures.annotate import annotate
 from service.cli.pictures.given_pictures import pictures_in
+from service.cli.text_output import text_output
 
 if TYPE_CHECKING:
     from service.judging.judgement import Judgement
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     judge = _Judge(Tracing.of(args), with_figures=args.page is not None)
     texts = sys.stderr if args.json == "-" else sys.stdout
     width = max(len(path.name) for path in (*images, *lone_truths))
-    with json_output(args.page, "--page") as write_page, json_output(args.json) as write:
+    with text_output(args.page, "--page") as write_page, text_output(args.json) as write:
         print(line(COLUMNS, width), file=texts)
         for judgement in judge.all(images, lone_truths):
             stream = sys.stderr if judgement.status == "error" else texts

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, TextIO
 from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.file_names import check_outputs, distinct_stems, make_folder, output_path
-from service.cli.json_output import json_output
 from service.cli.options.export import Exports, add_export_arguments
 from service.cli.options.tracing import Tracing, add_tracing_arguments
 from service.cli.pictures.given_pictures import add_pictures_argument, pictures_of
 from service.cli.pictures.trace_record import record_of, sentence, unusable_record
+from service.cli.text_output import text_output
 from service.config.plain_recipe import PlainRecipe
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     setup = _Setup.of(args)
     texts = sys.stderr if args.json == "-" else sys.stdout
     worst = EXIT_OK
-    with json_output(args.json) as write:
+    with text_output(args.json) as write:
         for image in args.images:
             record, line, status = _trace_one(image, setup)
             stream = texts if status != EXIT_UNUSABLE else sys.stderr

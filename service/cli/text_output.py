@@ -1,4 +1,4 @@
-"""Where a command's JSON goes: standard output, or a file that is whole or as it was before."""
+"""Where a command's JSON or page goes: standard output, or a file that is whole or as it was before."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from service.cli.errors import UserError
 
 
 @contextmanager
-def json_output(name: str | None, option: str = "--json") -> Iterator[Callable[[str], None]]:
+def text_output(name: str | None, option: str = "--json") -> Iterator[Callable[[str], None]]:
     """A function that takes text: nowhere for None, to standard output for `-`, else into the file of that name.
 
     The file is opened before any work is done, beside its place, and takes it when all went well; an error leaves what

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -34,13 +35,11 @@ EXPECTED_NOISE = (  # of requests that a test has refused, held or broken off
 
 @dataclass
 class Panel:
-    """A daemon, its page in a browser, and all that the browser complained of or asked for."""
+    """A daemon, and its page in a browser."""
 
     cell: Cell
     client: Client
     page: Page
-    complaints: list[str] = field(default_factory=list)
-    asked: list[str] = field(default_factory=list)
 
     def ordered(self, **content: Any) -> int:
         """The number of a job that was ordered past the page, once its evidence is kept."""
@@ -64,6 +63,23 @@ def chromium(playwright: Playwright) -> Browser:
     """Debian's Chromium, started; without it the test skips."""
     need_program("chromium", "apt-get install chromium")
     return playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+
+
+@contextmanager
+def clean_page(browser: Browser, url: str, noise: Sequence[str] = (), **more: Any) -> Iterator[Page]:
+    """The page there; nothing but the noise may go wrong in it, and nothing be loaded from elsewhere."""
+    page = browser.new_page(viewport=PANEL, **more)
+    page.set_default_timeout(BOUND_MS)
+    complaints: list[str] = []
+    asked: list[str] = []
+    page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(url)
+    yield page
+    page.close()
+    assert [one for one in complaints if not any(part in one for part in noise)] == []
+    assert [one for one in asked if not one.startswith(url)] == [], "nothing is loaded from elsewhere"
 
 
 def settled_state(panel: Panel, kind: str) -> None:

@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, sync_playwright
 
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import Client, token_file
-from tests.support.processes.page_panel import BOUND_MS, EXPECTED_NOISE, PANEL, Panel, chromium
+from tests.support.processes.page_panel import EXPECTED_NOISE, Panel, chromium, clean_page
 from tests.support.processes.processes import free_port
 
 
@@ -44,16 +44,6 @@ def browser(cell: tuple[Cell, Client]) -> Iterator[Browser]:
 
 @pytest.fixture
 def panel(cell: tuple[Cell, Client], browser: Browser) -> Iterator[Panel]:
-    """The page, opened anew; nothing but the expected may go wrong in it, and nothing be loaded from elsewhere."""
-    page = browser.new_page(viewport=PANEL, has_touch=True, locale="en-GB")
-    page.set_default_timeout(BOUND_MS)
-    opened = Panel(*cell, page)
-    url = opened.client.url
-    page.on("console", lambda message: message.type == "error" and opened.complaints.append(message.text))
-    page.on("pageerror", lambda error: opened.complaints.append(str(error)))
-    page.on("request", lambda request: opened.asked.append(request.url))
-    page.goto(url)
-    yield opened
-    page.close()
-    assert [one for one in opened.complaints if not any(noise in one for noise in EXPECTED_NOISE)] == []
-    assert [one for one in opened.asked if not one.startswith(url)] == [], "nothing is loaded from elsewhere"
+    """The page, opened anew."""
+    with clean_page(browser, cell[1].url, EXPECTED_NOISE, has_touch=True, locale="en-GB") as page:
+        yield Panel(*cell, page)

@@ -15,7 +15,7 @@ from playwright.sync_api import Page, expect, sync_playwright
 
 from tests.support.pictures.combs import write_combs
 from tests.support.processes.page_client import Client, Reply
-from tests.support.processes.page_panel import BOUND_MS, PANEL, chromium
+from tests.support.processes.page_panel import chromium, clean_page
 from tests.support.processes.processes import Process, called, until
 
 SQUARE = [[40.0, 40.0], [40.0, 140.0], [140.0, 140.0], [140.0, 40.0]]
@@ -127,22 +127,11 @@ class Hand:
 
 @pytest.fixture
 def hand(served: Served) -> Iterator[Hand]:
-    """The page in a browser, in which nothing goes wrong and to which nothing comes from elsewhere."""
+    """The page in a browser."""
     url = f"{served.client.url[:-1]}{served.path}"
-    complaints: list[str] = []
-    asked: list[str] = []
-    with sync_playwright() as playwright:
-        browser = chromium(playwright)
-        page = browser.new_page(viewport=PANEL)
-        page.set_default_timeout(BOUND_MS)
-        page.on("console", lambda message: message.type == "error" and complaints.append(message.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(url)
+    with sync_playwright() as playwright, chromium(playwright) as browser, clean_page(browser, url) as page:
         expect(page.locator("#view image")).to_have_attribute("width", "320")
         yield Hand(page)
-        browser.close()
-    assert (complaints, [one for one in asked if not one.startswith(url)]) == ([], [])
 
 
 def test_an_outline_is_drawn_mended_and_saved_and_what_else_the_file_holds_stays(served: Served, hand: Hand) -> None:

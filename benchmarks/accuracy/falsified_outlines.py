@@ -32,7 +32,6 @@ from tests.support.scenes.trials import calibration_for
 
 SCENES = (996_500, 100)
 _LONG_PITCHES = 4.0
-_WIDE_PITCHES = 1.0
 # A lens bends straight edges; chords of five cells follow it.
 _STEP_PITCHES = 5.0
 

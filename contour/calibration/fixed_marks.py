@@ -64,11 +64,10 @@ class Sentinels:
 
 @dataclass(frozen=True)
 class Offset:
-    """How far a mark lies from where the calibration saw it: its middle, and its worst corner, pixels."""
+    """How far a mark lies from where the calibration saw it: its middle, pixels."""
 
     id: int
     middle_px: tuple[float, float]
-    worst_px: float
 
     @property
     def distance_px(self) -> float:
@@ -140,4 +139,4 @@ def _around(picture: Bytes, mark: Mark, dictionary: str) -> Mark | None:
 
 def _offset(was: Mark, now: Mark) -> Offset:
     x, y = (now.middle_px - was.middle_px).tolist()
-    return Offset(was.id, (x, y), float(np.linalg.norm(now.corners_px - was.corners_px, axis=1).max()))
+    return Offset(was.id, (x, y))

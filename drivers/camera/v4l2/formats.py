@@ -77,7 +77,7 @@ def set_format(device: Device, width: int, height: int, code: str) -> PictureFor
             f"{device.path}: {width} x {height} {code} comes interlaced (field order {pix.field}); expected whole "
             "frames, as half frames of two instants tear edges. Choose another size or rate."
         )
-    return PictureFormat(code, width, height, pix.bytesperline, pix.sizeimage)
+    return PictureFormat(code, width, height, pix.bytesperline)
 
 
 def set_frame_rate(device: Device, frame_rate: float | None, code: str) -> float | None:

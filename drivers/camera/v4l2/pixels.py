@@ -43,7 +43,6 @@ class PictureFormat:
     width: int
     height: int
     bytes_per_line: int
-    bytes_per_picture: int
 
 
 def bytes_needed(layout: PictureFormat) -> int:

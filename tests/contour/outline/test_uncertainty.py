@@ -22,7 +22,6 @@ from tests.support.pictures.small_scenes import block
 WIDE = rectangle(500.0, 320.0)
 shapes = st.sampled_from([WIDE, circle(180.0), blob(170.0)])
 seeds = st.integers(0, 50)
-NO_YES = (False, True)
 few = settings(max_examples=12)
 """Each example is a fit or two."""
 

@@ -29,7 +29,7 @@ def raw_picture(code, padding):
     """A noisy buffer of a format with `padding` bytes behind each row: its memory, format, and rows without padding."""
     row_bytes = WIDTH * LAYOUTS[code].bytes_per_pixel
     rows = NOISE.integers(0, 256, (ROWS.get(code, HEIGHT), row_bytes + padding), np.uint8)
-    layout = PictureFormat(code, WIDTH, HEIGHT, row_bytes + padding, rows.size)
+    layout = PictureFormat(code, WIDTH, HEIGHT, row_bytes + padding)
     return in_memory(rows.tobytes()), layout, np.ascontiguousarray(rows[:, :row_bytes])
 
 
@@ -71,7 +71,7 @@ def test_a_whole_frame_needs_all_its_rows_but_not_the_last_ones_padding():
 def jpeg_frame(padding, size=(WIDTH, HEIGHT)):
     smooth = cv2.resize(NOISE.integers(0, 256, (6, 8, 3), np.uint8), size, interpolation=cv2.INTER_CUBIC)
     data = cv2.imencode(".jpg", smooth)[1].tobytes()
-    return data, in_memory(data + bytes(padding)), PictureFormat("MJPG", WIDTH, HEIGHT, 0, len(data) + padding)
+    return data, in_memory(data + bytes(padding)), PictureFormat("MJPG", WIDTH, HEIGHT, 0)
 
 
 @pytest.mark.parametrize("padding", [0, 1, 4096])

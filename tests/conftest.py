@@ -2,22 +2,31 @@
 
 `pytest --hypothesis-profile=explore` looks for new examples instead.
 
-Of the hundreds of processes that tests start, each may leave its bytecode for the next, and has one thread for numpy's
-algebra: its others wait busily while it starts.
+Of the hundreds of processes that tests start, this one too, each may leave its bytecode for the next, and has one
+thread for numpy's algebra: its others wait busily while it starts. Most are forked from one.
+
+Tests that mostly wait for processes come first: while they wait others compute, and nobody waits alone at the end.
 
 Every test fails that leaves a descriptor or a thread open, or a task in its event loop.
 """
 
 import os
+import sys
 
+import pytest
 from hypothesis import settings
 
 from tests.support.leaks import no_task_is_left, nothing_is_left, pytest_collection_modifyitems
+from tests.support.processes import forked
 
 __all__ = ["no_task_is_left", "nothing_is_left", "pytest_collection_modifyitems"]
 
+WAITING = ("tests/soak/", "tests/system/", "tests/hil/", "tests/controllers/")
+
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+forked.begin()
 
 # Those need a kernel with the virtual camera: `make test-camera` boots one and says so.
 collect_ignore = [] if os.environ.get("COMBTRACE_CAMERA_GUEST") else ["camera_guest"]
@@ -27,3 +36,8 @@ collect_ignore += [] if os.environ.get("COMBTRACE_LINUXCNC") else ["linuxcnc"]
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("explore", deadline=None, max_examples=1000)
 settings.load_profile("same")
+
+
+@pytest.hookimpl(specname="pytest_collection_modifyitems")
+def pytest_begin_with_those_that_wait(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: not item.nodeid.startswith(WAITING))

@@ -1,4 +1,4 @@
-"""A slice of each campaign of `make soak` that does more to both sides than lose requests and kill processes."""
+"""A slice of each campaign of `make soak` that does more to both sides than lose requests."""
 
 from __future__ import annotations
 
@@ -9,17 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from tests.soak.cells.disk_cell import DiskCell
 from tests.soak.cells.faulted_cell import FaultedCell, Terms
-from tests.soak.cells.killed_cell import KilledCell, Killing
 from tests.soak.cells.other_services import ForeignCell, TwinCell
 from tests.soak.cells.restored_cell import RestoredCell
-from tests.soak.cells.stopped_cell import StoppedCell
 from tests.soak.cells.swapped_cell import SettingsCell, SpareCell
-from tests.soak.cells.told_cell import ToldCell
 from tests.soak.cells.torn_cell import TearingController, TornCell
-from tests.support.processes.small_disk import CannotMount
-from tests.support.real_parts import missing
 
 # What must have happened in each, by the names that the report gives it.
 SLICES: list[tuple[type[FaultedCell], Terms, set[str]]] = [
@@ -47,26 +41,6 @@ async def test_what_always_holds_holds_for_two_services_with_copies_of_one_journ
     came_to = await TwinCell(tmp_path, Terms(seed=913, jobs=1, risk=0.0)).run(60)
     assert came_to.findings.counts == Counter(), came_to.findings.texts
     assert came_to.restarts.total() == 1
-
-
-@pytest.mark.parametrize(
-    ("cell", "killing"),
-    [
-        (StoppedCell, Killing(seed=917, kills=1, victim="service")),
-        (DiskCell, Killing(seed=919, kills=1, victim="service")),
-        (ToldCell, Killing(seed=920, kills=1, victim="service")),
-    ],
-    ids=["stopped", "disk", "serial line"],
-)
-async def test_what_always_holds_holds_for_processes(tmp_path: Path, cell: type[KilledCell], killing: Killing) -> None:
-    running = cell(tmp_path, killing)
-    try:
-        toll = await running.kill_service()
-    except CannotMount as why:
-        missing(str(why))
-    assert toll.findings.counts == Counter(), toll.findings.texts
-    assert toll.kills.total() == killing.kills
-    assert toll.acknowledged >= 2
 
 
 def test_a_controller_that_tears_shows_half_of_a_value_whose_halves_both_change_and_no_beat() -> None:

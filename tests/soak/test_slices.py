@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 from tests.soak.cells.faulted_cell import FaultedCell, Terms
-from tests.soak.cells.killed_cell import KilledCell, Killing
 from tests.soak.pieces import INCIDENTS, Amounts, all_pieces, faulted_terms, incident_terms, killing_terms
 from tests.soak.promises import PROMISES, Evidence, Findings, Side, Taken, judge, judge_twins
 from tests.soak.report import NAMES, write_report
@@ -35,21 +34,6 @@ async def test_what_always_holds_holds_under_faults_and_restarts(
     assert came_to.acknowledged >= 5, "nothing was tried"
     assert came_to.accepted >= 1, "nothing was brought to its end"
     assert came_to.faults.total() >= 1, "nothing was done to it"
-
-
-async def test_what_always_holds_holds_though_the_service_is_killed(tmp_path: Path) -> None:
-    toll = await KilledCell(tmp_path, Killing(seed=904, kills=3, victim="service")).kill_service()
-    assert toll.findings.counts == Counter(), toll.findings.texts
-    assert toll.kills.total() == 3
-    assert toll.accepted >= 2
-
-
-async def test_what_always_holds_holds_though_the_controller_is_killed(tmp_path: Path) -> None:
-    killing = Killing(seed=905, kills=3, victim="controller", word_order="little")
-    toll = await KilledCell(tmp_path, killing).kill_controller()
-    assert toll.findings.counts == Counter(), toll.findings.texts
-    assert toll.kills.total() == 3
-    assert toll.accepted >= 3
 
 
 # --- the judge --------------------------------------------------------------------------------------------------------

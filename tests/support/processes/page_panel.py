@@ -62,7 +62,7 @@ class Panel:
 def chromium(playwright: Playwright) -> Browser:
     """Debian's Chromium, started; without it the test skips."""
     need_program("chromium", "apt-get install chromium")
-    return playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+    return playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
 
 
 @contextmanager

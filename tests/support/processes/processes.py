@@ -14,9 +14,12 @@ import time
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from service.cli.main import main
+from tests.support.processes import forked
+from tests.support.processes.forked import Forked
 
 COMBTRACE = [sys.executable, "-m", "service.cli.main"]
 ROOT = Path(__file__).parents[3]
@@ -26,7 +29,9 @@ ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
 def combtrace(
     *arguments: str | Path, cwd: Path | None = None, bound_s: float = 60, variables: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command to its end."""
+    """Run a command to its end; with a folder or variables of its own it starts from nothing."""
+    if forked.begun and cwd is None and variables is None:
+        return _forked(list(map(str, arguments)), bound_s)
     return subprocess.run(
         [*COMBTRACE, *map(str, arguments)],
         capture_output=True,
@@ -36,6 +41,17 @@ def combtrace(
         cwd=cwd,
         env={**ENVIRONMENT, **(variables or {})},
     )
+
+
+def _forked(words: list[str], bound_s: float) -> subprocess.CompletedProcess[str]:
+    with TemporaryDirectory() as folder:
+        out, error = Path(folder) / "out", Path(folder) / "error"
+        process = Forked(words, out, error)
+        try:
+            status = process.wait(bound_s)
+        finally:
+            process.kill()
+        return subprocess.CompletedProcess(words, status, out.read_text(), error.read_text())
 
 
 def called(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -55,10 +71,8 @@ class Process:
 
     def __init__(self, log: Path, *arguments: str | Path) -> None:
         self.log = log
-        with log.open("ab") as file:
-            self._process = subprocess.Popen(
-                [*COMBTRACE, *map(str, arguments)], stdout=file, stderr=subprocess.STDOUT, env=ENVIRONMENT
-            )
+        words = list(map(str, arguments))
+        self._process = Forked(words, log, log) if forked.begun else _started(words, log)
 
     def kill(self) -> None:
         """kill -9."""
@@ -98,6 +112,11 @@ class Process:
     @property
     def text(self) -> str:
         return self.log.read_text(errors="replace")
+
+
+def _started(words: list[str], log: Path) -> subprocess.Popen[bytes]:
+    with log.open("ab") as file:
+        return subprocess.Popen([*COMBTRACE, *words], stdout=file, stderr=subprocess.STDOUT, env=ENVIRONMENT)
 
 
 def until(condition: Callable[[], Any], bound_s: float = 60, what: str = "it", pause_s: float = 0.02) -> Any:

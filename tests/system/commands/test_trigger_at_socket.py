@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import pytest
 
 from service.daemon.control import MOST_STREAMS, ask
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import COMBTRACE, ENVIRONMENT, called, jobs
+from tests.support.processes.forked import Forked
+from tests.support.processes.processes import called, jobs, until
 
 RECIPES = "recipes: [{number: 1, name: a}, {number: 2, name: b, min_area_mm2: 1, max_area_mm2: 100}]\n"
 QUEUE = "{state_dir: state, queue_depth: 20}"
@@ -58,22 +60,34 @@ def restart_controller(cell: Cell) -> None:
     cell.controller = cell.start_controller()
 
 
-def acknowledged(client: subprocess.Popen[str]) -> str:
-    """The job's number, once it is told."""
-    assert client.stdout is not None
-    word, number = client.stdout.readline().split()
-    assert word == "ACK"
-    return number
+class Waiting:
+    """A trigger that is being waited for."""
+
+    def __init__(self, cell: Cell, *options: str) -> None:
+        folder = Path(tempfile.mkdtemp(dir=cell.folder))
+        self._files = folder / "out", folder / "error"
+        self._process = Forked(["trigger", "--config", str(cell.folder / "config.yaml"), *options], *self._files)
+
+    def line(self) -> str:
+        """The first line that it printed, "" where it ended without."""
+        out, _ = self._files
+        until(lambda: "\n" in out.read_text() or self._process.poll() is not None, what="a line")
+        return out.read_text().partition("\n")[0]
+
+    def acknowledged(self) -> str:
+        """The job's number, once it is told."""
+        word, number = self.line().split()
+        assert word == "ACK"
+        return number
+
+    def ended(self) -> tuple[int, str, str]:
+        """Its exit status, and all that it printed, to standard output and error."""
+        out, error = self._files
+        return self._process.wait(90), out.read_text(), error.read_text()
 
 
 def trigger(cell: Cell, *options: str) -> subprocess.CompletedProcess[str]:
     return called("trigger", "--config", cell.folder / "config.yaml", *options)
-
-
-def waiting(cell: Cell, *options: str) -> subprocess.Popen[str]:
-    """A trigger that is being waited for."""
-    command = [*COMBTRACE, "trigger", "--config", str(cell.folder / "config.yaml"), *options]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
 
 
 def test_a_trigger_is_acknowledged_and_its_end_told_by_line_and_status(cell: Cell) -> None:
@@ -102,38 +116,38 @@ def test_a_halted_daemon_answers_nak_and_says_why(cell: Cell) -> None:
 
 
 def test_a_trigger_that_waits_is_told_its_place_and_a_halt_still_finds_room(stuck: Cell) -> None:
-    first = waiting(stuck)
-    number = acknowledged(first)
-    others = [waiting(stuck) for _ in range(MOST_STREAMS)]
-    lines = [other.stdout.readline() for other in others if other.stdout is not None]
+    first = Waiting(stuck)
+    number = first.acknowledged()
+    others = [Waiting(stuck) for _ in range(MOST_STREAMS)]
+    lines = [other.line() for other in others]
     assert sum(line.startswith("WAIT ") for line in lines) == MOST_STREAMS - 1
     assert ask(stuck.folder / "state", {"command": "halt", "reason": "enough"})["state"]
-    ended = [other.communicate(timeout=30) for other in others]
-    assert sum(out == "NAK 161 aborted\n" for out, _ in ended) == MOST_STREAMS - 1
-    assert sum("wait for ends of jobs already. Try again" in error for _, error in ended) == 1
+    ended = [other.ended() for other in others]
+    assert sum(out.endswith("\nNAK 161 aborted\n") for _, out, _ in ended) == MOST_STREAMS - 1
+    assert sum("wait for ends of jobs already. Try again" in error for _, _, error in ended) == 1
     restart_controller(stuck)
-    out, error = first.communicate(timeout=60)
-    assert (first.returncode, out) == (1, f"FAIL {number} 153 controller_restarted\n"), error
+    status, out, error = first.ended()
+    assert (status, out) == (1, f"ACK {number}\nFAIL {number} 153 controller_restarted\n"), error
 
 
 def test_the_end_is_told_across_a_kill_of_the_daemon(stuck: Cell) -> None:
-    client = waiting(stuck)
-    number = acknowledged(client)
+    client = Waiting(stuck)
+    number = client.acknowledged()
     stuck.service.kill()
     restart_controller(stuck)
     stuck.service = stuck.start_service()
-    out, error = client.communicate(timeout=90)
+    status, out, error = client.ended()
     (job,) = jobs(stuck.journal)
-    assert re.fullmatch(rf"FAIL {number} {job['reason']} \w+\n", out), error
-    assert client.returncode == 1
+    assert re.fullmatch(rf"ACK {number}\nFAIL {number} {job['reason']} \w+\n", out), error
+    assert status == 1
 
 
 def test_a_daemon_that_stops_does_not_wait_for_those_who_wait(stuck: Cell) -> None:
-    client = waiting(stuck, "--timeout-s", "20")
-    number = acknowledged(client)
+    client = Waiting(stuck, "--timeout-s", "20")
+    number = client.acknowledged()
     assert stuck.service.stop(bound_s=30) == 0
-    out, error = client.communicate(timeout=60)
-    assert (client.returncode, out) == (1, "")
+    status, out, error = client.ended()
+    assert (status, out) == (1, f"ACK {number}\n")
     assert f"`combtrace jobs show {number}` tells how it ended" in error
 
 

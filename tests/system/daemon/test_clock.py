@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.processes import processes
+from tests.support.processes import forked, processes
 from tests.support.processes.cell import Cell
 from tests.support.processes.processes import combtrace, jobs, until
 from tests.support.real_parts import missing
@@ -28,6 +28,7 @@ def clock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "FAKETIME_DONT_RESET": "1",
     }
     monkeypatch.setattr(processes, "ENVIRONMENT", {**processes.ENVIRONMENT, **settings})
+    monkeypatch.setattr(forked, "begun", False)  # a library is loaded before all else
     return path
 
 

@@ -54,6 +54,7 @@ class ToldCell(KilledCell):
                     await self._heard.wait()
 
     def all_told(self) -> bool:
-        """Or nobody waits any more."""
+        """Or nobody waits any more. What was typed last may not have been heard yet."""
         self._asked_at = self._asked_at or time.monotonic()
-        return not untold(self.said) or time.monotonic() > self._asked_at + LAST_WORD_S
+        waited_s = time.monotonic() - self._asked_at
+        return waited_s > LAST_WORD_S or (waited_s > PATIENCE_S and not untold(self.said))

@@ -139,27 +139,35 @@ def test_who_may_not_enter_the_services_folders_gets_a_line_and_no_traceback(rea
     for name in ("state", "archive", "closed"):
         (reachable / name).mkdir(exist_ok=True, mode=0o750)
         (reachable / name).chmod(0o750)
-    command_line = "sys.exit(main([*sys.argv[2:], '--config', sys.argv[1]]))"
-
-    def told(*command: str) -> tuple[int, str]:
-        done = python_as_nobody("from service.cli.main import main", command_line, path, *command)
-        assert "Traceback" not in done.stderr
-        return done.returncode, done.stdout + done.stderr
-
     state = reachable / "state"
-    assert "User root and group root may" in told("status")[1]
-    for command in (["jobs"], ["jobs", "show", "1"], ["replay", "--limit", "1"]):
-        status, text = told(*command)
-        assert (status, f"{state}/journal.sqlite: cannot be looked at: Permission denied" in text) == (2, True)
-    assert told("replay", "1")[0] == 2
-    assert "archive: cannot be looked at: Permission denied" in told("replay", "1")[1]
-    assert "closed/table: cannot be looked at: Permission denied" in told("run", "--once")[1]
-    status, text = told("check")
-    assert status == 1
-    assert f"warn  service      {state}: may not be entered, so whether the service runs is not known" in text
-    assert "camera " not in text
+    commands = ("status", "jobs", "jobs show 1", "replay --limit 1", "replay 1", "check")
+    status, *read, one, check = told_to_nobody(path, *commands)
+    assert "User root and group root may" in status[1]
+    unread = f"{state}/journal.sqlite: cannot be looked at: Permission denied"
+    assert [(refused, unread in text) for refused, text in read] == [(2, True)] * 3
+    assert (one[0], "archive: cannot be looked at: Permission denied" in one[1]) == (2, True)
+    run = python_as_nobody(
+        "from service.cli.main import main", "main(['run', '--once', '--config', sys.argv[1]])", path
+    )
+    assert "closed/table: cannot be looked at: Permission denied" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert check[0] == 1
+    assert f"warn  service      {state}: may not be entered, so whether the service runs is not known" in check[1]
+    assert "camera " not in check[1]
     path.chmod(0o600)
-    assert "Run this as a user who may read it" in told("jobs")[1]
+    assert "Run this as a user who may read it" in told_to_nobody(path, "jobs")[0][1]
+
+
+def told_to_nobody(config: Path, *commands: str) -> list[tuple[int, str]]:
+    """The exit status of each command, and all that it printed."""
+    code = (
+        "ended = [called(*command.split(), '--config', sys.argv[1]) for command in sys.argv[2:]]\n"
+        "print(json.dumps([(one.returncode, one.stdout + one.stderr) for one in ended]))"
+    )
+    prepare = "import json\nfrom tests.support.processes.processes import called"
+    done = python_as_nobody(prepare, code, config, *commands)
+    assert (done.returncode, done.stderr) == (0, "")
+    return [(status, text) for status, text in json.loads(done.stdout)]
 
 
 @needs_root

@@ -11,6 +11,7 @@ Every test fails that leaves a descriptor or a thread open, or a task in its eve
 """
 
 import os
+import signal
 import sys
 
 import pytest
@@ -25,6 +26,8 @@ WAITING = ("tests/soak/", "tests/system/", "tests/hil/", "tests/controllers/")
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+# A shell begins what runs in the background with Ctrl-C ignored, and so would be all that tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 forked.begin()
 

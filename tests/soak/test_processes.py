@@ -11,15 +11,8 @@ from tests.soak.cells.disk_cell import DiskCell
 from tests.soak.cells.killed_cell import KilledCell, Killing
 from tests.soak.cells.stopped_cell import StoppedCell
 from tests.soak.cells.told_cell import ToldCell
-from tests.support.processes import forked
 from tests.support.processes.small_disk import CannotMount
 from tests.support.real_parts import missing
-
-
-@pytest.fixture(autouse=True)
-def whole_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kills fall on any moment of a start, as in the campaigns: no process is forked."""
-    monkeypatch.setattr(forked, "begun", False)
 
 
 async def test_what_always_holds_holds_though_the_service_is_killed(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page bench-start accuracy methods refusals rules soak soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page bench-start profile accuracy methods refusals rules soak soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -50,6 +50,10 @@ bench-page: install
 # A command's start and a first trace, over what they cannot be without.
 bench-start: install
 	$(BIN)/python -m benchmarks.start --write
+
+# Times, passes over the picture, arrays and the largest of them, step by step, at 2, 12 and 48 MP.
+profile: install
+	$(BIN)/python -m benchmarks.profile --write
 
 accuracy: install
 	$(BIN)/python -m benchmarks.accuracy --random 300 --first 998000 --write

@@ -16,8 +16,9 @@ import cv2
 import numpy as np
 
 from contour.acceptance.block_level import exclusive_levels
-from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s
+from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, median
 from contour.geometry.rings import Contour, Ring
+from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
 _PITCH_PX = 6
@@ -95,7 +96,7 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float, flat: Bytes 
     ]
     apart, place, claims = max(farthest, key=lambda one: one[0])
     x, y = pixels_of(np.array(place), shrink).tolist()
-    on_the_whole = float(np.median(_at(outside, points) - _at(inside, points)))
+    on_the_whole = median(_at(outside, points) - _at(inside, points))
     return Disagreement(apart / small_pitch_px, (x, y), claims, on_the_whole / small_pitch_px)
 
 
@@ -116,8 +117,8 @@ def _busy(small: Bytes, small_pitch_px: float) -> Bytes:
 
 
 def _without_small_gaps(mask: Bytes, area_px2: float) -> Bytes:
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(cv2.bitwise_not(mask), connectivity=4)
-    small = stats[:, cv2.CC_STAT_AREA] < area_px2
+    labels, area = pieces_and_areas(_inverted(mask), 4)
+    small = area < area_px2
     small[0] = False
     return np.asarray(np.where(small[labels], np.uint8(255), mask), np.uint8)
 
@@ -140,7 +141,7 @@ def _fixed_point(ring: Ring) -> Int32s:
 
 def _touched(mask: Bytes, ours: Bytes) -> Bytes:
     """The parts of `mask` that meet `ours`."""
-    count, labels, _, _ = cv2.connectedComponentsWithStats(mask, connectivity=4)
+    count, labels = cv2.connectedComponents(mask, connectivity=4)
     meets = np.bincount(labels[ours > 0], minlength=count) > 0
     meets[0] = False
     return np.asarray(np.where(meets[labels], np.uint8(255), np.uint8(0)), np.uint8)

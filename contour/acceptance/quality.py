@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float32s, Int64s
+from contour.geometry.arrays import Bytes, Float32s, Int64s, median
 from contour.geometry.rings import Contour, Ring
 from contour.image.pixel_sampling import FULL_SCALE
 
@@ -86,8 +86,8 @@ def block_quality(picture: Bytes, light: Bytes, contour: Contour, pitch_px: floa
     contrast = np.maximum(high - low - _TAILS_OF_NOISE * noise, 0.0)
     blur = _blur_px(tiles, contrast, noise)
     return Quality(
-        level=float(np.median(high)),
-        contrast=float(np.median(contrast)),
+        level=median(high),
+        contrast=median(contrast),
         noise=noise,
         blur_px=blur,
         pitch_px=pitch_px,
@@ -199,7 +199,7 @@ def _blur_px(light: Bytes, contrast: Float32s, noise: float) -> float:
         steepest = np.partition(flat, place, axis=1)[:, place]
         # Of noise alone the steepest hundredth is 2.6 of its deviations, a quarter of a pixel's after the smoothing.
         clean = np.sqrt(np.maximum(steepest**2 - (0.65 * noise) ** 2, 1e-6))
-        worst = max(worst, float(np.median(_STEEPEST * contrast / clean)))
+        worst = max(worst, median(_STEEPEST * contrast / clean))
     # The smoothing's own blur comes off.
     return float(np.sqrt(max(worst**2 - 0.5, 0.0)))
 

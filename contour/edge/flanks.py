@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s
+from contour.geometry.arrays import Float64s, median, medians
 from contour.geometry.rings import perimeter
 from contour.walls.wall_evidence import RingEvidence
 
@@ -39,16 +39,13 @@ def _lines(
     if np.count_nonzero(beside) < _FEWEST:
         return []
     points = clear.points[beside]
-    middle = np.median(points, axis=0)
+    middle = medians(points, axis=0)
     spread = points - middle
     _, vectors = np.linalg.eigh(spread.T @ spread)
     normal = vectors[:, 0]
     normal = normal if normal @ clear.normal[beside].mean(axis=0) >= 0 else -normal
     # Broken walls lie inside: the line goes through the outer half.
-    return [
-        (middle + float(np.median(spread @ one)) * one, one)
-        for one in (normal, _straightened(spread, normal, pitch_px))
-    ]
+    return [(middle + median(spread @ one) * one, one) for one in (normal, _straightened(spread, normal, pitch_px))]
 
 
 def _straightened(spread: Float64s, normal: Float64s, pitch_px: float) -> Float64s:
@@ -59,5 +56,5 @@ def _straightened(spread: Float64s, normal: Float64s, pitch_px: float) -> Float6
     far = np.abs(across @ along) > pitch_px / 2
     if not far.any():
         return normal
-    tilt = float(np.median((across[far] @ normal) / (across[far] @ along)))
+    tilt = median((across[far] @ normal) / (across[far] @ along))
     return np.asarray((normal - tilt * along) / np.hypot(1.0, tilt), np.float64)

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int32s
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int32s, median
 from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
@@ -123,7 +123,7 @@ class TableLook:
         middle = deep > max(_HOLE_MIDDLE[0], _HOLE_MIDDLE[1] * float(deep.max()))
         if not (rim.any() and middle.any()):
             return True
-        return bool(np.median(self.light[rim]) > _RIM_LIGHT * np.median(self.light[middle]))
+        return bool(median(self.light[rim]) > _RIM_LIGHT * median(self.light[middle]))
 
 
 def beside(look: TableLook) -> float:
@@ -212,7 +212,7 @@ def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
         return np.ones(slope.shape, np.float32)
     size = 2 * round(0.5 * samples) + 1
     busy = cv2.blur(np.minimum(slope, np.percentile(comb, 90)).astype(np.float32), (size, size))
-    usual = float(np.median(busy[::2, ::2][block[::2, ::2] > 0]))
+    usual = median(busy[::2, ::2][block[::2, ::2] > 0])
     return np.asarray(busy / max(usual, 1e-3), np.float32)
 
 
@@ -229,16 +229,16 @@ def _borders(small: Bytes, slope: NDArray[np.int16], block: tuple[Bytes, Bytes],
     """1 where light changes sharply, along lines longer than specks; `block` without its holes, and with them."""
     material, whole = block
     far, walls = (slope[::2, ::2][material[::2, ::2] == part] for part in (0, 1))
-    usual = float(np.median(far)) if len(far) else 0.0
+    usual = median(far) if len(far) else 0.0
     level = max(_SHARP * usual, _LEAST_SHARP)
     if len(walls):
-        level = min(level, _OF_WALLS * float(np.median(walls)))
+        level = min(level, _OF_WALLS * median(walls))
     # Glare and half shadows have borders as steep, but wide ones.
     beside = np.where(material == 0, slope, np.int16(0))
     wide = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((_SOFT, _SOFT), np.uint8))
     light = small if small.ndim == 2 else small.max(axis=2)
     table = light[::2, ::2][material[::2, ::2] == 0]
-    lit = light > np.median(table) if len(table) else np.zeros(light.shape, np.bool_)
+    lit = light > median(table) if len(table) else np.zeros(light.shape, np.bool_)
     # Dark things on a table have soft sides, too.
     soft = (whole > material) | (lit & (wide > _SOFT_SHARE * level)) | (wide > level)
     return _long(np.where(soft, slope - wide, slope) > level, _SPECK_PITCHES * samples).astype(np.uint8)
@@ -284,7 +284,7 @@ def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, F
         lowest, highest = np.percentile(here, (2, 98)) if len(here) else (0.0, 0.0)
         local = np.asarray(cv2.blur(plane * main, (size, size)), np.float32) / np.maximum(share, 1e-3)
         if len(here):
-            spread[k] = 1.4826 * float(np.median(np.abs(here - local[some][main[some]])))
+            spread[k] = 1.4826 * median(np.abs(here - local[some][main[some]]))
         # Far from any of it, in a hole, the table may be as light as it is anywhere, and a little more so.
         anywhere = np.clip(plane, lowest - spread[k], highest + spread[k])
         level[:, :, k] = np.where(share > _SHARE_KNOWN, local, anywhere)

@@ -154,6 +154,15 @@ def above(picture: Bytes, threshold: float) -> Bytes:
     return cast(Bytes, cv2.threshold(picture, threshold, 255, cv2.THRESH_BINARY)[1])
 
 
+def pieces_and_areas(mask: Bytes, connectivity: int) -> tuple[Int32s, Int64s]:
+    """The number of each pixel's white piece, (H, W), 0 on black, and the area of each, (N,), 0 for black: of what
+    connectedComponentsWithStats tells this is had in a third of the time.
+    """
+    count, labels = cv2.connectedComponents(mask, connectivity=connectivity)
+    pieces = np.asarray(labels, np.int32)
+    return pieces, np.bincount(pieces[mask > 0], minlength=count)
+
+
 def region_boxes_and_areas(mask: Bytes) -> tuple[Int32s, Int32s]:
     """Boxes (left, top, width, height), shape (N, 4), and areas, shape (N,), of the black regions, joined by edges."""
     _, _, stats, _ = cv2.connectedComponentsWithStats(cv2.bitwise_not(mask), connectivity=4, ltype=cv2.CV_32S)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from contour.errors import ParameterError
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Bytes, Float64s, medians
 from contour.geometry.rings import Contour, Ring
 from contour.geometry.segments import contains, distances_to_ring
 
@@ -48,7 +48,7 @@ class Region:
         if inside.all():
             return np.ascontiguousarray(part), low.astype(np.float64)
         rim = inside - cv2.erode(inside, np.ones((9, 9), np.uint8), borderValue=0)
-        usual = np.median(part[rim > 0], axis=0)
+        usual = medians(part[rim > 0], axis=0)
         filled = part.copy()
         filled[inside == 0] = np.rint(usual).astype(np.uint8)
         return filled, low.astype(np.float64)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from contour.errors import CalibrationError, PictureError
-from contour.geometry.arrays import Bytes, Float32s
+from contour.geometry.arrays import Bytes, Float32s, median, medians
 from contour.image.line_noise import without_line_noise
 
 _CELL_PX = 16
@@ -102,7 +102,7 @@ def teach(pictures: Sequence[Bytes]) -> TaughtTable:
         total += picture
     mean = np.clip(np.rint(total / len(pictures)), 0, 255).astype(np.uint8)
     spread = np.std([_fine(picture) for picture in pictures], axis=0, ddof=1 if pictures[1:] else 0)
-    noise = max(float(np.median(spread)), 0.5)
+    noise = max(median(spread), 0.5)
     unrest = max(float(np.abs(_cells(picture) - _cells(mean)).max()) for picture in pictures)
     if unrest > _UNREST + noise:
         raise PictureError(
@@ -150,11 +150,11 @@ def _changed(picture: Bytes, known: Bytes, noise: float) -> tuple[float, Bytes, 
     ratio = (now + 1.0) / (then + 1.0)
     rim = np.ones(now.shape[:2], np.bool_)
     rim[_RIM_CELLS:-_RIM_CELLS, _RIM_CELLS:-_RIM_CELLS] = False
-    gain = float(np.median(ratio[rim]))
+    gain = median(ratio[rim])
     off = np.abs(now - gain * then) - _APART_SHARE * gain * then
     alike = off.reshape(*rim.shape, -1).max(axis=2) < _APART_LEVELS
     if np.count_nonzero(alike) > 0.2 * alike.size:
-        gain = float(np.median(ratio[alike]))
+        gain = median(ratio[alike])
     hop = max(1, round(np.sqrt(picture.shape[0] * picture.shape[1] / 1.5e6)))
     here, there = picture[::hop, ::hop], cv2.convertScaleAbs(known[::hop, ::hop], alpha=gain)
     apart = cv2.absdiff(here, there)
@@ -179,7 +179,7 @@ def _shift(picture: Bytes, table: TaughtTable) -> tuple[float, float] | None:
             found.append(moved)
     if len(found) < 2:
         return None
-    middle = np.median(found, axis=0)
+    middle = medians(np.array(found), axis=0)
     if np.count_nonzero(np.abs(np.array(found) - middle).max(axis=1) < _AGREE_PX) < max(2, 0.6 * len(found)):
         return None
     return float(middle[0]), float(middle[1])

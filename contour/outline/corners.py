@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median
 from contour.outline.lines_and_arcs import Models, distance, feet
 from contour.outline.runs import Segments
 from contour.outline.witnesses import Witnesses
@@ -79,7 +79,7 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Bools) -> Joints:
     aside = np.abs(one - other)
     smooth_turn = np.abs((one_tangent.conj() * other_tangent).imag) < _SMOOTH_SINE
     smooth_turn &= (one_tangent.conj() * other_tangent).real > 0.0
-    sigma = float(np.median(witnesses.outer))
+    sigma = median(witnesses.outer)
     touching = smooth_turn & (aside < max(4.0 * sigma, 0.05 * witnesses.pitch_px))
     blend = 0.5 * (one + other)
     end = np.where(corner, point, np.where(touching, blend, near))

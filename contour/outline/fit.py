@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.outline.bevels import bevelled
@@ -181,7 +181,7 @@ def _inlying(witnesses: Witnesses, residual: Float64s) -> Bools:
 
 def _spread(residual: Float64s, wall_px: float) -> float:
     """Robust standard deviation of the inliers; a wall's width where there are too few to tell."""
-    return float(1.4826 * np.median(np.abs(residual))) if len(residual) >= _FEWEST else max(wall_px, 1.0)
+    return 1.4826 * median(np.abs(residual)) if len(residual) >= _FEWEST else max(wall_px, 1.0)
 
 
 def _vertices(witnesses: Witnesses, segments: Segments, found: Joints, chains: list[Chain]) -> Vertices:

@@ -26,7 +26,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.arrays import Float64s, Indices, medians
 from contour.outline.fit import FittedRing
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
@@ -154,7 +154,7 @@ def _leverage(evidence: RingEvidence, fitted: FittedRing, place: Float64s, aroun
 
 def _middle_of_five(residual: Float64s) -> Float64s:
     """Median of each residual and its two neighbours on either side, around the ring."""
-    return np.asarray(np.median([np.roll(residual, shift) for shift in range(-2, 3)], axis=0), np.float64)
+    return medians(np.stack([np.roll(residual, shift) for shift in range(-2, 3)]), axis=0)
 
 
 def _largest_between(values: Float64s, on_line: Indices) -> Float64s:

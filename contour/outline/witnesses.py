@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median
 from contour.geometry.rectifier import Rectifier
 from contour.outline.lines_and_arcs import Models, distance
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
@@ -175,7 +175,7 @@ def noise_from_residuals(witnesses: Witnesses, signed: Float64s) -> float:
     ratio = ratio[ratio < 4.0]
     if len(ratio) < 8:
         return 1.0
-    return float(np.clip(np.median(ratio) / 0.6745, 0.5, 2.0))
+    return float(np.clip(median(ratio) / 0.6745, 0.5, 2.0))
 
 
 def window_cost(witnesses: Witnesses, models: Models, index: Indices) -> Float64s:

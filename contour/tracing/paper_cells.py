@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Int32s
+from contour.geometry.arrays import Bytes, Int32s, median
 from contour.image.opencv import region_boxes_and_areas
 
 HEXAGON = 2 / math.sqrt(3)
@@ -80,7 +80,7 @@ def measure_cells(mask: Bytes) -> EnclosedCells | None:
     x0, y0 = int(left[regular].min()), int(top[regular].min())
     x1, y1 = int((left + width)[regular].max()), int((top + height)[regular].max())
     wall = _wall_width(mask[y0:y1, x0:x1])
-    inner = float(np.median(areas[regular]))
+    inner = median(areas[regular])
     pitch_px = math.sqrt(HEXAGON * inner) + wall
     return EnclosedCells(
         pitch_px=pitch_px,

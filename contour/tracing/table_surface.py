@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Bytes, Float64s, median, medians
 
 OUTLIER = 4.0
 """Spreads of the table's light beyond which something is not the table."""
@@ -25,14 +25,14 @@ def table_surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2).reshape(-1, 6)
     values = small.reshape(len(terms), -1)
     rim = np.maximum(np.abs(x), np.abs(y)).ravel() > 1 - 2 * _BORDER_SHARE
-    smooth = texture.ravel() <= 2 * max(1.0, float(np.median(texture.ravel()[rim])))
+    smooth = texture.ravel() <= 2 * max(1.0, median(texture.ravel()[rim]))
     rim &= smooth
     used = rim
-    fitted = np.broadcast_to(np.median(values[rim], axis=0), values.shape)
+    fitted = np.broadcast_to(medians(values[rim], axis=0), values.shape)
     spread = 1.0
     for _ in range(_ROUNDS):
         off = np.abs(values - fitted).max(axis=1)
-        spread = max(1.4826 * float(np.median(off[used])), 1.0)
+        spread = max(1.4826 * median(off[used]), 1.0)
         # Weights that fall with the distance: a block that touches the border must not bend the table.
         root = np.sqrt(used / (1 + (off / spread) ** 4))[:, None]
         factors, *_ = np.linalg.lstsq(terms * root, values * root, rcond=None)

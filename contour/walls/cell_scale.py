@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s
+from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s, median
+from contour.image.opencv import pieces_and_areas
 from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
 from contour.walls.wall_mask import wall_mask
 
@@ -32,8 +34,10 @@ _WIDE_WALL = 0.2
 class CellScale:
     """Pitch and wall width in pixels, polarity, number of enclosed cells, the area share of those of usual size,
     the part of the tile they fill, the wall contrast in grey levels, the share of the
-    walls that hang together, the grey levels of walls and of cells' floors, the share of the cells with neighbours all
-    around, and the share of its convex hull that a cell fills."""
+    walls that hang together, and the grey levels of walls and of cells' floors.
+
+    order_and_solidity: tells the share of the cells with neighbours all around, and the share of its convex hull that a
+    cell fills; of most readings nobody asks."""
 
     pitch_px: float
     wall_px: float
@@ -45,8 +49,7 @@ class CellScale:
     connected: float
     level: float
     floor: float
-    order: float
-    solid: float
+    order_and_solidity: Callable[[], tuple[float, float]]
 
     @property
     def score(self) -> float:
@@ -55,10 +58,11 @@ class CellScale:
         thin = min(1.0, (_WIDEST_WALL - self.wall_px / self.pitch_px) / _WIDE_WALL)
         return self.regularity * self.filled * self.connected * thin * min(1.0, self.count / 12)
 
-    @property
+    @cached_property
     def comb(self) -> Comb:
         """What tells a comb from other things that have patches side by side."""
         regular = self.regularity * self.filled
+        order, solid = self.order_and_solidity()
         return Comb(
             self.pitch_px,
             self.wall_px,
@@ -66,8 +70,8 @@ class CellScale:
             self.count,
             self.score,
             regular,
-            order=self.order,
-            solid=self.solid,
+            order=order,
+            solid=solid,
         )
 
 
@@ -166,12 +170,12 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
     # told from single ones by a plain median.
     ascending = np.sort(areas)
     by_area = ascending[np.searchsorted(np.cumsum(ascending), 0.5 * ascending.sum())]
-    typical = float(np.median(areas[areas > by_area / 3]))
+    typical = median(areas[areas > by_area / 3])
     regular = (areas > typical / 2) & (areas < 2 * typical)
     usual = areas[regular]
     if len(usual) < _LEAST_CELLS:
         return None
-    inner = float(np.sqrt(2 / np.sqrt(3) * np.median(usual)))
+    inner = float(np.sqrt(2 / np.sqrt(3) * median(usual)))
     walls = _without_sheets(mask, max(3, round(0.7 * inner)))
     wall = wall_width(walls)
     size = inner + wall
@@ -181,8 +185,8 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
     # Cells of a comb lie side by side, specks of a table all over it: the part of their place that they fill.
     spread = np.diff(np.quantile(places[regular], [0.05, 0.95], axis=0), axis=0)[0] / 0.9 + size
     filled = len(usual) * size * size * np.sqrt(3) / 2 / float(np.prod(spread))
-    _, _, pieces, _ = cv2.connectedComponentsWithStats(mask, connectivity=8, ltype=cv2.CV_32S)
-    connected = float(pieces[1:, cv2.CC_STAT_AREA].max() / max(1, pieces[1:, cv2.CC_STAT_AREA].sum()))
+    _, pieces = pieces_and_areas(mask, 8)
+    connected = float(pieces.max() / max(1, pieces.sum()))
     return CellScale(
         size,
         wall,
@@ -192,11 +196,13 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
         float(min(1.0, filled)),
         seen.contrast,
         connected,
-        float(np.median(light[walls > 0][::7])),
+        median(light[walls > 0][::7]),
         # The darker part of what is free, for a lighter table may lie in it too (of the lighter part for dark walls).
         float(np.quantile(light[mask == 0][::7], 0.3 if bright else 0.7)),
-        lattice_order(places[regular], size),
-        solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
+        lambda: (
+            lattice_order(places[regular], size),
+            solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
+        ),
     )
 
 

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes
+from contour.geometry.arrays import Bytes, median
+from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_grid import averaged
 from contour.walls.coarse_rings import PAD, CoarseBlock, sides, with_rings
 
@@ -135,8 +136,8 @@ def _linked(walls: Bytes, kept: Bytes, filled: Bytes, samples: float) -> tuple[B
 
 
 def _largest(filled: Bytes) -> Bytes:
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(filled, connectivity=8)
-    return np.asarray(labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])), np.uint8)
+    labels, area = pieces_and_areas(filled, 8)
+    return np.asarray(labels == int(np.argmax(area)), np.uint8)
 
 
 def _padded(grid: Bytes, border: int) -> Bytes:
@@ -148,17 +149,17 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, shade: Bytes, radius: float
 
     Looked into at a slant, black cells show nothing but wall: no mask of walls against cells, and no hole either.
     """
-    count, labels, _, _ = cv2.connectedComponentsWithStats(1 - filled, connectivity=4)
+    count, labels = cv2.connectedComponents(1 - filled, connectivity=4)
     room = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
     opening = np.zeros(count, np.bool_)
     opening[labels[room > radius]] = True
     outside = labels[0, 0]
     opening[[0, outside]] = False
     if opening.any():
-        table = float(np.median(shade[labels == outside]))
-        wall = float(np.median(shade[walls > 0]))
+        table = median(shade[labels == outside])
+        wall = median(shade[walls > 0])
         for number in np.flatnonzero(opening):
-            inside = float(np.median(shade[labels == number]))
+            inside = median(shade[labels == number])
             # What is lighter than a light block's walls and cells together is a lamp's spot on the table in a hole.
             like_table = abs(inside - table) < abs(inside - wall)
             opening[number] = table < wall or like_table or table - wall < _LEAST_SHADE

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices, Int32s
+from contour.geometry.arrays import Float64s, Indices, Int32s, median
 
 # Walls of fine cells look wide; from this pitch on they look as wide as they are.
 _FINE_PITCH_PX = 15.0
@@ -117,7 +117,7 @@ def solidity(labels: Int32s, numbers: Indices, stats: Int32s) -> float:
         hull = cv2.convexHull(outlines[0])
         # Pixels have an area, the polygon through their centres lacks half of its boundary and one more.
         shares.append(area / (cv2.contourArea(hull) + 0.5 * cv2.arcLength(hull, True) + 1.0))
-    return float(np.median(shares))
+    return median(np.array(shares))
 
 
 def _spread(count: int) -> Indices:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Bytes, Float64s, median
 from contour.image.pixel_sampling import sample_at
 from contour.walls.coarse_rings import CoarseBlock
 
@@ -23,7 +23,7 @@ def midway_to_table(light: Bytes, level: float, contrast: float) -> float | None
     """
     margin = max(1, min(light.shape) // 50)
     rim = (light[:margin], light[-margin:], light[:, :margin], light[:, -margin:])
-    table = float(np.median(np.concatenate([part[::3, ::3].ravel() for part in rim])))
+    table = median(np.concatenate([part[::3, ::3].ravel() for part in rim]))
     return 0.5 * (level + table) if table - level >= 2 * contrast else None
 
 

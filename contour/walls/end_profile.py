@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Bytes, Float64s, medians
 from contour.image.pixel_sampling import sample_at
 
 _STEP = 0.5
@@ -125,7 +125,7 @@ def _fit(profile: Float64s, along: Float64s, spread: Float64s, model: EndModel) 
     """Least squares of background + height · Φ((end − s)/spread) to each profile (N, S), by Gauss-Newton on all at
     once.
     """
-    top = np.median(profile[:, along < -1.0], axis=1)
+    top = medians(profile[:, along < -1.0], axis=1)
     bottom = profile[:, along > 1.0].min(axis=1)
     end = _crossing(profile, along, 0.5 * (top + bottom))
     residual = profile

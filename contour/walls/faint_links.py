@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -16,16 +18,16 @@ _REACH_PITCHES = 0.7
 _STRAND_PITCHES = (0.8, 6.0)
 
 
-def with_faint_links(mask: Bytes, faint: Bytes, pitch_px: float) -> Bytes:
-    """The wall mask (H, W), uint8, with the walls of `faint`, a mask by a lower threshold, that lead from its largest
-    piece to strands beside it.
+def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -> Bytes:
+    """The wall mask (H, W), uint8, with the walls that lead from its largest piece to strands beside it, of the mask by
+    a lower threshold that `faint` makes.
 
     Foils differ in brightness by a factor of three, and where a dim one ends at the cut, the bright walls of the
     outermost cells would hang on nothing and be taken for chips.
     """
     step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
     samples = pitch_px / step
-    walls, all_walls = _coarse(mask, step), _coarse(faint, step)
+    walls = _coarse(mask, step)
     count, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
     if count < 3:
         return mask
@@ -34,18 +36,20 @@ def with_faint_links(mask: Bytes, faint: Bytes, pitch_px: float) -> Bytes:
     strand = (size > _STRAND_PITCHES[0] * samples) & (size < _STRAND_PITCHES[1] * samples)
     strand[labels[main][0]] = False
     strand[0] = False
+    if not strand.any():
+        return mask
     near = _within(main, _REACH_PITCHES * samples)
-    beside = np.unique(labels[near])
-    strand &= np.isin(np.arange(count), beside)
+    strand &= np.bincount(labels[near], minlength=count) > 0
     if not strand.any():
         return mask
     strands = strand[labels]
-    links = near & _within(strands, _REACH_PITCHES * samples) & (all_walls > 0) & (walls == 0)
+    weak = faint()
+    links = near & _within(strands, _REACH_PITCHES * samples) & (_coarse(weak, step) > 0) & (walls == 0)
     _, joined = cv2.connectedComponents((main | strands | links).astype(np.uint8), connectivity=8)
     count, parts = cv2.connectedComponents((strands | links).astype(np.uint8), connectivity=8)
     leads = np.isin(np.arange(count), np.unique(parts[strands]))
     links &= (joined == joined[main][0]) & leads[parts]
-    return np.asarray(np.where(enlarged(links, step, mask.shape), mask | faint, mask), np.uint8)
+    return np.asarray(np.where(enlarged(links, step, mask.shape), mask | weak, mask), np.uint8)
 
 
 def _coarse(mask: Bytes, step: int) -> Bytes:

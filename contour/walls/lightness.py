@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from contour.errors import PictureError
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Bytes, Float64s, median, medians
 
 LUMA = np.array([0.114, 0.587, 0.299])
 """Weights of blue, green and red in lightness (ITU-R BT.601)."""
@@ -67,15 +67,13 @@ def light_from_table(picture: Bytes, light: Bytes, mask: Bytes, hop: int) -> Byt
     parts = walls & near, free, rim & ~near | rim & walls
     if not all(part.any() for part in parts):
         return None
-    wall, cell, table = (np.median(colours[part], axis=0) for part in parts)
+    wall, cell, table = (medians(colours[part], axis=0) for part in parts)
     from_table, from_cell = wall - table, wall - cell
     across = from_cell - from_table
     share = float(np.clip(-(from_table @ across) / max(float(across @ across), 1e-9), 0.0, 1.0))
     direction = from_table + share * across
     length = float(np.linalg.norm(direction))
-    sign = (
-        1.0 if float(np.median(light[::step, ::step][walls])) > float(np.median(light[::step, ::step][free])) else -1.0
-    )
+    sign = 1.0 if median(light[::step, ::step][walls]) > median(light[::step, ::step][free]) else -1.0
     served = sign * min(float(from_table @ LUMA), float(from_cell @ LUMA), key=lambda gap: sign * gap)
     if length < _LEAST_COLOUR or served > _LUMA_SERVES * length:
         return None

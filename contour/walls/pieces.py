@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes
+from contour.geometry.arrays import Bools, Bytes, Int32s, Int64s
 from contour.geometry.rings import Ring
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 from contour.walls.coarse_rings import CoarseBlock
@@ -78,21 +78,35 @@ def without_loose_pieces(mask: Bytes, pitch_px: float) -> Bytes:
     """A wall mask (H, W), uint8, 255 on walls, without small pieces of comb whose walls nowhere touch the block's,
     however near they lie: strips of swarf, chips. Where no piece holds most of the walls, nothing is taken out.
     """
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    area = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
-    area[0] = 0.0
+    count, labels = cv2.connectedComponents(mask, connectivity=8)
+    places = np.flatnonzero(mask)
+    piece = np.asarray(labels, np.int32).ravel()[places]
+    area = np.bincount(piece, minlength=count)
     if area.max() <= _MOST_WALLS * area.sum():
         return mask
     small = (area > _LEAST_WALL * pitch_px) & (area < _LOOSE_SHARE * area.max())
-    small &= np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > pitch_px
-    loose = np.zeros(len(area), np.bool_)
-    for number in np.flatnonzero(small):
-        x, y, w, h = (int(value) for value in stats[number, :4])
-        walls = (labels[y : y + h, x : x + w] == number).astype(np.uint8)
+    few = np.flatnonzero(small[piece])
+    boxes = _boxes(np.divmod(places[few], mask.shape[1]), piece[few], count)
+    loose = np.zeros(count, np.bool_)
+    for number in np.flatnonzero(small & ((boxes[2:] - boxes[:2]).min(axis=0) > pitch_px)):
+        top, left, bottom, right = boxes[:, number].tolist()
+        walls = (labels[top:bottom, left:right] == number).astype(np.uint8)
         rings, around = cv2.findContours(walls, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
         holes = [ring for ring, outer in zip(rings, around[0, :, 3], strict=True) if outer >= 0]
         loose[number] = sum(cv2.contourArea(hole) > _LEAST_CELL * pitch_px**2 for hole in holes) >= _LOOSE_CELLS
     return np.where(loose[labels], np.uint8(0), mask) if loose.any() else mask
+
+
+def _boxes(places: tuple[Int64s, Int64s], piece: Int32s, count: int) -> Int64s:
+    """First row and column of each of `count` pieces, and the first ones behind it, shape (4, count), by the rows and
+    columns of their pixels (N,) and the piece of each (N,).
+    """
+    boxes = np.zeros((4, count), np.int64)
+    boxes[:2] = np.iinfo(np.int32).max
+    for axis in (0, 1):
+        np.minimum.at(boxes[axis], piece, places[axis])
+        np.maximum.at(boxes[2 + axis], piece, places[axis] + 1)
+    return boxes
 
 
 def reaches_frame(mask: Bytes, block: CoarseBlock) -> bool:

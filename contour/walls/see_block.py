@@ -89,8 +89,11 @@ def _visible(seen: WallMask, hidden: Bytes | None) -> WallMask:
     if hidden is None:
         return seen
     there = cv2.resize(hidden, seen.mask.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
-    mask, faint = (np.where(there, np.uint8(0), part) for part in (seen.mask, seen.faint))
-    return replace(seen, mask=mask, faint=faint)
+
+    def visible(mask: Bytes) -> Bytes:
+        return np.where(there, np.uint8(0), mask)
+
+    return replace(seen, mask=visible(seen.mask), faint=lambda: visible(seen.faint()))
 
 
 def _darker_than_table(seen: WallMask, light: Bytes, midway: float) -> WallMask:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Bytes, Float64s, median
 from contour.walls.end_profile import sample_across
 
 _ROUNDS = 8
@@ -86,7 +86,7 @@ def _fitted(lever: Float64s, normal: Float64s, width: Float64s) -> tuple[Float64
         matrix = (terms * root).T @ (terms * root) + np.diag([0.0, 0.0, _MIDDLE_HOLD, _MIDDLE_HOLD, 1.0, 1.0])
         factors = np.asarray(np.linalg.solve(matrix, (terms * root).T @ (width * root[:, 0])), np.float64)
         off = np.abs(width - terms @ factors)
-        spread = max(1.4826 * float(np.median(off)), 0.1)
+        spread = max(1.4826 * median(off), 0.1)
         weight = 1 / (1 + (off / (2 * spread)) ** 2)
         side = np.where(factors[1] * lever - normal @ factors[2:4] >= 0, 1.0, -1.0)
         covariance = np.asarray(np.linalg.inv(matrix), np.float64)

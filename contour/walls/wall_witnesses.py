@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Bytes, Float64s, median
 from contour.geometry.signed_distance import nearest
 from contour.image.pixel_grid import pixels_of, samples_of
 from contour.image.pixel_sampling import FULL_SCALE, sample_at
@@ -142,9 +142,9 @@ def _learnt(light: Bytes, ends: _Ends, cells: CellScale, wall: float, seen: Wall
     if not len(longest):
         return replace(model, height=max(seen.contrast, 1.0))
     free = fit_ends(light, ends.tip[longest], ends.axis[longest], ends.normal[longest], replace(model, blur_free=True))
-    blur = float(np.clip(np.median(free.blur), *_BLUR_PX))
+    blur = float(np.clip(median(free.blur), *_BLUR_PX))
     width = true_width(wall, float(np.hypot(blur, _MASK_BLUR_PX)))
-    return replace(model, width=width, blur=blur, height=max(float(np.median(free.height)), 1.0))
+    return replace(model, width=width, blur=blur, height=max(median(free.height), 1.0))
 
 
 def _tips(light: Bytes, ends: _Ends, cells: CellScale, model: EndModel) -> _Witnesses:

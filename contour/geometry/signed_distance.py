@@ -21,15 +21,20 @@ def depth_inside(ring: Ring, points: Float64s, rectifier: Rectifier | None = Non
     start, following = ring, np.roll(ring, -1, axis=0)
     along = following - start
     square = np.maximum((along**2).sum(axis=1), 1e-12)
-    off = points[:, None, :] - start[None, :, :]
-    part = np.clip((off * along).sum(axis=2) / square, 0.0, 1.0)
-    distance = np.sqrt(((off - part[:, :, None] * along) ** 2).sum(axis=2).min(axis=1, initial=np.inf))
+    # x and y apart: a last axis of two takes several times longer.
+    x, y = points[:, 0, None], points[:, 1, None]
+    off_x, off_y = x - start[:, 0], y - start[:, 1]
     # Even-odd rule along the ray to the right.
-    y = points[:, 1, None]
     spans = (start[:, 1] <= y) != (following[:, 1] <= y)
     rise = np.where(along[:, 1] == 0, 1.0, along[:, 1])
-    crossing = start[:, 0] + (y - start[:, 1]) / rise * along[:, 0]
-    inside = np.count_nonzero(spans & (crossing > points[:, 0, None]), axis=1) % 2 == 1
+    crossing = start[:, 0] + off_y / rise * along[:, 0]
+    inside = np.count_nonzero(spans & (crossing > x), axis=1) % 2 == 1
+    part = off_x * along[:, 0] + off_y * along[:, 1]
+    part /= square
+    np.minimum(np.maximum(part, 0.0, out=part), 1.0, out=part)
+    off_x -= part * along[:, 0]
+    off_y -= part * along[:, 1]
+    distance = np.sqrt((off_x**2 + off_y**2).min(axis=1, initial=np.inf))
     return np.asarray(np.where(inside, distance, -distance), np.float64)
 
 
@@ -38,5 +43,7 @@ def nearest(points: Float64s, others: Float64s) -> Float64s:
     if not len(others):
         return np.full(len(points), np.inf)
     parts = np.array_split(points, max(1, len(points) // _AT_ONCE))
-    square = [((part[:, None, :] - others[None, :, :]) ** 2).sum(axis=2).min(axis=1) for part in parts]
+    square = [
+        ((part[:, 0, None] - others[:, 0]) ** 2 + (part[:, 1, None] - others[:, 1]) ** 2).min(axis=1) for part in parts
+    ]
     return np.asarray(np.sqrt(np.concatenate(square)), np.float64)

@@ -49,10 +49,19 @@ def distance(models: Models, points: Complexes) -> Float64s:
     With u along the tangent and v outwards, F = v + k (u^2 + v^2) / 2 is the power of the point; the distance from the
     circle is 2 F / (1 + sqrt(1 + 2 k F)), exact for lines too.
     """
-    local = (points - models.origin) * models.tangent.conj()
-    power = 0.5 * models.curvature * (local.real**2 + local.imag**2) - local.imag
-    root = np.sqrt(np.maximum(1.0 + 2.0 * models.curvature * power, 0.0))
-    return 2.0 * power / (1.0 + root)
+    local = points - models.origin
+    local *= models.tangent.conj()
+    power = local.real**2
+    power += local.imag**2
+    power *= 0.5 * models.curvature
+    power -= local.imag
+    root = 2.0 * models.curvature * power
+    root += 1.0
+    np.sqrt(np.maximum(root, 0.0, out=root), out=root)
+    root += 1.0
+    power *= 2.0
+    power /= root
+    return power
 
 
 def feet(models: Models, points: Complexes) -> tuple[Complexes, Complexes]:

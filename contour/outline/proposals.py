@@ -45,7 +45,7 @@ _LEAST_RADIUS_CONCAVE = 1.05
 _REDUNDANT = 2.0
 # Rings of so few witnesses, holes mostly, are looked at from every place.
 FEW = 64
-_SAME = 0.1
+_SAME, _ROUNDING = 0.1, 1e-9
 
 
 @dataclass(frozen=True)
@@ -101,10 +101,8 @@ def propose(witnesses: Witnesses) -> Proposals:
     longer: list[Proposals] = []
     for level in reversed(levels):
         for fits in level:
-            worth = fits.gain > 0.0
-            for other in longer:
-                worth &= ~_explained(witnesses, fits, other)
-            kept.append(fits.take(worth))
+            worth = fits.take(fits.gain > 0.0)
+            kept.append(worth.take(~_explained(witnesses, worth, longer)) if len(worth) and longer else worth)
         longer = level
     return gather(kept)
 
@@ -126,17 +124,22 @@ def _propose_everywhere(witnesses: Witnesses) -> Proposals:
 
 def _different(witnesses: Witnesses, fits: Proposals) -> Indices:
     """Indices of proposals, best first, without those that save about the same as a better one at every witness."""
-    order = np.argsort(-fits.gain, kind="stable")
-    signed = distance(fits.models.take((order, None)), witnesses.points[None, :])
+    signed = distance(fits.models.take((slice(None), None)), witnesses.points[None, :])
     saved = np.maximum(witnesses.cap_inside - cost(witnesses, signed), 0.0)
     total = saved.sum(axis=1)
+    # By what they save in all: what two save differs by no less than that does, so that only near ones are compared.
+    rising = np.argsort(total)
+    saved, total, gain = saved[rising], total[rising], fits.gain[rising]
+    begin = np.searchsorted(total, total / (1.0 + _SAME) - _ROUNDING).tolist()
+    end = np.searchsorted(total, total / (1.0 - _SAME) + _ROUNDING, side="right").tolist()
+    left = np.ones(len(fits), np.bool_)
     kept: list[int] = []
-    while len(order):
-        kept.append(int(order[0]))
-        other = np.abs(saved - saved[0]).sum(axis=1) > _SAME * total
-        other[0] = False
-        order, saved, total = order[other], saved[other], total[other]
-    return np.array(kept, dtype=np.intp)
+    for best in np.lexsort((rising, -gain)).tolist():
+        if left[best]:
+            kept.append(best)
+            near = slice(begin[best], end[best])
+            left[near] &= np.abs(saved[near] - saved[best]).sum(axis=1) > _SAME * total[near]
+    return rising[kept]
 
 
 def _levels(witnesses: Witnesses, sizes: list[int]) -> list[list[Proposals]]:
@@ -212,21 +215,20 @@ def _best_starts(witnesses: Witnesses, points: Complexes, index: Indices, bend: 
     return join(found).take(order)
 
 
-def _explained(witnesses: Witnesses, fits: Proposals, longer: Proposals) -> Bools:
+def _explained(witnesses: Witnesses, fits: Proposals, longer: list[Proposals]) -> Bools:
     """True where one of the longer windows about the same place explains a window's own witnesses as well."""
-    if not len(fits) or not len(longer):
-        return np.zeros(len(fits), dtype=bool)
     count = len(witnesses)
     index = samples(count, fits.first, fits.length, min(int(fits.length[0]), 8))
-    points = witnesses.points[index]
     scale = float(fits.length[0]) / index.shape[1]
     own = window_cost(witnesses, fits.models, index).sum(axis=1)
-    stride = int(longer.first[1] - longer.first[0]) if len(longer) > 1 else count
-    middle = fits.first + fits.length // 2 - longer.length[0] // 2
-    near = np.rint(middle / stride).astype(np.intp)[:, None] + np.array([-1, 0, 1])
-    near = near % len(longer)
-    signed = distance(longer.models.take(near).take((..., None)), points[:, None, :])
-    theirs = cost(witnesses, signed, index[:, None, :]).sum(axis=2)
-    theirs = np.where(longer.gain[near] > 0.0, theirs, np.inf).min(axis=1)
-    explained: Bools = (theirs - own) * scale < _REDUNDANT
+    explained = np.zeros(len(fits), np.bool_)
+    for other in longer:
+        left = np.flatnonzero(~explained)
+        stride = int(other.first[1] - other.first[0]) if len(other) > 1 else count
+        middle = fits.first[left] + fits.length[left] // 2 - other.length[0] // 2
+        near = (np.rint(middle / stride).astype(np.intp)[:, None] + np.array([-1, 0, 1])) % len(other)
+        there = index[left][:, None, :]
+        theirs = cost(witnesses, distance(other.models.take(near).take((..., None)), witnesses.points[there]), there)
+        least = np.where(other.gain[near] > 0.0, theirs.sum(axis=2), np.inf).min(axis=1)
+        explained[left] = (least - own[left]) * scale < _REDUNDANT
     return explained

@@ -119,15 +119,32 @@ def cost(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(
     one missing cell or broken wall reaches no deeper. Outside of an exterior it rises sooner: nothing but debris that
     hangs on the block takes a witness there.
     """
+    # In place, for this is most of what a fit does.
     outside = signed > 0.0
     sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
     cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
-    beyond = np.clip(np.where(np.isinf(sigma), 0.0, np.abs(signed)) / witnesses.pitch_px - _DEEPEST, 0.0, 3.0)
-    square = 0.5 * (signed / sigma) ** 2
-    bent: Float64s = cap * square / (cap + square) + 4.0 * beyond**2
-    if witnesses.rare > 0.0:
-        return bent
-    return bent + _FAR_OUTSIDE * np.clip(signed / witnesses.pitch_px - _DUST, 0.0, 1.0)
+    square = signed / sigma
+    square *= square
+    square *= 0.5
+    bent: Float64s = cap * square
+    square += cap
+    bent /= square
+    out = signed / witnesses.pitch_px
+    beyond = np.abs(out)
+    beyond -= _DEEPEST
+    if witnesses.bound.any():
+        beyond[np.isinf(sigma)] = 0.0
+    if beyond.max(initial=0.0) > 0.0:
+        np.minimum(np.maximum(beyond, 0.0, out=beyond), 3.0, out=beyond)
+        beyond *= beyond
+        beyond *= 4.0
+        bent += beyond
+    if witnesses.rare <= 0.0:
+        out -= _DUST
+        np.minimum(np.maximum(out, 0.0, out=out), 1.0, out=out)
+        out *= _FAR_OUTSIDE
+        bent += out
+    return bent
 
 
 def weights(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(None)) -> Float64s:

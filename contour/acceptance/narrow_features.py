@@ -127,23 +127,24 @@ def _deepest(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     half = max(1, round(0.5 * _BESIDE * pitch_px / spacing))
     before, after = _Beside.of(places, -1, half), _Beside.of(places, 1, half)
     aligned = float(np.cos(np.radians(_ANGLE_DEG)))
+    # All feet at once: of so many steps, shape (S, 1), from each place, shape (S, N).
+    steps = np.arange(2, min(int(_LONGEST * pitch_px / spacing), count // 2))[:, None]
+    ends = (np.arange(count) + steps) % count
+    foot = places[ends] - places
+    width = np.hypot(foot[:, :, 0], foot[:, :, 1])
+    # A path so long reaches no farther out of its foot than half of it would, bent in its middle.
+    reach = 0.5 * np.sqrt(np.maximum((steps * spacing) ** 2 - width**2, 0.0))
+    long, starts = np.nonzero((width < _WIDE * pitch_px) & (reach > np.maximum(_DEPTH * pitch_px, _SLOPE * width)))
+    foot, width, reach = foot[long, starts], width[long, starts], reach[long, starts]
+    one, other = before.take(starts), after.take(ends[long, starts])
+    along = foot / np.maximum(width, 1e-9)[:, None]
+    least = np.maximum(np.maximum(_DEPTH * pitch_px, _SLOPE * width), _STEP * one.apart(other))
+    chosen = np.flatnonzero((reach > least) & (np.minimum(one.along(along), other.along(along)) > aligned))
     best: NarrowFeature | None = None
-    for steps in range(2, min(int(_LONGEST * pitch_px / spacing), count // 2)):
-        foot = np.roll(places, -steps, axis=0) - places
-        width = np.hypot(*foot.T)
-        # A path so long reaches no farther out of its foot than half of it would, bent in its middle.
-        reach = 0.5 * np.sqrt(np.maximum((steps * spacing) ** 2 - width**2, 0.0))
-        starts = np.flatnonzero((width < _WIDE * pitch_px) & (reach > np.maximum(_DEPTH * pitch_px, _SLOPE * width)))
-        if not len(starts):
-            continue
-        width, one, other = width[starts], before.take(starts), after.take((starts + steps) % count)
-        along = foot[starts] / np.maximum(width, 1e-9)[:, None]
-        least = np.maximum(np.maximum(_DEPTH * pitch_px, _SLOPE * width), _STEP * one.apart(other))
-        chosen = (reach[starts] > least) & (np.minimum(one.along(along), other.along(along)) > aligned)
-        if chosen.any():
-            best = _deeper(
-                best, places, (starts[chosen], steps), (along[chosen], width[chosen], least[chosen]), pitch_px
-            )
+    for some in np.split(chosen, np.flatnonzero(np.diff(long[chosen])) + 1):
+        if len(some):
+            run = starts[some], int(steps[long[some[0]], 0])
+            best = _deeper(best, places, run, (along[some], width[some], least[some]), pitch_px)
     return best
 
 

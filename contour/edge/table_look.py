@@ -246,6 +246,8 @@ def _borders(small: Bytes, slope: NDArray[np.int16], block: tuple[Bytes, Bytes],
 
 def _long(part: Bools, least: float) -> Bools:
     """The pieces of a part that are longer than that, samples."""
+    if not part.any():
+        return part
     _, pieces, stats, _ = cv2.connectedComponentsWithStats(part.astype(np.uint8), connectivity=8)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > least
     long[0] = False
@@ -261,11 +263,13 @@ def _told_from_table(
     main = int(np.argmax(area)) if area.any() else 0
     table_parts = np.zeros(len(area), np.bool_)
     table_parts[main] = main > 0
+    numbers = parts.ravel().astype(np.intp)
+    sizes = np.maximum(np.bincount(numbers, minlength=len(area)), 1)
     # Plates of a table lie side by side under one lamp: those told from the first tell what the next ones look like.
     for _ in range(_ROUNDS):
         level, spread = _table_level(small, table_parts[parts], samples)
         off = np.asarray(cv2.blur(small, (3, 3)).reshape(level.shape) - level, np.float32)
-        known, table_parts = table_parts, _table_parts(off, spread, parts, main)
+        known, table_parts = table_parts, _table_parts(off, spread, (numbers, sizes), main)
         if (known == table_parts).all() or area[table_parts & ~known].sum() < _FEW_SAMPLES * samples**2:
             break
     return table_parts[parts], off, level, spread
@@ -291,14 +295,14 @@ def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, F
     return level, spread
 
 
-def _table_parts(off: Float32s, spread: Float64s, parts: Int32s, main: int) -> Bools:
-    """Which of the numbered flat parts are as light as the table around them; `off`: the picture less that light."""
-    count = int(parts.max()) + 1
-    number = parts.ravel()
-    size = np.maximum(np.bincount(number, minlength=count), 1)
-    table = np.ones(count, np.bool_)
+def _table_parts(off: Float32s, spread: Float64s, parts: tuple[Indices, Indices], main: int) -> Bools:
+    """Which flat parts are as light as the table around them; `off`: the picture less that light, `parts`: the number
+    of each sample's part, and the samples of each.
+    """
+    numbers, sizes = parts
+    table = np.ones(len(sizes), np.bool_)
     for k in range(off.shape[2]):
-        mean = np.bincount(number, weights=off[:, :, k].ravel(), minlength=count) / size
+        mean = np.bincount(numbers, weights=off[:, :, k].ravel(), minlength=len(sizes)) / sizes
         table &= np.abs(mean) < _APART + _APART_SPREADS * spread[k]
     table[0] = False
     table[main] = main > 0

@@ -27,8 +27,10 @@ def samples_of(pixels: Float64s, step: int) -> Float64s:
 
 def averaged(picture: Bytes, step: int, border: int = cv2.BORDER_CONSTANT) -> Bytes:
     """Mean over the pixels of each sample, (H, W); the last ones are filled up by a border of OpenCV's, constant 0."""
+    if step == 1:
+        return picture
     wide, high = -picture.shape[1] % step, -picture.shape[0] % step
-    even = cv2.copyMakeBorder(picture, 0, high, 0, wide, border, value=0)
+    even = cv2.copyMakeBorder(picture, 0, high, 0, wide, border, value=0) if wide or high else picture
     size = (even.shape[1] // step, even.shape[0] // step)
     return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
 

@@ -79,7 +79,7 @@ def without_loose_pieces(mask: Bytes, pitch_px: float) -> Bytes:
     however near they lie: strips of swarf, chips. Where no piece holds most of the walls, nothing is taken out.
     """
     count, labels = cv2.connectedComponents(mask, connectivity=8)
-    places = np.flatnonzero(mask)
+    places = np.flatnonzero(mask > 0)
     piece = np.asarray(labels, np.int32).ravel()[places]
     area = np.bincount(piece, minlength=count)
     if area.max() <= _MOST_WALLS * area.sum():

@@ -10,8 +10,8 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes
-from contour.image.pixel_grid import pixels_of
-from contour.walls.cell_scale import probe
+from contour.image.pixel_grid import averaged, pixels_of
+from contour.walls.cell_scale import CellScale, probe
 from contour.walls.coarse_block import coarse_block
 from contour.walls.coarse_rings import CoarseBlock
 from contour.walls.dark_material import dark_edge, midway_to_table
@@ -24,7 +24,10 @@ from contour.walls.wall_witnesses import block_evidence
 
 # Noise alone reaches a score of 0.18.
 _ORDERLY = 0.35
-_HALF_SIZE_ABOVE_PX = 6_000_000
+# Larger pictures are halved to look for walls in cells of more than so many pixels, or made as small as leaves cells so
+# many pixels, and walls that.
+_WHOLE_UP_TO_PX, _HALVED_ABOVE_PX = 6_000_000, 20.0
+_PITCH_PX, _LEAST_WALL_PX = 16.0, 1.25
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
 _SUBSAMPLED_PITCH = 20.0
 _DARK_POINTS_PER_PITCH = 4
@@ -53,12 +56,8 @@ def see_block(
         coloured = light_from_table(picture, sample, walls, hop)
         if coloured is not None:
             light, cells = coloured, probe(coloured, "bright")
-    scale = 2 if light.size > _HALF_SIZE_ABOVE_PX and cells.pitch_px > 20 and cells.wall_px > 2.5 else 1
-    small = (
-        light
-        if scale == 1
-        else np.asarray(cv2.resize(light, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
-    )
+    scale = _scale(light, cells)
+    small = averaged(light, scale, cv2.BORDER_REPLICATE)
     seen = wall_mask(
         small, cells.pitch_px / scale, bright=cells.bright, contrast=cells.contrast, wall=cells.wall_px / scale
     )
@@ -82,6 +81,13 @@ def see_block(
     evidence = block_evidence(light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
+
+
+def _scale(light: Bytes, cells: CellScale) -> int:
+    """How many times smaller the picture is in which walls are looked for: where each ends is measured at full size."""
+    if light.size <= _WHOLE_UP_TO_PX or cells.pitch_px <= _HALVED_ABOVE_PX:
+        return 1
+    return max(1, int(min(max(2.0, cells.pitch_px / _PITCH_PX), cells.wall_px / _LEAST_WALL_PX)))
 
 
 def _visible(seen: WallMask, hidden: Bytes | None) -> WallMask:

@@ -221,7 +221,8 @@ def _typical_peak(local: Float32s, samples: float) -> float:
     rows, columns = local.shape[0] // size, local.shape[1] // size
     if rows < 2 or columns < 2:
         return float(local.max())
-    tiles = local[: rows * size, : columns * size].reshape(rows, size, columns, size).max(axis=(1, 3))
+    bands = local[: rows * size, : columns * size].reshape(rows, size, columns * size).max(axis=1)
+    tiles = bands.reshape(rows, columns, size).max(axis=2)
     walls = tiles[tiles > 0.25 * tiles.max()]
     return float(np.quantile(walls, 0.5)) if walls.size else 0.0
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Bytes, Float64s, quantiles
 
-# What is usual for one, and what the other one ever has: lowest, highest, percent.
-_USUAL = (4.0, 96.0)
-_EVER = (0.5, 99.5)
+# What is usual for one, and what the other one ever has: lowest, highest, as shares of it.
+_USUAL = (0.04, 0.96)
+_EVER = (0.005, 0.995)
 # Scratches and dust shift a level: so much of the way to the other's is still one's own.
 _NEAR = 0.25
 _FEW = 50
@@ -30,13 +30,13 @@ def exclusive_levels(level: Bytes, block: Bytes, table: Bytes) -> tuple[Bytes, B
 
 def _only(level: Bytes, own: Bytes, others: Bytes) -> Bytes:
     """Where the level is usual for `own`, or near to that, and no other has it; samples, shape (N,) or (N, 3)."""
-    (low, high), (least, most) = _percentiles(own, _USUAL), _percentiles(others, _EVER)
+    (low, high), (least, most) = _bounds(own, _USUAL), _bounds(others, _EVER)
     slack = _NEAR * np.maximum(np.maximum(low - most, least - high), 0.0)
     usual = cv2.inRange(level, low - slack, high + slack)
     return np.asarray(cv2.bitwise_and(usual, cv2.bitwise_not(cv2.inRange(level, least, most))), np.uint8)
 
 
-def _percentiles(samples: Bytes, percent: tuple[float, float]) -> tuple[Float64s, Float64s]:
-    """Two percentiles of the samples, one figure a channel each."""
-    low, high = np.percentile(samples.reshape(len(samples), -1), percent, axis=0)
+def _bounds(samples: Bytes, shares: tuple[float, float]) -> tuple[Float64s, Float64s]:
+    """What two shares of the samples lie below, one figure a channel each."""
+    low, high = quantiles(samples.reshape(len(samples), -1), shares)
     return low, high

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from contour.acceptance.block_level import exclusive_levels
-from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, median
+from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, median, quantile
 from contour.geometry.rings import Contour, Ring
 from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
@@ -26,7 +26,7 @@ _SHARE_OF_LEVEL = 0.5
 _NEARBY_PITCHES = 8.0
 # Of the busiest places in the picture: less is table, however quiet its surroundings.
 _LEAST_SHARE = 0.3
-_BUSIEST_PERCENT = 98.0
+_BUSIEST = 0.98
 # A missing cell is no opening, and a scratch is no part of the block.
 _OPENING_PITCHES = 2.2
 _SCRATCH_PITCHES = 1.8
@@ -111,7 +111,7 @@ def _busy(small: Bytes, small_pitch_px: float) -> Bytes:
     squares = cv2.boxFilter(average * average, cv2.CV_32F, (nearby, nearby))
     # The mean that weighs busy places by how busy they are: beside the block it is the block's.
     level = squares / np.maximum(cv2.boxFilter(average, cv2.CV_32F, (nearby, nearby)), 1e-3)
-    least = _LEAST_SHARE * float(np.percentile(level[::4, ::4], _BUSIEST_PERCENT))
+    least = _LEAST_SHARE * quantile(level[::4, ::4], _BUSIEST)
     busy = average > np.maximum(_SHARE_OF_LEVEL * level, least)
     return np.asarray(busy, np.uint8) * np.uint8(255)
 

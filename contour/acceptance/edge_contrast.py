@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from contour.edge.edge_parts import EdgePart, light_beside, longest_part, with_sides
-from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.arrays import Bools, Bytes, Float64s, quantiles
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.pixel_sampling import planes_of
@@ -19,8 +19,8 @@ _IN = np.array([0.6, 1.0, 1.4, 1.8])
 # Over how much of the edge the table's light is taken together, and that of cells and walls besides the whole: a shadow
 # makes a table as dark as dark walls elsewhere, and here and there walls are faint.
 _TABLE_OVER, _BLOCK_OVER = 2.0, 6.0
-# Of what is inside, in per cent: cells, and walls.
-_CELLS, _WALLS = 10.0, 97.0
+# Of what is inside: cells, and walls.
+_CELLS, _WALLS = 0.1, 0.97
 # What table and walls differ by, of what walls and cells do.
 _ALIKE = 0.3
 
@@ -49,14 +49,17 @@ def _longest(planes: list[Bytes], ring: Ring, out_px: float, *, dark: bool) -> E
 def _alike(planes: list[Bytes], lengths: RingLengths, at: Float64s, out_px: float, *, dark: bool) -> Bools:
     """At which lengths along a ring what lies beyond is nowhere told from the walls, shape (N,)."""
     place, outward = lengths.at(at), out_px * lengths.normals(at, _SPACING * abs(out_px))
-    tails = [100.0 - _CELLS, 100.0 - _WALLS] if dark else [_CELLS, _WALLS]
+    tails = (1.0 - _CELLS, 1.0 - _WALLS) if dark else (_CELLS, _WALLS)
     sampled = [[light_beside(plane, place, outward, pitches) for pitches in (_OUT, -_IN)] for plane in planes]
-    by_all = _like_walls(sampled, lambda within: np.percentile(within, tails)[:, None])
+    by_all = _like_walls(sampled, lambda within: quantiles(within.ravel(), tails)[:, None])
     if not by_all.any():
         return by_all
-    return by_all & _like_walls(
-        sampled, lambda within: np.percentile(with_sides(within, _BLOCK_OVER / _SPACING), tails, axis=(0, 2))
-    )
+
+    def nearby(within: Float64s) -> Float64s:
+        beside = with_sides(within, _BLOCK_OVER / _SPACING).transpose(0, 2, 1)
+        return quantiles(beside.reshape(-1, within.shape[1]), tails)
+
+    return by_all & _like_walls(sampled, nearby)
 
 
 def _like_walls(sampled: list[list[Float64s]], levels: Callable[[Float64s], Float64s]) -> Bools:

@@ -89,7 +89,7 @@ def _arms(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
     return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Beside:
     """The outline beside each place of a ring, on one side of it, in two halves: their unit directions, and the middle
     of the farther one, (N, 2) each.

@@ -133,7 +133,7 @@ def lost_in_noise(quality: Quality, limits: QualityLimits) -> str | None:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _TilePlaces:
     """Left and top pixels of square tiles, (N,) each, and their side, pixels."""
 

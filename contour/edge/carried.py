@@ -38,7 +38,7 @@ def _on_ring(own: list[Stretch], traced: RingLengths, polygon: RingLengths) -> l
     hidden = [(_span(stretch, traced, polygon), stretch) for stretch in own if stretch.state != "seen"]
     begun = polygon.feet(traced.at(np.array([stretch.from_px for stretch in own])))
     ends = [end % around for (low, long), _ in hidden for end in (low, low + long)]
-    cuts = np.unique([0.0, around, *begun, *ends])
+    cuts = np.array(sorted({0.0, around, *begun, *ends}))
     middles = (cuts[:-1] + cuts[1:]) / 2
     nearest = np.searchsorted([stretch.to_px for stretch in own], traced.feet(polygon.at(middles)))
     pieces = []

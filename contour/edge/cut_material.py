@@ -95,7 +95,7 @@ def _with_things(clear: RingEvidence, distrusted: Float64s, look: TableLook) -> 
     reach = round(_TOUCHES_PITCHES * look.pitch_px / look.step)
     for x, y in grid:
         near = parts[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1]
-        touching[np.unique(near)] = True
+        touching[near] = True
     touching[0] = False
     union = touching[parts].astype(np.uint8)
     cv2.fillPoly(union, [np.rint(samples_of(clear.coarse, look.step)).astype(np.int32)], 1)

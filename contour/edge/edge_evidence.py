@@ -8,7 +8,7 @@ from contour.edge.ring_places import places_along, runs_of, turns_deg
 from contour.edge.stretches import Hider, State, Stretch
 from contour.edge.table_look import TableLook
 from contour.edge.visible_edge import SPACING_PITCHES, VisibleRing
-from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.arrays import Float64s, Indices, distinct
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import nearest
@@ -39,7 +39,7 @@ def ring_evidence(
     for index, run in enumerate(runs):
         label[run] = index + 1
     states = [_run_state(run, places.points, visible.on_line, pitch_px) for run in runs]
-    starts = np.unique(np.concatenate([[0], np.flatnonzero(label != np.roll(label, 1))]))
+    starts = distinct(np.concatenate([[0], np.flatnonzero(label != np.roll(label, 1))]))
     stretches = []
     for first, last in zip(starts, [*starts[1:], len(label)], strict=True):
         begin, end = float(places.at[first]), float(places.at[last]) if last < len(label) else places.whole

@@ -11,7 +11,7 @@ from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Places:
     """Places along a ring, pixels (N, 2), their arc lengths along its chords from its first vertex on (N,), and its
     whole length.

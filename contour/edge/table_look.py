@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int32s, median
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
@@ -54,7 +54,7 @@ _HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT = (0.5, 0.9), (1.0, 0.6), 0.92
 _BAND, _LONG_PITCHES = 0.55, 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TableLook:
     """Maps on a grid of `step` pixels a sample, (h, w): `table`, and `foreign`, flat and not the table."""
 
@@ -211,7 +211,7 @@ def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
     if not len(comb):
         return np.ones(slope.shape, np.float32)
     size = 2 * round(0.5 * samples) + 1
-    busy = cv2.blur(np.minimum(slope, np.percentile(comb, 90)).astype(np.float32), (size, size))
+    busy = cv2.blur(np.minimum(slope, quantile(comb, 0.9)).astype(np.float32), (size, size))
     usual = median(busy[::2, ::2][block[::2, ::2] > 0])
     return np.asarray(busy / max(usual, 1e-3), np.float32)
 
@@ -285,7 +285,7 @@ def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, F
     for k in range(channels.shape[2]):
         plane, some = channels[:, :, k], (slice(None, None, 3), slice(None, None, 3))
         here = plane[some][main[some]]
-        lowest, highest = np.percentile(here, (2, 98)) if len(here) else (0.0, 0.0)
+        lowest, highest = quantiles(here, (0.02, 0.98)).tolist() if len(here) else (0.0, 0.0)
         local = np.asarray(cv2.blur(plane * main, (size, size)), np.float32) / np.maximum(share, 1e-3)
         if len(here):
             spread[k] = 1.4826 * median(np.abs(here - local[some][main[some]]))

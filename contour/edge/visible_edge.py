@@ -39,7 +39,7 @@ _CORNER_DEG = 15.0
 Fit = Callable[[RingEvidence], FittedRing]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class VisibleRing:
     """A fitted ring, the witnesses it went through, and the places (N, 2), pixels, where walls ended at something that
     lies over the edge. `filled`: witnesses of the evidence that are ends of filled cells, not of walls, shape (N,).

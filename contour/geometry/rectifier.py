@@ -19,7 +19,7 @@ class Rectifier(Protocol):
     def unrectify(self, points: Float64s) -> Float64s: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CroppedRectifier:
     """A rectifier for the pixels of a part of the picture, whose first one is `first` (x, y) of the whole."""
 

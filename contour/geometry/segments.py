@@ -27,7 +27,7 @@ _SPLITTER = 134217729.0
 """2^27 + 1: splits a double into two halves of 26 bits (Dekker 1971)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BoxTree:
     """Boxes over runs of consecutive segments; `levels[0]` holds one box a segment, each further level half as many."""
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Float64s, Indices
+from contour.geometry.arrays import Bools, Float64s, Indices, distinct
 from contour.geometry.segments import BoxTree, distances_to_segments, self_meetings
 
 _FINER = (0.0, 0.35, 0.6, 0.8)
@@ -87,7 +87,7 @@ def _farthest(path: Float64s, begin: Indices, end: Indices) -> tuple[Indices, Fl
     distance = distances_to_segments(path[index], path[begin[owner]], path[end[owner]])
     largest = np.maximum.reduceat(distance, first)
     hits = np.flatnonzero(distance == largest[owner])
-    _, once = np.unique(owner[hits], return_index=True)
+    once = np.flatnonzero(np.diff(owner[hits], prepend=-1))
     return index[hits[once]], largest
 
 
@@ -211,7 +211,7 @@ def _untangled(path: Float64s, kept: Indices, tolerance: float) -> Indices:
         if not meetings:
             return kept
         ends = np.append(kept[1:], kept[0] + last)
-        tangled = np.unique(np.concatenate(meetings))
+        tangled = distinct(np.concatenate(meetings))
         begin, end = kept[tangled], ends[tangled]
         long = end - begin > 1
         if not long.any():

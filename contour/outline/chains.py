@@ -21,7 +21,7 @@ _SHARPEST = 0.7
 _MOST_TRIES = 10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chain:
     """Segments (their indices, in order) that one curve replaces, and the witnesses it runs through."""
 

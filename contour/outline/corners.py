@@ -20,7 +20,7 @@ _SMOOTH_SINE = 0.26
 _ASIDE = 0.8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Joints:
     """Joint after each segment, shape (S,): where the segment ends and where the next begins (the same point but for
     a bevel).

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, distinct, median
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.outline.bevels import bevelled
@@ -33,7 +33,7 @@ _CHORD_PX = 0.3
 _FLAT_PX = 0.08
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FittedRing:
     """An outline ring and how well its witnesses support it.
 
@@ -78,7 +78,7 @@ def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifi
         others, still = overlooked(evidence, again.ring, pitch_px, rectifier)
         if still < left_out:
             fitted, left_out = replace(again, inlier=again.inlier[own], residual=again.residual[own]), still
-        bounds = np.union1d(bounds, others) if len(others) else others
+        bounds = distinct(np.concatenate([bounds, others])) if len(others) else others
     return fitted
 
 

@@ -19,7 +19,7 @@ _SMOOTHNESS = 10.0 ** np.arange(-3.0, 5.0)
 _CAUTION = 1.4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve:
     """A uniform cubic B-spline in the plane over arc length 0..length, closed or open.
 
@@ -40,7 +40,7 @@ class Curve:
         return (value * near).sum(axis=1), (slope * near).sum(axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Guide:
     """A first guess of a curve: each witness's foot, its arc length along the curve (rising), the whole length, pixels,
     and whether it closes.

@@ -44,7 +44,7 @@ _LIES = 0.5
 _FAR = 1e6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Labelling:
     """label: proposal of each witness, shape (N,). energy: nats of the whole ring."""
 
@@ -127,7 +127,7 @@ def _steps(
     return np.where(same, 0.0, price + joint)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Foot:
     """Feet of a witness on models, and the models' tangents there, complex."""
 
@@ -135,7 +135,7 @@ class _Foot:
     tangent: Complexes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Between:
     """What lies between the last witness of one model and the next, of another: the gap between both, and the larger
     standard deviation of the two. unseen: pixels from the last witness that lies on the one model to its foot, and from

@@ -17,7 +17,7 @@ from contour.geometry.arrays import Bools, Complexes, Float64s
 _LEAST_ROOT = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Models:
     """Lines and arcs, any shape of batch: origin and unit tangent (complex, pixels), curvature (1/pixel, convex
     positive)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.arrays import Float64s, Indices, distinct
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside
@@ -53,7 +53,7 @@ def overlooked(
             continue
         found.append(_spaced(run, walls, height, pitch_px))
         total += high
-    return np.unique(np.concatenate(found)), total
+    return distinct(np.concatenate(found)), total
 
 
 def _spaced(run: Indices, walls: Float64s, height: Float64s, pitch_px: float) -> Indices:

@@ -48,7 +48,7 @@ FEW = 64
 _SAME, _ROUNDING = 0.1, 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Proposals:
     """Models with the stretch of witnesses they may explain: first index and length (cyclic), and their gain in
     nats."""

@@ -11,7 +11,7 @@ from contour.outline.lines_and_arcs import Models, feet
 from contour.outline.witnesses import Witnesses
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Reach:
     """From each state's foot along its model to the nearest witness that lies on it, back and ahead: shape (N, A),
     pixels, 0 where none does."""

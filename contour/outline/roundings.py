@@ -33,7 +33,7 @@ _NEXT = 6
 _LEAST_TURN, _MOST_TURN = 0.3, 2.6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Ring:
     """A ring's segments, their joints, and which of them are arcs that were put in here, shape (S,)."""
 
@@ -42,7 +42,7 @@ class _Ring:
     made: Bools
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Corner:
     """Segment `k` and the one `after` it, between which an arc may go instead of the corner and what is `between`.
 
@@ -70,7 +70,7 @@ class _Corner:
         return float(self.present[max(own - _NEXT, 0) : len(self.part) - max(others - _NEXT, 0)].sum())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Arcs:
     """Arcs of several radii in one corner, shape (R,): nats that each saves, where it leaves the one edge and meets the
     other, its model, and which witnesses lie along it (R, M).

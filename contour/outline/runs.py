@@ -18,7 +18,7 @@ _SHARED = (2, 4)
 _STEPS = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Segments:
     """Pieces of the outline in travel order, one model each: first witness and number of witnesses (cyclic), shape
     (S,)."""

@@ -19,7 +19,7 @@ _MOST_FREE = 0.25
 _BEND_UNSEEN = 1.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Vertices:
     """Vertices of a ring, complex, shape (M,), and the two segments that meet in each, twice the same inside one, shape
     (M, 2).

@@ -62,7 +62,7 @@ class Coefficients:
     outside: float = 1.43
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stretches:
     """Stretches of outline between neighbouring witnesses on it, shape (S,) each, pixels.
 

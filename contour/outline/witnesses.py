@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median, quantile
 from contour.geometry.rectifier import Rectifier
 from contour.outline.lines_and_arcs import Models, distance
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
@@ -33,7 +33,7 @@ _DEARER_BOUND = 2.0
 _NOTHING = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Witnesses:
     """Witnesses of one ring in travel order, shape (N,) each, in pixels of the fitting plane.
 
@@ -180,7 +180,7 @@ def noise_from_neighbours(witnesses: Witnesses) -> float:
     # 1.5, -1, -1, 1/4, 1/4 are the weights of five even neighbours in the excess: 2.09 is the root of their squares'
     # sum.
     excess = (off - 0.5 * (np.roll(off, 1) + np.roll(off, -1))) / (2.09 * witnesses.outer)
-    level = min(float(np.quantile(np.abs(simple[sound]), 0.25)), float(np.quantile(np.abs(excess[sound]), 0.25)))
+    level = min(quantile(np.abs(simple[sound]), 0.25), quantile(np.abs(excess[sound]), 0.25))
     most = _NOISIEST if len(witnesses) > _FEW else _NOISIEST_OF_FEW
     return float(np.clip(level / 0.36, 0.5, most))
 

@@ -25,7 +25,7 @@ _LEAST_COSINE = 0.2
 """Of half the turn at a new tip, about 157 degrees: a sharper one runs far into the material."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Ring:
     """A ring on its way. Edge i runs from points[i] to the next point, and stands for the traced vertices from
     traced[first[i]] to traced[first[i + 1]], both included, all cyclic.
@@ -40,7 +40,7 @@ class _Ring:
         return np.asarray((np.roll(self.first, -1) - self.first - 1) % len(self.traced) + 1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Step:
     """Vertex `at` of ring `ring` goes, or, with a tip, the edge that begins there; `first`: as in `_Ring`, at the tip.
 
@@ -140,7 +140,7 @@ def _merges(number: int, ring: _Ring, turn: NDArray[np.int8], bound: float) -> l
     to_tip = np.hypot(*(vertices - tips[owner]).T)
     nearest = np.minimum.reduceat(to_tip, begins)
     hits = np.flatnonzero(to_tip == nearest[owner])
-    _, once = np.unique(owner[hits], return_index=True)
+    once = np.flatnonzero(np.diff(owner[hits], prepend=-1))
     divide = hits[once]
     place = np.arange(len(owner))
     off = np.maximum(

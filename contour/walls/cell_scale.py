@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s, median
+from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.opencv import pieces_and_areas
 from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
 from contour.walls.wall_mask import wall_mask
@@ -183,7 +183,7 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
         return None
     # Area a regular comb of this pitch would fill with as many cells.
     # Cells of a comb lie side by side, specks of a table all over it: the part of their place that they fill.
-    spread = np.diff(np.quantile(places[regular], [0.05, 0.95], axis=0), axis=0)[0] / 0.9 + size
+    spread = np.diff(quantiles(places[regular], (0.05, 0.95)), axis=0)[0] / 0.9 + size
     filled = len(usual) * size * size * np.sqrt(3) / 2 / float(np.prod(spread))
     _, pieces = pieces_and_areas(mask, 8)
     connected = float(pieces.max() / max(1, pieces.sum()))
@@ -198,7 +198,7 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
         connected,
         median(light[walls > 0][::7]),
         # The darker part of what is free, for a lighter table may lie in it too (of the lighter part for dark walls).
-        float(np.quantile(light[mask == 0][::7], 0.3 if bright else 0.7)),
+        quantile(light[mask == 0][::7], 0.3 if bright else 0.7),
         lambda: (
             lattice_order(places[regular], size),
             solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),

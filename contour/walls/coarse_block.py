@@ -130,8 +130,8 @@ def _linked(walls: Bytes, kept: Bytes, filled: Bytes, samples: float) -> tuple[B
     closed = length <= _GAPS_PITCHES * samples
     closed[nearest[0, 0]] = False
     line &= closed[low] | closed[nearest]
-    across = np.unique(labels[line & (cv2.dilate(filled, np.ones((3, 3), np.uint8)) == 0)])
-    joined = np.isin(np.arange(len(small)), across) & small
+    across = labels[line & (cv2.dilate(filled, np.ones((3, 3), np.uint8)) == 0)]
+    joined = (np.bincount(across, minlength=len(small)) > 0) & small
     return filled | line.astype(np.uint8), kept | joined[labels].astype(np.uint8)
 
 

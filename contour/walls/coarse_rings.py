@@ -16,7 +16,7 @@ PAD = 8
 """Samples of margin around the coarse grid."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CoarseRing:
     """One ring of the coarse block: vertices (M, 2), the same smoothed over two pitches (M, 2), arc length at each
     (M,), outward unit normals (M, 2), total length.
@@ -32,7 +32,7 @@ class CoarseRing:
     is_hole: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CoarseBlock:
     """Rings (exterior first) and the maps that place any point: signed distance and nearest ring vertex.
 

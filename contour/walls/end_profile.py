@@ -19,7 +19,7 @@ _HEIGHT_SPREAD = 0.4
 _MISFIT = 0.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FittedEnds:
     """Ends in picture pixels (N, 2), unit axes out of the wall (N, 2), blur (standard deviation of the edge, N), wall
     level above background (N,), standard deviation across the outline (N,), residual in grey levels (N,).
@@ -110,7 +110,7 @@ def fit_ends(light: Bytes, tip: Float64s, axis: Float64s, normal: Float64s, mode
     return FittedEnds(point, axis, fitted.spread / widening, fitted.height, sigma, misfit)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Steps:
     """Fitted steps: where, how wide, how high (N,), variance of the place for unit noise (N,), residuals (N, S)."""
 

@@ -47,7 +47,7 @@ def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -
     links = near & _within(strands, _REACH_PITCHES * samples) & (_coarse(weak, step) > 0) & (walls == 0)
     _, joined = cv2.connectedComponents((main | strands | links).astype(np.uint8), connectivity=8)
     count, parts = cv2.connectedComponents((strands | links).astype(np.uint8), connectivity=8)
-    leads = np.isin(np.arange(count), np.unique(parts[strands]))
+    leads = np.bincount(parts[strands], minlength=count) > 0
     links &= (joined == joined[main][0]) & leads[parts]
     return np.asarray(np.where(enlarged(links, step, mask.shape), mask | weak, mask), np.uint8)
 

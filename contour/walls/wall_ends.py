@@ -14,7 +14,7 @@ _BAND_PITCHES = 1.25
 _DEPTH_PITCHES = 0.9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WallEnds:
     """Ends in mask pixels: tip (N, 2), unit axis pointing out of the wall (N, 2), length of straight wall behind
     (N,).
@@ -25,7 +25,7 @@ class WallEnds:
     straight: Float64s
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chains:
     """Boundary chains one after the other: points (N, 2), first index and length of each point's chain, both (N,)."""
 

@@ -25,7 +25,7 @@ class WitnessKind(IntEnum):
     BOUND = 3  # no witness of the edge: a wall that the outline must not leave outside, however deep it lies inside
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EdgePoints:
     """Points along a ring's edge and the outward normals there (K, 2), arc lengths of their feet on the coarse ring
     (K,), all in pixels.
@@ -40,7 +40,7 @@ class EdgePoints:
         return EdgePoints(self.points[index], self.position[index], self.normal[index])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RingEvidence:
     """Witnesses of one ring of the outline, in order along the coarse ring, which runs with the material on its left
     in the y-down picture coordinates' own shoelace sense given by `is_hole` (exterior: positive shoelace in pixels;

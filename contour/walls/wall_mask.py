@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bytes, Float32s, median
+from contour.geometry.arrays import Bytes, Float32s, median, quantile
 from contour.image.opencv import pieces_and_areas
 
 AnyFloat = NDArray[np.floating[Any] | np.integer[Any]]
@@ -48,7 +48,7 @@ _SPECK_LENGTH = 0.15
 _FIFTH_OF_NORMAL = 0.2533
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WallMask:
     """Mask (H, W), uint8, 255 on walls; noise and median wall contrast in grey levels of the picture it came from.
 
@@ -159,7 +159,7 @@ def _opened(light: L, size: int, *, closed: bool = False) -> L:
 
 def _typical(span: Float32s) -> float:
     """Median of the wall contrast where there is any to speak of."""
-    strong = span[span > 0.5 * np.quantile(span[::4, ::4], 0.98)]
+    strong = span[span > 0.5 * quantile(span[::4, ::4], 0.98)]
     return median(strong[:: max(1, strong.size // 4096)]) if strong.size else 0.0
 
 
@@ -175,14 +175,14 @@ def _noise_level(smooth: Levels, pitch_px: float, unit: int) -> float:
     # Of noise alone, after the light blur, a fifth of all tiles of n pixels show no more than 1 − 1.5 / n.
     # Each tile's pixels in a row of their own: their deviation is told several times faster so.
     flat = tiles.transpose(0, 2, 1, 3).astype(np.float32, order="C").reshape(rows.shape[0] * tiles.shape[2], -1)
-    quiet = float(np.quantile(flat.std(axis=1), 0.2)) / (1 - 1.5 / tile)
+    quiet = quantile(flat.std(axis=1), 0.2) / (1 - 1.5 / tile)
     if pitch_px < FINE_PITCH:
         # No tile of fine cells is quiet, but second differences both ways see little of a blurred structure, and keep
         # the noise that the light blur left as it is.
         part = smooth[: 1 << 9, : 1 << 9].astype(np.float32)
         bent = part[:, :-2] - 2 * part[:, 1:-1] + part[:, 2:]
         second = np.abs(bent[:-2] - 2 * bent[1:-1] + bent[2:])
-        quiet = min(quiet, float(np.quantile(second, 0.2)) / _FIFTH_OF_NORMAL)
+        quiet = min(quiet, quantile(second, 0.2) / _FIFTH_OF_NORMAL)
         # Walls of no more than twelve times their noise would not show as cells at all.
         quiet = min(quiet, float(smooth[::hop].std()) / 6)
     return max(quiet, 0.3 * unit)
@@ -224,7 +224,7 @@ def _typical_peak(local: Float32s, samples: float) -> float:
     bands = local[: rows * size, : columns * size].reshape(rows, size, columns * size).max(axis=1)
     tiles = bands.reshape(rows, columns, size).max(axis=2)
     walls = tiles[tiles > 0.25 * tiles.max()]
-    return float(np.quantile(walls, 0.5)) if walls.size else 0.0
+    return median(walls) if walls.size else 0.0
 
 
 def _mean(values: AnyFloat, window: int) -> Float32s:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float64s, median
+from contour.geometry.arrays import Bytes, Float64s, median, quantile
 from contour.walls.end_profile import sample_across
 
 _ROUNDS = 8
@@ -23,7 +23,7 @@ _LEAST_PX = 1.0
 _MIDDLE_HOLD = 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Parallax:
     """Displacement of the walls' lower edges towards `middle` (picture pixels), as a share of the distance from it;
     width of the walls' tops in pixels, or None where no parallax shows.
@@ -58,7 +58,7 @@ def parallax(light: Bytes, tip: Float64s, axis: Float64s, *, straight: Float64s,
     lever, normal, width = (((tip - middle) * normal).sum(axis=1))[seen], normal[seen], width[seen]
     factors, deviation = _fitted(lever, normal, width)
     share = float(factors[1])
-    largest = float(np.quantile(np.abs(share * lever - normal @ factors[2:4]), 0.9))
+    largest = quantile(np.abs(share * lever - normal @ factors[2:4]), 0.9)
     if share < _SIGNIFICANT * deviation or largest < _LEAST_PX or factors[0] < 1.0:
         return none
     return Parallax(share, middle + factors[2:4] / share, float(factors[0]))

@@ -47,7 +47,7 @@ _WALLS_INSIDE = 1.1
 _BESIDE_PX = np.array([-3.0, -1.5, 0.0, 1.5, 3.0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Ends:
     """Ends in picture pixels before they are fitted: tip, axis and outward normal (N, 2), straight wall behind (N,)."""
 
@@ -57,7 +57,7 @@ class _Ends:
     straight: Float64s
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Witnesses:
     points: Float64s
     kind: NDArray[np.int8]
@@ -174,7 +174,7 @@ def _sides(light: Bytes, place: Float64s, normal: Float64s, wall: float, model: 
     return _Witnesses(points, kind, sigma)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Dark:
     """Dark material: the light it is seen in, the level midway from it to the table, its cells' pitch."""
 

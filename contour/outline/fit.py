@@ -65,25 +65,34 @@ def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifi
             f"no outline: {len(evidence.points)} wall ends along a ring, {_FEWEST} or more are needed; "
             "check focus and light, or that the ring is no single missing cell"
         )
-    fitted = _fitted(evidence, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
-    bounds, left_out = overlooked(evidence, fitted.ring, pitch_px, rectifier)
+    material = _material(evidence, rectifier)
+    walls = material[: len(evidence.walls.points)]
+
+    def left_outside(ring: Ring) -> tuple[Indices, float]:
+        flat = ring if rectifier is None else rectifier.rectify(ring)
+        return overlooked(walls, flat, pitch_px, is_hole=evidence.is_hole)
+
+    fitted = _fitted(evidence, material, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
+    bounds, left_out = left_outside(fitted.ring)
     for _ in range(_LOOKS):
         if not len(bounds):
             break
         more, own = with_bounds(evidence, bounds)
         try:
-            again = _fitted(more, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
+            again = _fitted(more, material, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
         except NoBlockFound:  # so many walls are left out that no line goes past all of them: nothing gets better
             break
-        others, still = overlooked(evidence, again.ring, pitch_px, rectifier)
+        others, still = left_outside(again.ring)
         if still < left_out:
             fitted, left_out = replace(again, inlier=again.inlier[own], residual=again.residual[own]), still
         bounds = distinct(np.concatenate([bounds, others])) if len(others) else others
     return fitted
 
 
-def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None) -> FittedRing:
-    """The outline through witnesses as they are."""
+def _fitted(
+    evidence: RingEvidence, material: Float64s, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None
+) -> FittedRing:
+    """The outline through witnesses as they are; `material` as `_material` tells it."""
     witnesses = prepare(evidence, pitch_px, rectifier)
     witnesses = scaled(witnesses, max(noise_from_neighbours(witnesses), 0.7))
     witnesses, segments = segmented(witnesses)
@@ -94,7 +103,7 @@ def _fitted(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifie
     for chain in chains:
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
-    found = bevelled(witnesses, segments, found, inlier, _material(evidence, rectifier))
+    found = bevelled(witnesses, segments, found, inlier, material[:, 0] + 1j * material[:, 1])
     vertices = _vertices(witnesses, segments, found, chains)
     if len(vertices.ring) < 3:
         raise NoBlockFound(
@@ -121,13 +130,10 @@ def _given_leverage(segments: Segments, inlier: Bools, arcs: Bools, chains: list
     return given
 
 
-def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Complexes:
-    """Points of walls, and of what else may be material, in the fitting plane, shape (K,)."""
+def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Float64s:
+    """Points of walls, and behind them of what else may be material, in the fitting plane, shape (K, 2)."""
     points = np.concatenate([evidence.walls.points, evidence.beside])
-    if rectifier is not None:
-        points = rectifier.rectify(points)
-    places: Complexes = points[:, 0] + 1j * points[:, 1]
-    return places
+    return points if rectifier is None else rectifier.rectify(points)
 
 
 def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from contour.geometry.arrays import Float64s, Indices, distinct
-from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
@@ -24,21 +23,16 @@ _CHAIN_BREAKS = 0.4
 _BOUNDS_APART = 0.3
 
 
-def overlooked(
-    evidence: RingEvidence, ring: Ring, pitch_px: float, rectifier: Rectifier | None
-) -> tuple[Indices, float]:
-    """Indices of the evidence's wall points that bound the outline from inside where `ring` leaves walls out, and how
-    far it does in all, pitches.
+def overlooked(walls: Float64s, ring: Ring, pitch_px: float, *, is_hole: bool) -> tuple[Indices, float]:
+    """Indices of the points of walls, shape (N, 2), that bound the outline from inside where `ring` leaves walls out,
+    and how far it does in all, pitches; both in the fitting plane.
 
     A cut through a wall leaves an end of it, which sticks out at one place. A wall that leaves the outline at one place
     and comes back to it at another is the side of a cell.
     """
-    walls = evidence.walls.points
     if not len(walls):
         return np.zeros(0, dtype=np.intp), 0.0
-    if rectifier is not None:
-        ring, walls = rectifier.rectify(ring), rectifier.rectify(walls)
-    height = (1.0 if evidence.is_hole else -1.0) * depth_inside(ring, walls) / pitch_px
+    height = (1.0 if is_hole else -1.0) * depth_inside(ring, walls) / pitch_px
     outside = height > _OUTSIDE
     apart = np.hypot(*(walls - np.roll(walls, 1, axis=0)).T) > _CHAIN_BREAKS * pitch_px
     starts = np.flatnonzero(outside & (~np.roll(outside, 1) | apart))

@@ -55,7 +55,7 @@ def bump(wide: float, high: float) -> NDArray[np.float64]:
 @pytest.mark.parametrize("wide", [0.7, 1.0, 2.0])
 def test_a_wall_that_comes_back_to_the_outline_elsewhere_is_overlooked(wide: float) -> None:
     evidence = with_walls(witnesses(BLOCK, seed=1), bump(wide, 0.4))
-    bounds, height = overlooked(evidence, BLOCK, PITCH, None)
+    bounds, height = overlooked(evidence.walls.points, BLOCK, PITCH, is_hole=False)
     assert len(bounds) >= 1
     assert abs(height - 0.4) < 0.1
     assert (evidence.walls.points[bounds][:, 1] < 200.0).all()
@@ -64,12 +64,12 @@ def test_a_wall_that_comes_back_to_the_outline_elsewhere_is_overlooked(wide: flo
 @pytest.mark.parametrize(("wide", "high"), [(0.1, 0.4), (0.3, 2.0), (0.4, 0.3), (0.8, 1.4)])
 def test_an_end_of_a_wall_or_debris_that_touches_is_not_overlooked(wide: float, high: float) -> None:
     evidence = with_walls(witnesses(BLOCK, seed=1), bump(wide, high))
-    assert overlooked(evidence, BLOCK, PITCH, None)[1] == 0.0
+    assert overlooked(evidence.walls.points, BLOCK, PITCH, is_hole=False)[1] == 0.0
 
 
 def test_walls_behind_a_zigzag_edge_are_not_overlooked() -> None:
     evidence = with_walls(witnesses(BLOCK, seed=1), bump(3.0, 0.12))
-    assert overlooked(evidence, BLOCK, PITCH, None)[1] == 0.0
+    assert overlooked(evidence.walls.points, BLOCK, PITCH, is_hole=False)[1] == 0.0
 
 
 def test_a_bump_is_overlooked_wherever_its_chain_begins() -> None:
@@ -77,18 +77,18 @@ def test_a_bump_is_overlooked_wherever_its_chain_begins() -> None:
     for first in range(0, len(chain), 5):
         turned = np.concatenate([chain[first:], chain[:first]])
         evidence = with_walls(witnesses(BLOCK, seed=1), turned)
-        assert overlooked(evidence, BLOCK, PITCH, None)[1] == pytest.approx(0.4, abs=0.1)
+        assert overlooked(evidence.walls.points, BLOCK, PITCH, is_hole=False)[1] == pytest.approx(0.4, abs=0.1)
 
 
 def test_walls_in_a_hole_are_overlooked_on_the_side_of_the_opening() -> None:
     hole = with_walls(witnesses(BLOCK, seed=1, hole=True), bump(1.0, -0.4))
-    assert overlooked(hole, BLOCK[::-1], PITCH, None)[1] == pytest.approx(0.4, abs=0.1)
+    assert overlooked(hole.walls.points, BLOCK[::-1], PITCH, is_hole=True)[1] == pytest.approx(0.4, abs=0.1)
     assert overlooked(with_walls(hole, bump(1.0, 0.4)), BLOCK[::-1], PITCH, None)[1] == 0.0
 
 
 def test_the_evidence_keeps_its_own_order_beside_its_bounds() -> None:
     evidence = with_walls(witnesses(BLOCK, seed=1), bump(1.0, 0.4))
-    bounds, _ = overlooked(evidence, BLOCK, PITCH, None)
+    bounds, _ = overlooked(evidence.walls.points, BLOCK, PITCH, is_hole=False)
     more, own = with_bounds(evidence, bounds)
     assert (more.points[own] == evidence.points).all()
     assert (np.diff(more.position) >= 0.0).all()
@@ -138,7 +138,7 @@ def test_an_outline_is_found_though_no_line_goes_past_all_that_it_leaves_out(hei
     block = rectangle(1.2 * height, height, angle=0.0)
     evidence = witnesses(block, seed=seed, spacing=perimeter(block) / 16)
     crowded = with_walls(evidence, *crags(block, seed))
-    bounds, _ = overlooked(crowded, fit_ring(evidence, **FIT).ring, PITCH, None)
+    bounds, _ = overlooked(crowded.walls.points, fit_ring(evidence, **FIT).ring, PITCH, is_hole=False)
     assert len(bounds) > 5 * len(evidence.points)
     assert 3 <= len(fit_ring(crowded, **FIT).ring) < 100
 

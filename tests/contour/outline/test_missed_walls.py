@@ -83,7 +83,8 @@ def test_a_bump_is_overlooked_wherever_its_chain_begins() -> None:
 def test_walls_in_a_hole_are_overlooked_on_the_side_of_the_opening() -> None:
     hole = with_walls(witnesses(BLOCK, seed=1, hole=True), bump(1.0, -0.4))
     assert overlooked(hole.walls.points, BLOCK[::-1], PITCH, is_hole=True)[1] == pytest.approx(0.4, abs=0.1)
-    assert overlooked(with_walls(hole, bump(1.0, 0.4)), BLOCK[::-1], PITCH, None)[1] == 0.0
+    bumped = with_walls(hole, bump(1.0, 0.4))
+    assert overlooked(bumped.walls.points, BLOCK[::-1], PITCH, is_hole=True)[1] == 0.0
 
 
 def test_the_evidence_keeps_its_own_order_beside_its_bounds() -> None:

@@ -52,4 +52,4 @@ def quantiles(values: NDArray[Any], shares: tuple[float, ...]) -> Float64s:
 
 def distinct(numbers: NDArray[Any]) -> Indices:
     """The numbers, none negative, each once, rising."""
-    return np.flatnonzero(np.bincount(numbers))
+    return np.flatnonzero(np.bincount(numbers.ravel()))

@@ -24,6 +24,8 @@ _FARTHER_IN, _BEYOND = np.array([-1.5, -2.0]), np.array([0.4, 0.6, 0.8])
 # No line through comb goes so far without a wall; what is finer is noise. Over how much of the edge the comb farther in
 # is taken together, and how near to what hides or fills it nothing is said.
 _CELL, _FINE, _COMB_OVER, _BESIDE = 1.3, 0.12, 6.0, 1.0
+# Nothing is looked at so far out, nor what blurs into it.
+_AROUND = 1.0
 # Of the changes of light farther in: those where no cells are, and what both sides of the outline differ by where they
 # are alike; and over how much of it, pitches. The more bare and alike, the shorter: a corner drawn past the block's own
 # is no longer than that.
@@ -40,14 +42,13 @@ def bare_edge(traced: Trace, pitch_px: float) -> EdgePart | None:
 
     What the trace's evidence tells as hidden or filled is left out.
     """
-    fine = max(1, round(_FINE * pitch_px))
-    light = np.asarray(cv2.blur(traced.light, (fine, fine)), np.uint8)
+    light, first = _about(traced, pitch_px)
     out_px = float(np.sign(signed_area(traced.contour.exterior))) * pitch_px
     found: list[EdgePart] = []
     for number, ring in enumerate(traced.contour.rings):
         lengths = RingLengths.of(ring)
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
-        changes, apart = _within(light, lengths, at, out_px)
+        changes, apart = _within(light, RingLengths.of(ring - first), at, out_px)
         judged = ~_known(traced, number, at, _BESIDE * pitch_px)
         for quiet, alike, long in _BARE:
             chosen = judged & (changes < quiet) & (apart < alike)
@@ -57,6 +58,16 @@ def bare_edge(traced: Trace, pitch_px: float) -> EdgePart | None:
             if part is not None and part.length_pitches > long:
                 found.append(part)
     return max(found, key=lambda one: one.length_pitches) if found else None
+
+
+def _about(traced: Trace, pitch_px: float) -> tuple[Bytes, Float64s]:
+    """Light about the contour without what is finer than a share of a cell, and its first pixel (x, y)."""
+    fine = max(1, round(_FINE * pitch_px))
+    exterior, margin = traced.contour.exterior, _AROUND * pitch_px
+    left, top = np.maximum(np.floor(exterior.min(axis=0) - margin), 0).astype(int).tolist()
+    right, bottom = np.maximum(np.ceil(exterior.max(axis=0) + margin), 0).astype(int).tolist()
+    about = traced.light[top : bottom + 1, left : right + 1]
+    return np.asarray(cv2.blur(about, (fine, fine)), np.uint8), np.array([left, top], np.float64)
 
 
 def _known(traced: Trace, ring: int, at: Float64s, beside_px: float) -> Bools:

@@ -17,6 +17,7 @@ from contour.walls.wall_mask import wall_mask
 
 _TILE_PX = 512
 _TILES = 4
+_LARGE_PX = 24_000_000
 # First guesses of the pitch; the mask's windows forgive a factor of two either way.
 _GUESSES = (24.0, 70.0, 8.0)
 _GOOD_SCORE = 0.2
@@ -114,7 +115,8 @@ def _parts(light: Bytes) -> Iterator[tuple[Bytes, int]]:
 def _busiest_tiles(light: Bytes) -> list[Bytes]:
     """Tiles of up to 512 px with the most local contrast, busiest first, apart from each other."""
     block = 32
-    sample = light[::4, ::4].astype(np.float32)
+    hop = 4 if light.size < _LARGE_PX else 8
+    sample = light[::hop, ::hop].astype(np.float32)
     shape = (max(1, light.shape[1] // block), max(1, light.shape[0] // block))
     mean = cv2.resize(sample, shape, interpolation=cv2.INTER_AREA)
     square = cv2.resize(sample * sample, shape, interpolation=cv2.INTER_AREA)

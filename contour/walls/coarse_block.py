@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes, median
+from contour.geometry.arrays import Bytes, Int32s, median
 from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_grid import averaged
 from contour.walls.coarse_rings import PAD, CoarseBlock, sides, with_rings
@@ -35,6 +35,10 @@ _THIN_PITCHES = 0.8
 _OUT_PITCHES = 2.3
 
 
+Pieces = tuple[Int32s, Int32s]
+"""The number of the piece of walls each sample lies in, (H, W), 0 in none, and OpenCV's statistics of each."""
+
+
 def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch_px` pixels wide.
 
@@ -46,8 +50,10 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = _padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch_px / step
-    kept = _main_piece(walls, samples)
-    filled, kept = _linked(walls, kept, _close(kept, _CLOSING_PITCHES * samples), samples)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    pieces = np.asarray(labels, np.int32), np.asarray(stats, np.int32)
+    kept = _main_piece(pieces, samples)
+    filled, kept = _linked(pieces, kept, _close(kept, _CLOSING_PITCHES * samples), samples)
     filled = without_threads(_largest(filled | kept), samples)
     kept &= filled
     shade = _padded(averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
@@ -60,13 +66,13 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     return with_rings(filled, kept, _strands(walls & (1 - kept), samples), step, samples)
 
 
-def _main_piece(walls: Bytes, samples: float) -> Bytes:
+def _main_piece(pieces: Pieces, samples: float) -> Bytes:
     """The walls of the largest piece of comb; `samples` is the pitch on the coarse grid. Raises NoBlockFound.
 
     Chips and neighbouring pieces may lie nearer than the closing reaches, but do not hang together with the block. Only
     where no piece holds most of the walls (a faint block seen in fragments) all fragments of several cells are taken.
     """
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    labels, stats = pieces
     area = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
     area[0] = 0
     size = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
@@ -96,7 +102,7 @@ def _close(walls: Bytes, radius: float) -> Bytes:
     return np.asarray(shrunk[pad:-pad, pad:-pad] | walls, np.uint8)
 
 
-def _linked(walls: Bytes, kept: Bytes, filled: Bytes, samples: float) -> tuple[Bytes, Bytes]:
+def _linked(pieces: Pieces, kept: Bytes, filled: Bytes, samples: float) -> tuple[Bytes, Bytes]:
     """The filled block and its walls with a thin line across every gap of less than a cell that leads into an opening.
 
     Closing joins what lies side by side, but not the ends of a strand of walls between an opening and the table. Grown
@@ -104,7 +110,7 @@ def _linked(walls: Bytes, kept: Bytes, filled: Bytes, samples: float) -> tuple[B
     are walls of the block then.
     """
     reach = 0.5 * _LINK_PITCHES * samples
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    labels, stats = pieces
     size = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
     small = (size > _SPECK_PITCHES * samples) & (size < _FRAGMENT_PITCHES * samples)
     small[0] = False

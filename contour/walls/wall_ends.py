@@ -118,6 +118,7 @@ def outermost(chains: Chains, coarse: CoarseBlock, pitch_px: float) -> Int64s:
     _, _, normal = coarse.feet(chains.points[peak])
     peak = peak[(chains.free_side(peak, 3) * normal).sum(axis=1) > 0]
     points, level = chains.points[peak], height[peak]
-    close = ((points[:, None, :] - points[None, :, :]) ** 2).sum(axis=2) < pitch_px * pitch_px
+    x, y = points[:, 0], points[:, 1]
+    close = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 < pitch_px * pitch_px
     envelope = np.where(close, level[None, :], -np.inf).max(axis=1) if len(peak) else level
     return np.asarray(peak[level > envelope - pitch_px / 3], np.int64)

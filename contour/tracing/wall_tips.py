@@ -21,7 +21,7 @@ from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import pieces_beside
-from contour.walls.see_block import see_block
+from contour.walls.see_block import see_block, see_walls
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
 from contour.walls.wall_mask import wall_mask
 
@@ -101,8 +101,9 @@ def looked_at(
     """What is seen of the block, and of what lies on it and around it: once more where that hides some of its edge."""
     hidden: Bytes | None = None
     plain = False
+    walls = see_walls(picture, light, settings.polarity)
     for _ in range(_LOOKS):
-        seen = see_block(picture, light, settings.polarity, lambda: on_stage("mask"), hidden=hidden)
+        seen = see_block(walls, lambda: on_stage("mask"), hidden=hidden)
         look = table_look(picture, seen, plain=plain)
         if not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
             break

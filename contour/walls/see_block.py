@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -35,18 +35,23 @@ _DARK_POINTS_PER_PITCH = 4
 _STRANDS_PITCHES = 5.0
 
 
-def see_block(
-    picture: Bytes,
-    light: Bytes,
-    polarity: str,
-    on_mask: Callable[[], None] = lambda: None,
-    *,
-    hidden: Bytes | None = None,
-) -> BlockEvidence:
-    """Witnesses of the largest block in a picture, grey (H, W) or BGR (H, W, 3), uint8.
+@dataclass(frozen=True, eq=False)
+class SeenWalls:
+    """Walls of a picture, whatever hides them: the light they were seen in, (H, W), and the same `scale` times smaller,
+    their cells, and their mask in the smaller one.
+    """
 
-    `light` is its `wall_light`. `on_mask` is called when the wall mask is made. `hidden`, (h, w), not 0 where something
-    hides the block, on a grid of any size over the picture: no walls are seen there. Raises NoBlockFound.
+    light: Bytes
+    small: Bytes
+    scale: int
+    cells: CellScale
+    mask: WallMask
+
+
+def see_walls(picture: Bytes, light: Bytes, polarity: str) -> SeenWalls:
+    """The walls in a picture, grey (H, W) or BGR (H, W, 3), uint8, of which `light` is the `wall_light`.
+
+    Raises NoBlockFound.
     """
     cells = probe(light, polarity)
     if picture.ndim == 3:
@@ -66,7 +71,19 @@ def see_block(
             f"no block found: cells of {cells.pitch_px:.0f} px with a contrast of {seen.contrast:.0f} grey levels look "
             "like noise. Check the light, and that a block lies in view"
         )
-    seen = without_specks(_visible(seen, hidden), cells.pitch_px / scale, cells.wall_px / scale)
+    return SeenWalls(light, small, scale, cells, seen)
+
+
+def see_block(
+    walls: SeenWalls, on_mask: Callable[[], None] = lambda: None, *, hidden: Bytes | None = None
+) -> BlockEvidence:
+    """Witnesses of the largest block among the walls of a picture, in its pixels.
+
+    `on_mask` is called when the mask of what belongs to blocks is made. `hidden`, (h, w), not 0 where something hides
+    the block, on a grid of any size over the picture: no walls are seen there. Raises NoBlockFound.
+    """
+    small, scale, cells = walls.small, walls.scale, walls.cells
+    seen = without_specks(_visible(walls.mask, hidden), cells.pitch_px / scale, cells.wall_px / scale)
     midway = None if cells.bright else midway_to_table(small, cells.level, seen.contrast)
     if midway is not None:
         # Such a block is told from the table by its darkness: fainter walls would be more of its cells' own shades.
@@ -78,7 +95,7 @@ def see_block(
     seen = replace(seen, mask=without_loose_pieces(every, cells.pitch_px / scale))
     coarse = coarse_block(seen.mask, small, cells.pitch_px / scale)
     others = pieces_beside(every, coarse.rings[0].vertices, cells.pitch_px / scale, scale)
-    evidence = block_evidence(light, seen, coarse, cells, scale, midway)
+    evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from contour.edge.table_look import TableLook, table_look
 from contour.edge.visible_edge import doubtful
 from contour.walls.lightness import wall_light
-from contour.walls.see_block import see_block
+from contour.walls.see_block import see_block, see_walls
 from contour.walls.wall_evidence import BlockEvidence
 from tests.support.pictures.small_scenes import block
 
@@ -25,7 +25,7 @@ PITCH = 20.0
 def plain(name: str = "rectangle") -> tuple[Picture, BlockEvidence]:
     """A grey picture and the block seen in it; things painted later leave the block as it was seen."""
     picture = block(name).picture
-    return picture, see_block(picture, wall_light(picture), "auto")
+    return picture, see_block(see_walls(picture, wall_light(picture), "auto"))
 
 
 def middle_of_an_edge(name: str = "rectangle") -> NDArray[np.float64]:

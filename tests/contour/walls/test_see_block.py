@@ -29,7 +29,7 @@ from contour.synthetic import (
 from contour.walls.cell_scale import probe
 from contour.walls.coarse_block import coarse_block
 from contour.walls.lightness import light_from_table, wall_light
-from contour.walls.see_block import see_block
+from contour.walls.see_block import see_block, see_walls
 from contour.walls.wall_evidence import BlockEvidence, WitnessKind
 from contour.walls.wall_mask import wall_mask
 
@@ -70,7 +70,7 @@ def picture(
 
 def seen_in(picture: NDArray[np.uint8], polarity: str) -> BlockEvidence:
     """The block as it is seen in the picture's own light."""
-    return see_block(picture, wall_light(picture), polarity)
+    return see_block(see_walls(picture, wall_light(picture), polarity))
 
 
 @pytest.mark.parametrize("pitch_mm", [3.0, 5.0, 8.0, 14.0, 22.0])
@@ -151,7 +151,7 @@ def test_no_walls_are_seen_in_what_hides_the_block() -> None:
     hidden = np.zeros((150, 200), np.uint8)
     x, y = (corner / 4).astype(int)
     hidden[max(0, y - 15) : y + 15, max(0, x - 15) : x + 15] = 1
-    found = see_block(rendered.picture, wall_light(rendered.picture), "auto", hidden=hidden).rings[0].points
+    found = see_block(see_walls(rendered.picture, wall_light(rendered.picture), "auto"), hidden=hidden).rings[0].points
     assert np.abs(found - corner).max(axis=1).min() > 50
     far = np.abs(plain - corner).max(axis=1) > 120
     nearest = np.hypot(*np.moveaxis(plain[far][:, None] - found, 2, 0)).min(axis=1)

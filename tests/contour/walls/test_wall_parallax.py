@@ -18,7 +18,7 @@ from contour.synthetic import (
     render,
 )
 from contour.walls.lightness import wall_light
-from contour.walls.see_block import see_block
+from contour.walls.see_block import see_block, see_walls
 from contour.walls.wall_evidence import WitnessKind
 
 
@@ -58,6 +58,6 @@ def test_ribbons_thicker_than_other_walls_are_no_parallax_that_moves_wall_ends_i
         seed=1039,
     )
     seen = render(scene)
-    ring = see_block(seen.picture, wall_light(seen.picture), "auto").rings[0]
+    ring = see_block(see_walls(seen.picture, wall_light(seen.picture), "auto")).rings[0]
     off = distances_to(ring.points[ring.kind == WitnessKind.CLEAN], seen.truth_px)
     assert sorted(off)[int(0.8 * len(off))] < 0.8

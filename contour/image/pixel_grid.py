@@ -29,8 +29,20 @@ def averaged(picture: Bytes, step: int, border: int = cv2.BORDER_CONSTANT) -> By
     """Mean over the pixels of each sample, (H, W); the last ones are filled up by a border of OpenCV's, constant 0."""
     if step == 1:
         return picture
-    wide, high = -picture.shape[1] % step, -picture.shape[0] % step
-    even = cv2.copyMakeBorder(picture, 0, high, 0, wide, border, value=0) if wide or high else picture
+    # No more is filled up than what is left over, for that takes a copy.
+    high, wide = (size // step * step for size in picture.shape)
+    means = [
+        _filled_averaged(part, step, border) for part in (picture[:high, :wide], picture[:high, wide:]) if part.size
+    ]
+    rows = [np.hstack(means)] if means else []
+    if high < picture.shape[0]:
+        rows.append(_filled_averaged(picture[high:], step, border))
+    return np.vstack(rows)
+
+
+def _filled_averaged(part: Bytes, step: int, border: int) -> Bytes:
+    wide, high = -part.shape[1] % step, -part.shape[0] % step
+    even = cv2.copyMakeBorder(part, 0, high, 0, wide, border, value=0) if wide or high else part
     size = (even.shape[1] // step, even.shape[0] // step)
     return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
 

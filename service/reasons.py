@@ -41,6 +41,7 @@ class Reason(IntEnum):
     OUTSIDE_WORK_AREA = 115
     SEVERAL_BLOCKS = 116
     EDGE_COVERED = 117
+    PART_DOES_NOT_FIT = 119
     BUSY = 120
     NOT_READY = 121
     UNKNOWN_RECIPE = 122
@@ -207,6 +208,18 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
         Explanation(
             "Кромка заготовки чем-то закрыта.",
             "Уберите то, что лежит на кромке: ленту, прижим, руку, кабель; на снимке это место отмечено красным.",
+        ),
+    ),
+    Reason.PART_DOES_NOT_FIT: (
+        Explanation(
+            "The recipe's part does not fit into the block with its margin.",
+            "Lay a larger block there, or check the part, its margin and the turns allowed; the overlay shows the "
+            "tightest place.",
+        ),
+        Explanation(
+            "Деталь из рецепта не помещается в заготовку с нужным припуском.",
+            "Положите заготовку побольше либо проверьте чертёж детали, припуск и разрешённые повороты; самое узкое "
+            "место отмечено на снимке.",
         ),
     ),
     Reason.BUSY: (

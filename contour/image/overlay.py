@@ -21,6 +21,7 @@ REFUSED: Colour = (60, 60, 240)
 HOLE: Colour = (230, 170, 40)
 VERTEX: Colour = (40, 220, 250)
 DOUBTED: Colour = (85, 138, 255)
+PART: Colour = (240, 110, 220)
 """Blue, green, red. Readable on both dark and bright, and apart for people who tell red from green poorly."""
 
 _TEXT: Colour = (235, 235, 235)
@@ -54,6 +55,18 @@ class Hidden:
     covered: bool
 
 
+@dataclass(frozen=True)
+class DrawnPart:
+    """A part laid into the block, in pixels: its outline, how wide a margin it needs around it, where it is tightest
+    (a place on its outline and one on the block's), and whether it fits.
+    """
+
+    outline: Contour
+    margin_px: float
+    tightest: tuple[tuple[float, float], tuple[float, float]]
+    fits: bool
+
+
 def draw_overlay(
     picture: Bytes,
     contour_px: Contour | None,
@@ -64,6 +77,7 @@ def draw_overlay(
     uncertainty_px: float | None = None,
     others_px: Sequence[Ring] = (),
     hidden: Sequence[Hidden] = (),
+    part: DrawnPart | None = None,
 ) -> Bytes:
     """The picture as BGR, shape (H, W, 3), with the contour, its vertices and lines of text; the input stays as it is.
 
@@ -72,7 +86,9 @@ def draw_overlay(
     Exterior green, or red where `refused`, holes blue, vertices yellow (without `marks` none). The first caption line
     is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `others_px`,
     outlines of what lies besides, are drawn like the exterior, without vertices. Of `hidden` parts bridged ones are
-    dashed, covered ones red and wide; the rest of a refused exterior then is orange. Raises PictureError.
+    dashed, covered ones red and wide; the rest of a refused exterior then is orange. A `part` is drawn in violet, or
+    red where it does not fit, its margin as a veil around it, its tightest place as a line with dots. Raises
+    PictureError.
     """
     check_picture(picture)
     canvas = _cv.bgr(picture)
@@ -87,13 +103,15 @@ def draw_overlay(
             _draw_band(canvas, contour_px, uncertainty_px, unit)
         for hole in contour_px.holes:
             _draw_ring(canvas, hole, HOLE, unit)
-        doubted = any(part.covered for part in hidden)
+        doubted = any(one.covered for one in hidden)
         _draw_ring(canvas, contour_px.exterior, (DOUBTED if doubted else REFUSED) if refused else ACCEPTED, unit)
-        for part in hidden:
-            _draw_hidden(canvas, RingLengths.of(contour_px.rings[part.ring]), part, unit)
+        for one in hidden:
+            _draw_hidden(canvas, RingLengths.of(contour_px.rings[one.ring]), one, unit)
         if marks and contour_px.point_count <= _MOST_MARKS:
             for ring in contour_px.rings:
                 _mark_vertices(canvas, ring, unit)
+    if part is not None:
+        _draw_part(canvas, part, unit)
     if refused:
         canvas = text.above(canvas)
     text.write(canvas, REFUSED if refused else ACCEPTED, unit)
@@ -142,6 +160,23 @@ def _draw_band(canvas: Bytes, contour_px: Contour, half_px: float, unit: float) 
         )
     inside = band > 0
     canvas[inside] = (canvas[inside] * (1.0 - _VEIL) + np.array(VERTEX) * _VEIL).astype(np.uint8)
+
+
+def _draw_part(canvas: Bytes, part: DrawnPart, unit: float) -> None:
+    rings = [_fixed_point(ring).reshape(-1, 1, 2) for ring in part.outline.rings]
+    around, inside = np.zeros(canvas.shape[:2], np.uint8), np.zeros(canvas.shape[:2], np.uint8)
+    # OpenCV draws no wider than 32767 px, and no picture has a margin of so many.
+    width = max(min(round(2.0 * part.margin_px), 32_767), 1)
+    cv2.polylines(around, rings, True, 255, width, cv2.LINE_8, _FRACTION_BITS)
+    cv2.fillPoly(inside, rings, 255, cv2.LINE_8, _FRACTION_BITS)
+    veiled = (around > 0) & (inside == 0)
+    canvas[veiled] = (canvas[veiled] * (1.0 - _VEIL) + np.array(PART) * _VEIL).astype(np.uint8)
+    for ring in part.outline.rings:
+        _draw_ring(canvas, ring, PART if part.fits else REFUSED, unit)
+    ends = np.array(part.tightest)
+    _draw_path(canvas, ends, (0, 0, 0), _line_width(unit) + 4)
+    _draw_path(canvas, ends, VERTEX, _line_width(unit) + 2)
+    _mark_vertices(canvas, ends, 1.6 * unit)
 
 
 def _line_width(unit: float) -> int:

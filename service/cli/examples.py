@@ -18,6 +18,14 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "The outline at the top of a block of 20 mm, for CAD.",
         ),
     ),
+    "fit": (
+        ("combtrace fit block.png --part part.dxf --calibration calibration.yaml", "Where the part lies best."),
+        (
+            "combtrace fit block.png --part part.dxf --margin-mm 3 --rotation 4 --config config.yaml --json -",
+            "As the recipe traces, quarter turns only, for a script.",
+        ),
+        ("combtrace fit block.png --part part.svg --config config.yaml --overlay laid.png", "Draw it, to look at."),
+    ),
     "judge": (
         ("combtrace judge pictures/ --page judged.html", "How well your own blocks are traced."),
         ("combtrace judge pictures/ --config config.yaml --recipe 2 --json -", "With a recipe, for a script."),

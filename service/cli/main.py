@@ -13,7 +13,15 @@ from service.cli.errors import EXIT_UNUSABLE, UserError
 from service.cli.examples import examples_of
 
 MODULES = (  # of this package, in the order of `--help`
-    *("daemon.run", "pictures.trace", "pictures.judge", "daemon.demo", "daemon.check", "daemon.trigger"),
+    *(
+        "daemon.run",
+        "pictures.trace",
+        "pictures.fit",
+        "pictures.judge",
+        "daemon.demo",
+        "daemon.check",
+        "daemon.trigger",
+    ),
     *("controller.simulate_controller", "controller.simulate_service"),
     *("pictures.cameras", "pictures.grab", "pictures.focus"),
     *("calibration.board", "calibration.calibrate", "calibration.align", "calibration.verify", "calibration.repeat"),

@@ -140,7 +140,9 @@ def _resolved(config: Config, folder: Path) -> Config:
 
 
 def _resolved_recipe(recipe: Recipe, folder: Path) -> Recipe:
-    if recipe.gcode.template is None:
-        return recipe
-    gcode = recipe.gcode.model_copy(update={"template": folder / recipe.gcode.template})
-    return recipe.model_copy(update={"gcode": gcode})
+    updates: dict[str, Any] = {}
+    if recipe.gcode.template is not None:
+        updates["gcode"] = recipe.gcode.model_copy(update={"template": folder / recipe.gcode.template})
+    if recipe.part is not None:
+        updates["part"] = recipe.part.model_copy(update={"file": folder / recipe.part.file})
+    return recipe.model_copy(update=updates) if updates else recipe

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from contour.polygon.start_vertex import Start
     from contour.tracing.trace import Method
+    from service.config.recipes import PartToCut
 
 
 @dataclass(frozen=True)
@@ -35,4 +36,5 @@ class PlainRecipe:
     bridge: Literal["straight", "arcs"] = "straight"
     roi_px: tuple[float, ...] = ()
     roi_mm: tuple[float, ...] = ()
+    part: PartToCut | None = None
     parameters: dict[str, float] = field(default_factory=dict)

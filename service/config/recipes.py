@@ -6,6 +6,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from contour.errors import ParameterError
+from contour.placement.pose import MOST_STEPS, Turns
 from contour.polygon.start_vertex import Start
 from contour.tracing.trace import Method
 from service.config.plain_recipe import PlainRecipe
@@ -39,6 +41,48 @@ class Gcode(Model):
         0, ge=0, le=1000, description="Straight way onto each ring through what is no material, mm; 0 = none."
     )
     template: FilePath | None = Field(None, description="Program around $rings; none = one for LinuxCNC.")
+
+
+class PartToCut(Model):
+    """The part that is to be cut from the block: it must fit, or the block is refused (119)."""
+
+    file: FilePath = Field(description="Its drawing: .dxf, .svg, .geojson or .json.")
+    units: Literal["um", "mm", "cm", "m", "in"] | None = Field(
+        None, description="Unit of a drawing that does not say its own; none is guessed."
+    )
+    layer: str = Field(
+        "", max_length=255, description="Layer, or group of an SVG, that it is on; empty = the whole file."
+    )
+    margin_mm: float = Field(
+        0,
+        ge=0,
+        le=1000,
+        description="Least distance to the block's edge and holes, mm, besides the contour's own bound.",
+    )
+    rotation: Literal["free", "fixed"] | Annotated[int, Field(ge=1, le=MOST_STEPS)] = Field(
+        "free", description="free: any turn; fixed: as drawn; a number: that many equal steps of the circle."
+    )
+    ribbon_angle_deg: Annotated[Number, Field(ge=-360, le=360)] | None = Field(
+        None,
+        description="Direction of the core's ribbon in the machine frame, degrees from x counter-clockwise: the "
+        "drawing's x axis comes to lie along it, either way round; none = it does not matter.",
+    )
+    ribbon_tolerance_deg: float = Field(2, ge=0, le=90, description="How far from it the part may be turned, degrees.")
+
+    @property
+    def turns(self) -> Turns:
+        """The turns that the part may take."""
+        steps = {"free": None, "fixed": 1}.get(str(self.rotation), self.rotation)
+        turns = Turns.free() if steps is None else Turns.steps(int(steps))
+        return turns if self.ribbon_angle_deg is None else turns.along(self.ribbon_angle_deg, self.ribbon_tolerance_deg)
+
+    @model_validator(mode="after")
+    def _may_be_turned_somehow(self) -> Self:
+        try:
+            assert self.turns.intervals
+        except ParameterError as error:
+            raise ValueError(str(error)) from error
+        return self
 
 
 class Recipe(Model):
@@ -107,6 +151,7 @@ class Recipe(Model):
         (), description="Forms in which an accepted contour is kept in the archive: dxf, svg, geojson, gcode."
     )
     gcode: Gcode = Field(Gcode(), description="How G-code moves.")
+    part: PartToCut | None = Field(None, description="The part that is to be cut from the block; none = not checked.")
     parameters: dict[str, Number] = Field(
         default_factory=dict, description="Sizes of the method; left out, they follow from the picture."
     )
@@ -156,6 +201,7 @@ class Recipe(Model):
             "margin_mm": self.margin_mm,
             "start": isinstance(self.start, tuple),
             "max_bridged_mm": self.max_bridged_mm,
+            "part": self.part is not None,
         }
         return next((key for key, value in meant.items() if value), None)
 

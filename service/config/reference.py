@@ -38,6 +38,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`triggers`", (triggers.IntervalTrigger, triggers.ControllerTrigger, triggers.SerialTrigger)),
     ("`recipes`", (recipes.Recipe,)),
     ("A recipe's `gcode`", (recipes.Gcode,)),
+    ("A recipe's `part`", (recipes.PartToCut,)),
     ("`table`", (config.Table,)),
     ("`service`", (config.Service,)),
     ("`journal`", (config.JournalSettings,)),

@@ -31,6 +31,7 @@ from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from service.measuring.measurement import Measurement
+from service.measuring.part_trial import PartTrial
 from service.reasons import Reason, Rejection
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ class Measurer:
         self._table = table
         self._clock = clock
         self._doubted: set[int] = set()
+        self.parts = PartTrial()
 
     @property
     def guard(self) -> CalibrationGuard | None:
@@ -126,6 +128,9 @@ class Measurer:
             findings = (*result.findings, *self._guard.findings(picture, camera))
             result = replace(result, findings=tuple(sorted(findings, key=lambda finding: finding[0])))
             watch.lap("guard")
+        if recipe.part is not None:
+            result = self.parts.tried(result, recipe.part, self._calibration)
+            watch.lap("part")
         doubt = step_doubt(recipe, result.pitch_px)
         if doubt and recipe.number not in self._doubted:
             self._doubted.add(recipe.number)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from contour.acceptance.sent_evidence import SentStretch
 from contour.geometry.rings import Contour, Ring
 from contour.image.overlay import Hidden
 from service.reasons import Reason, Rejection
+
+if TYPE_CHECKING:
+    from service.parts.fit import PartFit
 
 _STRETCH_FIELDS = ("ring", "from_px", "to_px", "from_mm", "to_mm", "state", "by", "bound_px", "bound_mm")
 
@@ -24,6 +27,7 @@ class Measurement:
     pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
     has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
     was refused (116). evidence: what the contour rests on, stretches along its rings; None where nobody says.
+    part: the recipe's part in it; None where the recipe has none, or the contour was refused before it was tried.
     """
 
     method: str
@@ -37,6 +41,7 @@ class Measurement:
     uncertainty_px: float | None = None
     uncertainty: ErrorBudget | None = None
     evidence: tuple[SentStretch, ...] | None = None
+    part: PartFit | None = None
     thickness_mm: float | None = None
     aligned: bool = False
     quality: Quality | None = None
@@ -57,6 +62,13 @@ class Measurement:
     def uncertainty_mm(self) -> float | None:
         """95 % bound on the position of the polygon that is sent, all causes together; None where it is not known."""
         return None if self.uncertainty is None else self.uncertainty.total_mm
+
+    @property
+    def largest_bound_mm(self) -> float | None:
+        """The bound that holds all along the contour, also where it was bridged; None where it is not known."""
+        if self.uncertainty_mm is None:
+            return None
+        return max([self.uncertainty_mm, *(part.bound_mm for part in self.evidence or () if part.bound_mm is not None)])
 
     @property
     def size_mm(self) -> tuple[float, float] | None:
@@ -90,6 +102,7 @@ class Measurement:
             "area_mm2": _rounded(self.area_mm2),
             "uncertainty_mm": _rounded(self.uncertainty_mm),
             "thickness_mm": self.thickness_mm,
+            **({} if self.part is None else {"part": self.part.summary()}),
             "quality": None if self.quality is None else {k: _rounded(v) for k, v in asdict(self.quality).items()},
             "timings_ms": {name: _rounded(value) for name, value in self.timings_ms.items()},
         }

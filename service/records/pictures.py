@@ -27,6 +27,7 @@ def write_overlay(path: Path, picture: NDArray[np.uint8], measurement: Measureme
         uncertainty_px=measurement.uncertainty_px,
         others_px=measurement.other_blocks_px,
         hidden=measurement.hidden,
+        part=None if measurement.part is None else measurement.part.drawn,
     )
     write_picture(path, drawn)
 
@@ -60,4 +61,7 @@ def caption(measurement: Measurement) -> list[str]:
         found += f", within {measurement.uncertainty_mm:.2f} mm"
     elif measurement.uncertainty_px is not None:
         found += f", within {measurement.uncertainty_px:.1f} px"
-    return [verdict, found]
+    part = measurement.part
+    if part is None:
+        return [verdict, found]
+    return [verdict, found, f"{part.part.path.name}: margin {part.margin_mm:.2f} mm, needed {part.needed_mm:.2f} mm"]

@@ -15,6 +15,7 @@ from service.measuring.calibration_file import CalibrationChanged, CalibrationFi
 from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
 from service.measuring.measure import Measurer
 from service.measuring.table_file import TableFileError, TableRecord
+from service.parts.part import PartFileError
 from service.reasons import Reason
 from service.wiring.errors import WiringError
 
@@ -28,6 +29,7 @@ def make_plan(config: Config) -> tuple[Plan, Fault | None]:
         work_area_mm=work_area(config),
         table=find_table(config),
     )
+    read_parts(measurer, config)
     return plan_of(measurer, config), fault
 
 
@@ -67,6 +69,17 @@ def find_table(config: Config) -> TableRecord | None:
         return None if config.table is None else table_file.find_table(config.table.file)
     except TableFileError as error:
         raise WiringError(str(error)) from error
+
+
+def read_parts(measurer: Measurer, config: Config) -> None:
+    """Have the measurer read the parts of all recipes; raise WiringError where one cannot be used."""
+    for recipe in config.recipes:
+        if recipe.part is None:
+            continue
+        try:
+            measurer.parts.part_of(recipe.part)
+        except PartFileError as error:
+            raise WiringError(f"recipe {recipe.number}: part: {error}") from error
 
 
 def work_area(config: Config) -> NDArray[np.float64] | None:

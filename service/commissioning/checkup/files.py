@@ -8,6 +8,7 @@ import numpy as np
 
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
+from contour.geometry.rings import bounding_box
 from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.commissioning.checkup.page import check_page
 from service.config.config import Config
@@ -15,6 +16,8 @@ from service.config.recipes import Gcode
 from service.export.recipe_exports import trial
 from service.measuring.calibration_guard import CalibrationGuard
 from service.measuring.measure import step_doubt
+from service.measuring.part_trial import PartTrial
+from service.parts.part import PartFileError
 from service.wiring.errors import WiringError
 from service.wiring.plan import find_guard, find_table
 
@@ -34,6 +37,7 @@ def check_files(config: Config) -> Iterator[CheckResult]:
     yield from check_calibration(config)
     yield from _sizes(config)
     yield from _exports(config)
+    yield from _parts(config)
     if config.table is not None:
         yield _table(config)
     if config.page is not None:
@@ -110,6 +114,20 @@ def _sizes(config: Config) -> Iterator[CheckResult]:
         doubt = step_doubt(recipe)
         if doubt:
             yield warning("recipes", f"recipe {recipe.number}: {doubt}")
+
+
+def _parts(config: Config) -> Iterator[CheckResult]:
+    for recipe in config.recipes:
+        if recipe.part is None:
+            continue
+        try:
+            part = PartTrial().part_of(recipe.part)
+        except PartFileError as error:
+            yield fault("parts", f"recipe {recipe.number}: {error}")
+            continue
+        box, holes = bounding_box(part.contour.exterior), len(part.contour.holes)
+        size = f"{box.width:.1f} x {box.height:.1f} mm, {holes} hole{'s' * (holes != 1)}, drawn in {part.unit}"
+        yield ok("parts", f"recipe {recipe.number}: {part.path.name}, {size}")
 
 
 def _exports(config: Config) -> Iterator[CheckResult]:

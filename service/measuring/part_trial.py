@@ -1,0 +1,58 @@
+"""A recipe's part tried in an accepted block. What lays it there is loaded only where a recipe has a part."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from contour.calibration.calibration import Calibration
+from service.measuring.measurement import Measurement
+from service.reasons import Reason
+
+if TYPE_CHECKING:
+    from service.config.recipes import PartToCut
+    from service.parts.part import Part
+
+
+class PartTrial:
+    """Reads each part once, and says where it lies in blocks."""
+
+    def __init__(self) -> None:
+        self._parts: dict[PartToCut, Part] = {}
+
+    def part_of(self, asked: PartToCut) -> Part:
+        """The part of a recipe; raise PartFileError."""
+        from service.parts.part import Asked
+        from service.parts.part_file import load_part
+
+        if asked not in self._parts:
+            self._parts[asked] = load_part(asked.file, Asked(asked.units or "", asked.layer))
+        return self._parts[asked]
+
+    def tried(self, measured: Measurement, asked: PartToCut, calibration: Calibration | None) -> Measurement:
+        """The measurement of a block that was accepted, with where the part lies in it, refused where it does not fit.
+
+        One that was refused before, or is without millimetres, stays as it is.
+        """
+        from service.parts.fit import fit_part, in_picture
+        from service.parts.part import PartFileError
+
+        if measured.findings or measured.millimetres is None or calibration is None:
+            return measured
+        try:
+            part = self.part_of(asked)
+        except PartFileError as error:
+            return _refused(measured, f"The part cannot be read: {error}")
+        if measured.largest_bound_mm is None:
+            return _refused(
+                measured,
+                "Whether the part fits cannot be said, since it is not known how sure the contour is. Use wall-tips "
+                "with edge: cut, and a calibration that knows the scale at the block's height.",
+            )
+        fit = fit_part(part, measured.millimetres, measured.largest_bound_mm, asked)
+        measured = replace(measured, part=in_picture(fit, calibration, measured.thickness_mm or 0.0))
+        return measured if fit.finding is None else _refused(measured, fit.finding)
+
+
+def _refused(measured: Measurement, text: str) -> Measurement:
+    return replace(measured, findings=((Reason.PART_DOES_NOT_FIT, text),))

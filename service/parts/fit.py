@@ -1,0 +1,126 @@
+"""Whether a part can be cut from a block: where it lies best, and by how much it is short where it does not fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from contour.calibration.calibration import Calibration
+from contour.errors import CalibrationError
+from contour.geometry.rings import Contour, densified, perimeter
+from contour.image.overlay import DrawnPart
+from contour.placement.place import Placement, best_placement
+from service.parts.part import CHORD_MM, Part
+
+if TYPE_CHECKING:
+    from service.config.recipes import PartToCut
+
+
+_STEP_MM = 5.0
+"""A lens bends what is straight in millimetres; over so much, by less than a pixel."""
+
+
+@dataclass(frozen=True)
+class PartFit:
+    """A part where its least margin to the measured block is largest, millimetres of the machine frame.
+
+    placed: its outline there. asked_mm: the margin that the recipe asks for. bound_mm: the 95 % bound on the block's
+    contour. drawn: the same in the picture; None where it is not in view.
+    """
+
+    part: Part
+    placement: Placement
+    placed: Contour
+    asked_mm: float
+    bound_mm: float
+    drawn: DrawnPart | None = None
+
+    @property
+    def needed_mm(self) -> float:
+        """What the margin must be: what is asked for, the bound, and what curves lost as chords."""
+        return self.asked_mm + self.bound_mm + CHORD_MM
+
+    @property
+    def margin_mm(self) -> float:
+        """The least distance reached, negative where the part stands out of the block."""
+        return self.placement.margin
+
+    @property
+    def fits(self) -> bool:
+        return self.margin_mm >= self.needed_mm
+
+    @property
+    def short_by_mm(self) -> float | None:
+        """What the margin lacks; None where it fits."""
+        return None if self.fits else self.needed_mm - self.margin_mm
+
+    @property
+    def sentence(self) -> str:
+        """Where it lies, in a few words."""
+        pose = self.placement.pose
+        return (
+            f"{self.part.path.name} at ({pose.x:.2f}, {pose.y:.2f}) mm, turned {pose.angle_deg:.2f} degrees, with "
+            f"{self.margin_mm:.2f} mm of {self.needed_mm:.2f} mm needed"
+        )
+
+    @property
+    def finding(self) -> str | None:
+        """Why the block is refused, in a sentence; None where the part fits."""
+        if self.fits:
+            return None
+        (x, y), _ = self.placement.tightest
+        reached = (
+            f"keeps {self.margin_mm:.2f} mm"
+            if self.margin_mm >= 0
+            else f"stands out of the block by {-self.margin_mm:.2f} mm or more"
+        )
+        needed = f"{self.needed_mm:.2f} mm ({self.asked_mm:g} mm, and the contour's bound of {self.bound_mm:.2f} mm)"
+        return (
+            f"The part {self.part.path.name} does not fit: where it lies best it {reached} at ({x:.1f}, {y:.1f}) mm, "
+            f"needed are {needed}. It is short by {self.short_by_mm:.2f} mm. Lay a larger block, or allow less margin "
+            "or more turns."
+        )
+
+    def fields(self) -> dict[str, Any]:
+        """What `combtrace fit --json` tells."""
+        pose = self.placement.pose
+        return {
+            "fits": self.fits,
+            "pose": {"x_mm": pose.x, "y_mm": pose.y, "angle_deg": pose.angle_deg},
+            "margin_mm": self.margin_mm,
+            "needed_mm": self.needed_mm,
+            "tightest_mm": list(self.placement.tightest[0]),
+            "part_mm": {
+                "exterior": self.placed.exterior.tolist(),
+                "holes": [hole.tolist() for hole in self.placed.holes],
+            },
+            "short_by_mm": self.short_by_mm,
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """What the journal keeps of it."""
+        told = self.fields()
+        pose = {name: round(value, 4) for name, value in told["pose"].items()}
+        margin, needed = round(self.margin_mm, 3), round(self.needed_mm, 3)
+        return {"file": self.part.path.name, "fits": self.fits, "margin_mm": margin, "needed_mm": needed, **pose}
+
+
+def fit_part(part: Part, block_mm: Contour, bound_mm: float, asked: PartToCut) -> PartFit:
+    """The part in the block, machine frame; `bound_mm` is the 95 % bound on where the block's edge lies."""
+    placement = best_placement(part.contour, block_mm, asked.turns)
+    return PartFit(part, placement, placement.pose.placed(part.contour), asked.margin_mm, bound_mm)
+
+
+def in_picture(fit: PartFit, calibration: Calibration, thickness_mm: float) -> PartFit:
+    """The same with where it is seen in the picture, on the block's top; unchanged where that is not in view."""
+    try:
+        rings = [calibration.to_pixels(densified(ring, _STEP_MM), thickness_mm) for ring in fit.placed.rings]
+        ends = calibration.to_pixels(np.array(fit.placement.tightest), thickness_mm)
+    except CalibrationError:
+        return fit
+    scale = perimeter(rings[0]) / perimeter(fit.placed.exterior)
+    (x, y), (u, v) = ends.tolist()
+    outline = Contour(rings[0], tuple(rings[1:]))
+    return replace(fit, drawn=DrawnPart(outline, scale * fit.needed_mm, ((x, y), (u, v)), fit.fits))

@@ -62,8 +62,10 @@ class PartToCut(Model):
     rotation: Literal["free", "fixed"] | Annotated[int, Field(ge=1, le=MOST_STEPS)] = Field(
         "free", description="free: any turn; fixed: as drawn; a number: that many equal steps of the circle."
     )
-    ribbon_angle_deg: Annotated[Number, Field(ge=-360, le=360)] | None = Field(
+    ribbon_angle_deg: float | None = Field(
         None,
+        ge=-360,
+        le=360,
         description="Direction of the core's ribbon in the machine frame, degrees from x counter-clockwise: the "
         "drawing's x axis comes to lie along it, either way round; none = it does not matter.",
     )

@@ -64,13 +64,6 @@ class Measurement:
         return None if self.uncertainty is None else self.uncertainty.total_mm
 
     @property
-    def largest_bound_mm(self) -> float | None:
-        """The bound that holds all along the contour, also where it was bridged; None where it is not known."""
-        if self.uncertainty_mm is None:
-            return None
-        return max([self.uncertainty_mm, *(part.bound_mm for part in self.evidence or () if part.bound_mm is not None)])
-
-    @property
     def size_mm(self) -> tuple[float, float] | None:
         """Width and height of the contour's box in the machine frame."""
         if self.millimetres is None:

@@ -43,13 +43,13 @@ class PartTrial:
             part = self.part_of(asked)
         except PartFileError as error:
             return _refused(measured, f"The part cannot be read: {error}")
-        if measured.largest_bound_mm is None:
+        if measured.uncertainty_mm is None:
             return _refused(
                 measured,
                 "Whether the part fits cannot be said, since it is not known how sure the contour is. Use wall-tips "
                 "with edge: cut, and a calibration that knows the scale at the block's height.",
             )
-        fit = fit_part(part, measured.millimetres, measured.largest_bound_mm, asked)
+        fit = fit_part(part, measured.millimetres, measured.uncertainty_mm, asked)
         measured = replace(measured, part=in_picture(fit, calibration, measured.thickness_mm or 0.0))
         return measured if fit.finding is None else _refused(measured, fit.finding)
 

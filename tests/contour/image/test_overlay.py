@@ -4,7 +4,7 @@ import pytest
 
 from contour.errors import PictureError
 from contour.geometry.rings import Contour
-from contour.image.overlay import ACCEPTED, DOUBTED, HOLE, REFUSED, VERTEX, Hidden, draw_overlay
+from contour.image.overlay import ACCEPTED, DOUBTED, HOLE, PART, REFUSED, VERTEX, DrawnPart, Hidden, draw_overlay
 from tests.support.pictures.rings import SQUARE
 
 OUTLINE = Contour(SQUARE * [50, 30] + [150.0, 150.0], (SQUARE[::-1] * 8 + [300.0, 250.0],))
@@ -130,3 +130,18 @@ def test_of_hidden_parts_covered_ones_are_red_and_bridged_ones_dashed() -> None:
     assert dashes[-1]
     assert near(draw_overlay(blank, OUTLINE, refused=True, hidden=parts[1:2]), 200, 150, REFUSED, reach=1)
     assert near(draw_overlay(blank, OUTLINE, hidden=parts[1:2]), 200, 150, ACCEPTED, reach=1)
+
+
+@pytest.mark.parametrize(("fits", "colour"), [(True, PART), (False, REFUSED)])
+def test_a_part_is_drawn_with_its_margin_and_its_tightest_place(fits: bool, colour: tuple[int, int, int]) -> None:
+    outline = Contour(SQUARE * [20, 10] + [400.0, 200.0], (SQUARE[::-1] * 4 + [480.0, 230.0],))
+    part = DrawnPart(outline, 12.0, ((400.0, 250.0), (380.0, 250.0)), fits)
+    drawn = draw_overlay(np.full((600, 800), 60, np.uint8), OUTLINE, part=part)
+    assert near(drawn, 500, 200, colour)
+    assert near(drawn, 500, 230, colour)
+    assert near(drawn, 400, 250, VERTEX, reach=1)
+    assert near(drawn, 390, 250, VERTEX, reach=1)
+    # The veil lies around the outline, not in the part's material, and no wider than the margin.
+    assert (drawn[191, 450] != 60).any()
+    assert (drawn[212, 450] == 60).all()
+    assert (drawn[185, 450] == 60).all()

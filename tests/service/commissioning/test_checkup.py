@@ -273,6 +273,27 @@ def test_exports_that_no_job_could_make_are_told_by_the_check(tmp_path: Path, gc
     assert text is None or text in found[0].text
 
 
+@pytest.mark.parametrize(
+    ("drawing", "text"),
+    [
+        ('{"type": "Polygon", "coordinates": [[[0, 0], [40, 0], [40, 30], [0, 0]]]}', None),
+        ('{"type": "Polygon", "coordinates": [[[0, 0], [40, 0], [40, 30], [0, 30]]]}', "is open: ring 0 ends at"),
+        ("", "is no GeoJSON"),
+    ],
+)
+def test_parts_are_read_and_what_is_wrong_with_one_is_told(tmp_path: Path, drawing: str, text: str | None) -> None:
+    (tmp_path / "part.json").write_text(drawing)
+    recipes = (
+        f"calibration: {{file: {SAMPLES / 'calibration.yaml'}}}\n"
+        "default_recipe: 3\nrecipes: [{number: 3, name: a, part: {file: part.json, units: mm}}]"
+    )
+    found = [one for one in check_files(config(tmp_path, more=recipes)) if one.part == "parts"]
+    assert len(found) == 1
+    assert (found[0].level is Level.FAULT) == (text is not None)
+    expected = text or "recipe 3: part.json, 40.0 x 30.0 mm, 0 holes, drawn in mm"
+    assert expected in found[0].text
+
+
 def test_without_exports_there_is_nothing_to_say_of_them(tmp_path: Path) -> None:
     assert not [one for one in check_files(config(tmp_path)) if one.part == "exports"]
 

@@ -11,6 +11,7 @@ import pytest
 
 from service.commissioning.given_contours import GivenContours, NoCamera
 from service.config.config import Config
+from service.config.recipes import PartToCut
 from service.jobs.rehearsal import rehearse
 from service.records.archive_writer import ArchiveWriter
 from service.records.journal_file import JournalError
@@ -129,6 +130,14 @@ async def test_the_daemon_rehearses_and_one_with_given_contours_does_not(tmp_pat
         parts.pool.shutdown()
         if parts.archive is not None:
             parts.archive.close()
+
+
+async def test_a_part_that_cannot_be_read_stops_the_start(tmp_path: Path) -> None:
+    config = configured(tmp_path, metrics=None)
+    part = PartToCut(file=tmp_path / "none.dxf")
+    recipes = tuple(recipe.model_copy(update={"part": part}) for recipe in config.recipes)
+    with pytest.raises(WiringError, match=r"recipe 1: part: .*none\.dxf: cannot be read"):
+        build(config.model_copy(update={"recipes": recipes}))
 
 
 async def test_a_page_that_cannot_be_served_leaves_no_metrics_behind(tmp_path: Path) -> None:

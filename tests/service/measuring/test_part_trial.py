@@ -1,0 +1,89 @@
+"""A recipe's part is tried in blocks that were accepted, and refuses those in which it does not fit."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from contour.acceptance.error_budget import ErrorBudget
+from contour.geometry.rings import Contour
+from contour.synthetic import rectangle
+from service.config.recipes import PartToCut
+from service.measuring.calibration_file import load_record
+from service.measuring.measurement import Measurement
+from service.measuring.part_trial import PartTrial
+from service.reasons import Reason
+
+CALIBRATION = load_record(Path(__file__).parents[3] / "service" / "samples" / "calibration.yaml").calibration
+BLOCK = rectangle((150.0, 100.0), 200.0, 120.0)
+
+
+@pytest.fixture
+def asked(tmp_path: Path) -> PartToCut:
+    path = tmp_path / "part.json"
+    ring = [[0, 0], [160, 0], [160, 100], [0, 100], [0, 0]]
+    path.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    return PartToCut(file=path, units="mm", margin_mm=9.0, rotation="fixed")
+
+
+def seen(bound_mm: float | None = 0.5, **more: Any) -> Measurement:
+    budget = None if bound_mm is None else ErrorBudget(bound_mm, 0.0, None)
+    return Measurement("wall-tips", millimetres=BLOCK, uncertainty=budget, thickness_mm=20.0, **more)
+
+
+def test_the_bound_adds_to_the_margin(asked: PartToCut) -> None:
+    fits, vague = (PartTrial().tried(seen(bound), asked, CALIBRATION) for bound in (0.5, 1.5))
+    assert fits.findings == ()
+    assert fits.part is not None
+    assert (fits.part.fits, fits.part.short_by_mm) == (True, None)
+    assert fits.part.margin_mm == pytest.approx(10.0, abs=1e-3)
+    assert vague.reasons == (Reason.PART_DOES_NOT_FIT,)
+    assert vague.part is not None
+    assert vague.part.short_by_mm == pytest.approx(0.505, abs=1e-3)
+    assert "keeps 10.00 mm at" in vague.texts[0]
+    assert "needed are 10.51 mm (9 mm, and the contour's bound of 1.50 mm). It is short by 0.51 mm" in vague.texts[0]
+
+
+def test_what_was_refused_before_and_what_is_in_pixels_stay_as_they_are(asked: PartToCut) -> None:
+    refused = seen(findings=((Reason.TOUCHES_BORDER, "it does"),))
+    assert PartTrial().tried(refused, asked, CALIBRATION) is refused
+    in_pixels = replace(seen(), millimetres=None)
+    assert PartTrial().tried(in_pixels, asked, None) is in_pixels
+
+
+def test_without_a_bound_nothing_is_said_to_fit(asked: PartToCut) -> None:
+    measured = PartTrial().tried(seen(None), asked, CALIBRATION)
+    assert measured.reasons == (Reason.PART_DOES_NOT_FIT,)
+    assert "cannot be said" in measured.texts[0]
+
+
+def test_a_part_is_read_once_and_one_that_is_gone_is_told(asked: PartToCut) -> None:
+    trial = PartTrial()
+    assert trial.part_of(asked) is trial.part_of(asked)
+    asked.file.unlink()
+    assert trial.tried(seen(), asked, CALIBRATION).findings == ()
+    measured = PartTrial().tried(seen(), asked, CALIBRATION)
+    assert measured.reasons == (Reason.PART_DOES_NOT_FIT,)
+    assert "The part cannot be read" in measured.texts[0]
+
+
+def test_what_stands_out_is_told_by_how_much(asked: PartToCut) -> None:
+    small = replace(seen(), millimetres=Contour(BLOCK.exterior * 0.7))
+    measured = PartTrial().tried(small, asked, CALIBRATION)
+    assert measured.part is not None
+    assert measured.part.margin_mm == pytest.approx(-math.hypot(10.0, 8.0), abs=0.01)
+    assert "stands out of the block by 12.81 mm" in measured.texts[0]
+    # The block is 140 mm by 84: the part's corners stand out by 10 mm and 8 mm.
+    assert np.isfinite(measured.part.placement.pose.x)
+
+
+def test_the_journal_keeps_where_it_lies(asked: PartToCut) -> None:
+    kept = PartTrial().tried(seen(), asked, CALIBRATION).summary()["part"]
+    assert kept["fits"] is True
+    assert (kept["file"], kept["angle_deg"], kept["margin_mm"]) == ("part.json", 0.0, 10.0)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from contour.geometry.rings import Contour, oriented_contour
 
 EXTERIOR, HOLES = "EXTERIOR", "HOLES"
-"""Names of the layers that exterior and holes are on."""
+PART, PART_HOLES = "PART", "PART_HOLES"
+"""Names of the layers that exterior and holes of block and part are on."""
 
 
 class ExportError(Exception):
@@ -18,13 +19,19 @@ class ExportError(Exception):
 class ExportDocument:
     """A contour to be exported, machine frame, mm; `thickness_mm` is the height of its plane above the table.
 
-    title: one line that names the picture or job. uncertainty_mm: 95 % bound on its position, None = not known.
+    title: one line that names the picture or job. uncertainty_mm: 95 % bound on its position, None = not known. part:
+    what is to be cut from the block, where it lies in it; None = nothing is laid into it.
     """
 
     contour: Contour
     title: str
     thickness_mm: float
     uncertainty_mm: float | None = None
+    part: Contour | None = None
+
+    def oriented_part(self) -> Contour | None:
+        """The part's rings, as `oriented` has the block's."""
+        return None if self.part is None else oriented_contour(self.part, counter_clockwise=True)
 
     def oriented(self) -> Contour:
         """The rings as everywhere else: exterior counter-clockwise, holes clockwise, first vertex not repeated."""

@@ -1,12 +1,12 @@
-"""DXF by ezdxf: closed LWPOLYLINEs, exterior and holes on layers of their own, units set to millimetres."""
+"""DXF by ezdxf: closed LWPOLYLINEs, exteriors and holes of block and part, each on a layer of its own; millimetres."""
 
 from __future__ import annotations
 
 import io
 
-from service.export.document import EXTERIOR, HOLES, ExportDocument, ExportError
+from service.export.document import EXTERIOR, HOLES, PART, PART_HOLES, ExportDocument, ExportError
 
-COLOURS = {EXTERIOR: 7, HOLES: 1}  # white or black after the background, red
+COLOURS = {EXTERIOR: 7, HOLES: 1, PART: 6, PART_HOLES: 6}  # white or black after the background, red, magenta
 VERSION = "R2010"
 
 
@@ -22,8 +22,11 @@ def to_dxf(document: ExportDocument) -> bytes:
     drawing.header["$MEASUREMENT"] = 1
     drawing.header.custom_vars.append("combtrace", document.note)
     space = drawing.modelspace()
-    contour = document.oriented()
-    for layer, rings in ((EXTERIOR, (contour.exterior,)), (HOLES, contour.holes)):
+    contour, part = document.oriented(), document.oriented_part()
+    layers = [(EXTERIOR, (contour.exterior,)), (HOLES, contour.holes)]
+    if part is not None:
+        layers += [(PART, (part.exterior,)), (PART_HOLES, part.holes)]
+    for layer, rings in layers:
         drawing.layers.add(layer, color=COLOURS[layer])
         for ring in rings:
             space.add_lwpolyline(ring.tolist(), close=True, dxfattribs={"layer": layer})

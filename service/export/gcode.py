@@ -1,4 +1,6 @@
-"""G-code for LinuxCNC: along the holes, then along the exterior, each begun and ended clear of the material."""
+"""G-code for LinuxCNC: along the holes, then along the exterior, each begun and ended clear of the material; where a
+part is laid into the block, along the part's.
+"""
 
 from __future__ import annotations
 
@@ -57,13 +59,15 @@ def to_gcode(document: ExportDocument, settings: GcodeSettings | None = None) ->
     safe_z_mm = document.thickness_mm + SAFE_ABOVE_MM if settings.safe_z_mm is None else settings.safe_z_mm
     cut_z_mm = safe_z_mm if settings.cut_z_mm is None else settings.cut_z_mm
     _check_heights(document, settings, safe_z_mm, cut_z_mm)
-    contour = document.oriented()
+    part = document.oriented_part()
+    contour = document.oriented() if part is None else part
     clockwise = settings.direction == "climb"
     rings = [oriented(ring, counter_clockwise=clockwise) for ring in contour.holes]
     rings.append(oriented(contour.exterior, counter_clockwise=not clockwise))
     lines: list[str] = []
     for number, ring in enumerate(rings, 1):
         name = "exterior" if number == len(rings) else f"hole {number}"
+        name = name if part is None else f"part's {name}"
         start, lead = _begin(ring, contour, settings.lead_in_mm, name)
         lines += [f"({name}, {len(ring)} vertices)", *_along(start, lead, settings, safe_z_mm, cut_z_mm)]
     words = {

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
-from contour.geometry.rings import Ring
+from contour.geometry.rings import Contour, Ring
 from service.export.document import ExportDocument
 
 
 def to_geojson(document: ExportDocument) -> bytes:
-    """A Feature with one Polygon: rings closed by their first vertex, exterior counter-clockwise, holes clockwise."""
-    contour = document.oriented()
-    feature = {
+    """A Feature with one Polygon: rings closed by their first vertex, exterior counter-clockwise, holes clockwise.
+
+    With a part a FeatureCollection of two, the block's and the part's, as their property `role` says.
+    """
+    block, part = document.oriented(), document.oriented_part()
+    feature = _feature(document, block, {"uncertainty_mm": document.uncertainty_mm})
+    if part is not None:
+        feature["properties"]["role"] = "block"
+        both = [feature, _feature(document, part, {"role": "part"})]
+        feature = {"type": "FeatureCollection", "features": both}
+    return (json.dumps(feature, ensure_ascii=False) + "\n").encode()
+
+
+def _feature(document: ExportDocument, contour: Contour, more: dict[str, Any]) -> dict[str, Any]:
+    return {
         "type": "Feature",
         "geometry": {"type": "Polygon", "coordinates": [_closed(ring) for ring in contour.rings]},
         "properties": {
@@ -19,10 +32,9 @@ def to_geojson(document: ExportDocument) -> bytes:
             "unit": "mm",
             "frame": "machine",
             "thickness_mm": document.thickness_mm,
-            "uncertainty_mm": document.uncertainty_mm,
+            **more,
         },
     }
-    return (json.dumps(feature, ensure_ascii=False) + "\n").encode()
 
 
 def _closed(ring: Ring) -> list[list[float]]:

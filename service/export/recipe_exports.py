@@ -48,12 +48,20 @@ def _tried(form: str, document: ExportDocument, recipe: Recipe) -> str | None:
     return None
 
 
+def document_of(measurement: Measurement, title: str) -> ExportDocument | None:
+    """The contour, and the part in it, to be exported; None of one that was refused, or is in pixels alone."""
+    contour, thickness_mm, part = measurement.millimetres, measurement.thickness_mm, measurement.part
+    if measurement.findings or contour is None or thickness_mm is None:
+        return None
+    placed = None if part is None else part.placed
+    return ExportDocument(contour, title, thickness_mm, measurement.uncertainty_mm, placed)
+
+
 def exports_of(recipe: Recipe, measurement: Measurement, title: str) -> tuple[dict[str, bytes], list[str]]:
     """The files that the recipe wants beside a job's evidence, by name, none of a refused one; and what went wrong."""
-    contour, thickness_mm = measurement.millimetres, measurement.thickness_mm
-    if measurement.findings or contour is None or thickness_mm is None:
+    document = document_of(measurement, title)
+    if document is None:
         return {}, []
-    document = ExportDocument(contour, title, thickness_mm, measurement.uncertainty_mm)
     files, errors = {}, []
     for form in recipe.exports:
         try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from xml.sax.saxutils import escape
 
 from contour.geometry.rings import Ring, bounding_box
-from service.export.document import EXTERIOR, HOLES, ExportDocument
+from service.export.document import EXTERIOR, HOLES, PART, PART_HOLES, ExportDocument
 
 MARGIN_MM = 5.0
 LINE_MM = 0.2
@@ -19,6 +19,10 @@ def to_svg(document: ExportDocument) -> bytes:
     width, height = box.max_x + MARGIN_MM - left, box.max_y + MARGIN_MM - bottom
     paths = [f'    <path id="{EXTERIOR}" d="{_path(contour.exterior)}"/>']
     paths += [f'    <path id="{HOLES}-{number}" d="{_path(hole)}"/>' for number, hole in enumerate(contour.holes, 1)]
+    part = document.oriented_part()
+    if part is not None:
+        named = [(PART, part.exterior), *((f"{PART_HOLES}-{k}", hole) for k, hole in enumerate(part.holes, 1))]
+        paths += [f'    <path id="{name}" stroke="magenta" d="{_path(ring)}"/>' for name, ring in named]
     return "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8"?>',

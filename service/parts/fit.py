@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from contour.errors import CalibrationError
 from contour.geometry.rings import Contour, densified, perimeter
 from contour.image.overlay import DrawnPart
 from contour.placement.place import Placement, best_placement
+from contour.placement.pose import Pose
 from service.parts.part import CHORD_MM, Part
 
 if TYPE_CHECKING:
@@ -92,12 +94,42 @@ class PartFit:
             "margin_mm": self.margin_mm,
             "needed_mm": self.needed_mm,
             "tightest_mm": list(self.placement.tightest[0]),
-            "part_mm": {
-                "exterior": self.placed.exterior.tolist(),
-                "holes": [hole.tolist() for hole in self.placed.holes],
-            },
+            "part_mm": _rings_kept(self.placed),
             "short_by_mm": self.short_by_mm,
         }
+
+    def kept(self) -> dict[str, Any]:
+        """All of it as JSON's types, for `of_kept`."""
+        pose, drawn = self.placement.pose, self.drawn
+        return {
+            **self.summary(),
+            "path": str(self.part.path),
+            "unit": self.part.unit,
+            "pose": [pose.x, pose.y, pose.angle],
+            "margin": self.margin_mm,
+            "tightest_mm": self.placement.tightest,
+            "asked_mm": self.asked_mm,
+            "bound_mm": self.bound_mm,
+            "millimetres": _rings_kept(self.placed),
+            "drawn": None
+            if drawn is None
+            else {"pixels": _rings_kept(drawn.outline), "margin_px": drawn.margin_px, "tightest_px": drawn.tightest},
+        }
+
+    @classmethod
+    def of_kept(cls, kept: dict[str, Any]) -> PartFit:
+        """The fit that was kept; its part as drawn is that which was placed, taken back."""
+        pose, placed = Pose(*kept["pose"]), _rings_of(kept["millimetres"])
+        as_drawn = Contour(pose.undone(placed.exterior), tuple(pose.undone(hole) for hole in placed.holes))
+        placement = Placement(pose, kept["margin"], _pair(kept["tightest_mm"]))
+        fit = cls(
+            Part(Path(kept["path"]), as_drawn, kept["unit"]), placement, placed, kept["asked_mm"], kept["bound_mm"]
+        )
+        drawn = kept["drawn"]
+        if drawn is None:
+            return fit
+        outline = _rings_of(drawn["pixels"])
+        return replace(fit, drawn=DrawnPart(outline, drawn["margin_px"], _pair(drawn["tightest_px"]), fit.fits))
 
     def summary(self) -> dict[str, Any]:
         """What the journal keeps of it."""
@@ -105,6 +137,19 @@ class PartFit:
         pose = {name: round(value, 4) for name, value in told["pose"].items()}
         margin, needed = round(self.margin_mm, 3), round(self.needed_mm, 3)
         return {"file": self.part.path.name, "fits": self.fits, "margin_mm": margin, "needed_mm": needed, **pose}
+
+
+def _rings_kept(contour: Contour) -> dict[str, Any]:
+    return {"exterior": contour.exterior.tolist(), "holes": [hole.tolist() for hole in contour.holes]}
+
+
+def _rings_of(kept: dict[str, Any]) -> Contour:
+    return Contour(np.array(kept["exterior"]), tuple(np.array(hole) for hole in kept["holes"]))
+
+
+def _pair(kept: Any) -> tuple[tuple[float, float], tuple[float, float]]:
+    (x, y), (u, v) = kept
+    return (x, y), (u, v)
 
 
 def fit_part(part: Part, block_mm: Contour, bound_mm: float, asked: PartToCut) -> PartFit:

@@ -30,6 +30,7 @@ from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
 from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
 from service.measuring.table_file import TableFileError, TableRecord, load_table
+from service.parts.fit import PartFit
 from service.reasons import Reason
 from service.records.archive import DRAFT, PLAIN_FRAME, TABLES, document_of, folder_of
 from service.records.evidence import FRAME, VERSION, Evidence
@@ -83,6 +84,12 @@ class ArchivedJob:
         """What the polygon rests on; None where nobody said, as in documents of earlier versions."""
         found = self.document["measurement"].get("evidence")
         return None if found is None else tuple(SentStretch(**stretch) for stretch in found)
+
+    @property
+    def part(self) -> PartFit | None:
+        """The part that was laid into the block; None where the recipe had none, or the block was refused before."""
+        found = self.document["measurement"].get("part")
+        return None if found is None else PartFit.of_kept(found)
 
     @cached_property
     def recipe_settings(self) -> dict[str, Any]:
@@ -205,6 +212,7 @@ def _measurement(draft: ArchivedJob) -> Measurement:
         uncertainty_px=known["uncertainty_px"],
         uncertainty=None if uncertainty is None else ErrorBudget(**uncertainty),
         evidence=draft.evidence,
+        part=draft.part,
         thickness_mm=known["thickness_mm"],
         aligned=known["aligned"],
         quality=None if quality is None else Quality(**quality),
@@ -233,7 +241,7 @@ def recipe_with(archived: ArchivedJob, changes: dict[str, Any]) -> Recipe:
     settings = dict(archived.recipe_settings)
     for key, value in changes.items():
         name, _, inner = key.partition(".")
-        settings[name] = {**settings.get(name, {}), inner: value} if inner else value
+        settings[name] = {**(settings.get(name) or {}), inner: value} if inner else value
     try:
         return Recipe.model_validate(settings)
     except ValidationError as error:

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.geometry.rings import Contour
-from contour.image.overlay import draw_overlay
 from drivers.camera import Frame
 from drivers.controller.mailbox.page_text import pages_to_text
 from drivers.controller.mailbox.pages import Page
@@ -28,7 +27,7 @@ from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
 from service.measuring.table_file import TableRecord
 from service.records.job import Job
-from service.records.pictures import caption
+from service.records.pictures import overlay
 
 VERSION = 1
 FRAME = "frame.png"
@@ -132,6 +131,7 @@ def measurement_fields(measurement: Measurement) -> dict[str, Any]:
         "uncertainty_px": measurement.uncertainty_px,
         "uncertainty": None if measurement.uncertainty is None else asdict(measurement.uncertainty),
         "evidence": measurement.evidence_fields,
+        **({} if measurement.part is None else {"part": measurement.part.kept()}),
         "reasons": [{"code": int(reason), "text": text} for reason, text in measurement.findings],
         "pixels": contour_fields(measurement.pixels),
         "millimetres": contour_fields(measurement.millimetres),
@@ -157,15 +157,7 @@ def frame_bytes(frame: Frame) -> bytes:
 
 def overlay_bytes(frame: Frame, measurement: Measurement) -> bytes:
     """The frame with the contour over it, made smaller, as JPEG."""
-    drawn = draw_overlay(
-        frame.pixels,
-        measurement.pixels,
-        caption=caption(measurement),
-        refused=bool(measurement.findings),
-        uncertainty_px=measurement.uncertainty_px,
-        others_px=measurement.other_blocks_px,
-        hidden=measurement.hidden,
-    )
+    drawn = overlay(frame.pixels, measurement)
     height, width = drawn.shape[:2]
     scale = OVERLAY_PX / max(height, width)
     if scale < 1:

@@ -18,18 +18,21 @@ class PictureFileError(Exception):
 
 def write_overlay(path: Path, picture: NDArray[np.uint8], measurement: Measurement) -> None:
     """Write the picture with the contour over it; the format follows the ending. Raise PictureFileError."""
-    refused = bool(measurement.findings)
-    drawn = draw_overlay(
+    write_picture(path, overlay(picture, measurement))
+
+
+def overlay(picture: NDArray[np.uint8], measurement: Measurement) -> NDArray[np.uint8]:
+    """The picture as BGR with all that was measured in it."""
+    return draw_overlay(
         picture,
         measurement.pixels,
         caption=caption(measurement),
-        refused=refused,
+        refused=bool(measurement.findings),
         uncertainty_px=measurement.uncertainty_px,
         others_px=measurement.other_blocks_px,
         hidden=measurement.hidden,
         part=None if measurement.part is None else measurement.part.drawn,
     )
-    write_picture(path, drawn)
 
 
 def write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:

@@ -24,7 +24,7 @@ def add_export_arguments(parser: argparse.ArgumentParser) -> None:
             f"--{form}",
             type=output_path,
             metavar="FILE",
-            help=f"accepted contour in mm, .{ending}; a folder for several images",
+            help=f"accepted contour in mm, with the part in it, .{ending}; a folder for several images",
         )
 
 
@@ -68,14 +68,13 @@ class Exports:
         gcode = self.gcode
         if not self.paths or gcode is None:
             return []
-        from service.export.document import ExportDocument, ExportError
+        from service.export.document import ExportError
         from service.export.files import exported, write_export
+        from service.export.recipe_exports import document_of
 
-        if measurement.findings or measurement.millimetres is None or measurement.thickness_mm is None:
+        document = document_of(measurement, image.name)
+        if document is None:
             return ["refused: nothing exported, files of before are as they were"]
-        document = ExportDocument(
-            measurement.millimetres, image.name, measurement.thickness_mm, measurement.uncertainty_mm
-        )
         told = []
         for form, files in self.paths:
             file = files[image]

@@ -13,9 +13,11 @@ from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.file_names import check_outputs, output_path
 from service.cli.json_output import json_output
+from service.cli.options.export import Exports, add_export_arguments
 from service.cli.options.part import add_part_arguments, with_part
 from service.cli.options.tracing import Tracing, add_tracing_arguments
 from service.cli.pictures.trace_record import sentence
+from service.config.plain_recipe import PlainRecipe
 
 if TYPE_CHECKING:
     from service.measuring.measurement import Measurement
@@ -40,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_tracing_arguments(parser)
     parser.add_argument("--json", metavar="FILE", help="one JSON object; - is standard output")
     parser.add_argument("--overlay", type=output_path, metavar="FILE", help="picture with block, part and margin")
+    add_export_arguments(parser)
     parser.add_argument(
         "--language", choices=("en", "ru"), default="en", help="ru: each reason also in Russian, with what to do"
     )
@@ -52,11 +55,15 @@ def run(args: argparse.Namespace) -> int:
         raise UserError("a part is in millimetres: name the calibration by --calibration or --config")
     tracing = dataclasses.replace(tracing, recipe=with_part(tracing.recipe, args))
     file = _checked_part(tracing)
+    args.images, args.several = [args.image], False
+    exports = Exports()
+    if not isinstance(tracing.recipe, PlainRecipe):
+        exports = Exports.of(args, tracing.recipe, calibrated=True)
     outputs = [("--json", Path(args.json))] if args.json not in (None, "-") else []
     outputs += [("--overlay", args.overlay)] if args.overlay is not None else []
-    check_outputs([args.image, file], outputs)
+    check_outputs([args.image, file], [*outputs, *exports.outputs])
     with json_output(args.json) as write:
-        record, line, status = _fitted(args, tracing)
+        record, line, status = _fitted(args, tracing, exports)
         stream = sys.stderr if args.json == "-" or status == EXIT_UNUSABLE else sys.stdout
         print(painted(line, Colour.GOOD if status == EXIT_OK else Colour.BAD, stream), file=stream, flush=True)
         write(json.dumps(record, ensure_ascii=False) + "\n")
@@ -76,7 +83,7 @@ def _checked_part(tracing: Tracing) -> Path:
     return part.file
 
 
-def _fitted(args: argparse.Namespace, tracing: Tracing) -> tuple[dict[str, Any], str, int]:
+def _fitted(args: argparse.Namespace, tracing: Tracing, exports: Exports) -> tuple[dict[str, Any], str, int]:
     """The JSON object, the line for people, and the exit status."""
     from contour.errors import ContourError
     from drivers.camera import CameraError
@@ -89,6 +96,8 @@ def _fitted(args: argparse.Namespace, tracing: Tracing) -> tuple[dict[str, Any],
     note = "" if args.overlay is None else f"  [{args.overlay}]"
     if args.overlay is not None:
         _write_overlay(args.overlay, picture, measurement)
+    written = exports.write(args.image, measurement)
+    note += f"  [{', '.join(written)}]" if written else ""
     fits = measurement.part is not None and measurement.part.fits
     told = measurement.part.sentence if fits and measurement.part else sentence(measurement, args.language)
     line = f"{shown(args.image)}: {'fits: ' if fits else ''}{told}{note}"

@@ -13,6 +13,8 @@ import pytest
 import shapely
 
 from service.cli.main import main
+from service.parts.part import Asked
+from service.parts.part_file import load_part
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"
 PICTURE = str(SAMPLES / "4-with-holes.jpg")
@@ -102,6 +104,25 @@ def test_the_overlay_shows_the_part(part: Path, tmp_path: Path) -> None:
     violet = (np.abs(pictures[1].astype(int) - (240, 110, 220)).max(axis=2) < 30).sum()
     assert violet > 1000
     assert (np.abs(pictures[0].astype(int) - (240, 110, 220)).max(axis=2) < 30).sum() == 0
+
+
+def test_a_part_that_fits_is_exported_in_place(part: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = {form: tmp_path / f"laid.{form}" for form in ("dxf", "geojson", "gcode")}
+    words = [word for form, file in files.items() for word in (f"--{form}", file)]
+    assert fit("--part", part, *words, "--json", "-") == 0
+    placed = shapely.Polygon(told(capsys)["part_mm"]["exterior"])
+    block, laid = (
+        shapely.geometry.shape(one["geometry"]) for one in json.loads(files["geojson"].read_text())["features"]
+    )
+    assert block.contains(laid)
+    assert shapely.hausdorff_distance(laid.exterior, placed.exterior) < 1e-3
+    # What was exported is a drawing, too: its layer has the part where it lies.
+    again = load_part(files["dxf"], Asked(layer="PART"))
+    assert shapely.hausdorff_distance(shapely.Polygon(again.contour.exterior).exterior, placed.exterior) < 1e-3
+    assert "(part's exterior, 4 vertices)" in files["gcode"].read_text()
+    before = files["dxf"].read_bytes()
+    assert fit("--part", part, "--margin-mm", 200, *words) == 3
+    assert files["dxf"].read_bytes() == before
 
 
 def test_a_recipes_part_is_taken_and_changed_by_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import cv2
 import ezdxf
@@ -30,6 +32,11 @@ HOLES = (
 )
 CONTOUR = Contour(EXTERIOR, HOLES)
 DOCUMENT = ExportDocument(CONTOUR, "block (7).png", 20.0, 0.123)
+PART = Contour(
+    np.array([[30.0, 10.0], [50.0, 10.0], [50.0, 40.0], [30.0, 40.0]]),
+    (np.array([[35.0, 20.0], [35.0, 30.0], [45.0, 30.0]]),),
+)
+LAID = replace(DOCUMENT, part=PART)
 
 
 def rings_of(polygon):
@@ -54,6 +61,37 @@ def test_dxf_has_no_fault_that_the_auditor_finds_and_states_millimetres():
         ("LWPOLYLINE", "HOLES", True),
         ("LWPOLYLINE", "HOLES", True),
     ]
+
+
+def test_a_part_is_on_layers_of_its_own_for_another_reader(tmp_path):
+    path = tmp_path / "contour.dxf"
+    path.write_bytes(to_dxf(LAID))
+    _, _, geometries, fields = pyogrio.raw.read(path, columns=["Layer"])
+    found = {
+        layer: np.array(line.coords)[:-1, :2]
+        for layer, line in zip(fields[0], shapely.from_wkb(geometries), strict=True)
+    }
+    assert list(fields[0]) == ["EXTERIOR", "HOLES", "HOLES", "PART", "PART_HOLES"]
+    same_ring(PART.exterior, found["PART"])
+    same_ring(PART.holes[0], found["PART_HOLES"])
+    assert not ezdxf.read(io.StringIO(to_dxf(LAID).decode())).audit().has_issues
+
+
+def test_block_and_part_are_two_polygons_for_another_reader(tmp_path):
+    path = tmp_path / "contour.geojson"
+    path.write_bytes(to_geojson(LAID))
+    _, _, geometries, fields = pyogrio.raw.read(path, columns=["role"])
+    block, part = shapely.from_wkb(geometries)
+    assert list(fields[0]) == ["block", "part"]
+    assert block.contains(part)
+    for ring, found in zip(PART.rings, rings_of(part), strict=True):
+        same_ring(ring, found)
+
+
+def test_svg_names_the_parts_paths():
+    root = ElementTree.fromstring(to_svg(LAID))
+    paths = [path.get("id") for path in root.iter("{http://www.w3.org/2000/svg}path")]
+    assert paths == ["EXTERIOR", "HOLES-1", "HOLES-2", "PART", "PART_HOLES-1"]
 
 
 def test_dxf_holds_the_same_rings_for_another_reader(tmp_path):

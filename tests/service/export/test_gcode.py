@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -46,6 +47,18 @@ def cut_rings(program: bytes) -> list[np.ndarray]:
         elif rings and rings[-1]:
             rings.append([])
     return [np.array(ring) for ring in rings if ring]
+
+
+def test_with_a_part_the_tool_goes_around_the_part_alone():
+    part = Contour(SQUARE * 0.3 + 5.0, (HOLE * 0.2 + 8.0,))
+    program = to_gcode(replace(DOCUMENT, part=part), replace(CUT, lead_in_mm=1.0))
+    hole, exterior = (shapely.LineString(ring) for ring in cut_rings(program))
+    laid = shapely.Polygon(part.exterior, list(part.holes))
+    for ring, true in ((hole, laid.interiors[0]), (exterior, laid.exterior)):
+        assert shapely.hausdorff_distance(shapely.LineString(ring.coords[1:-1]), true) < 1e-4
+    # Leads lie out of the part, and nothing goes nearer to the block's edge than the part does but they.
+    assert all(not laid.buffer(-1e-6).intersects(ring) for ring in (hole, exterior))
+    assert b"(part's hole 1, 4 vertices)" in program
 
 
 def test_the_machines_interpreter_takes_the_program_and_moves_along_the_rings(tmp_path):

@@ -18,6 +18,7 @@ from service.config.recipes import PartToCut
 from service.measuring.calibration_file import load_record
 from service.measuring.measurement import Measurement
 from service.measuring.part_trial import PartTrial
+from service.parts.fit import PartFit
 from service.reasons import Reason
 
 CALIBRATION = load_record(Path(__file__).parents[3] / "service" / "samples" / "calibration.yaml").calibration
@@ -81,6 +82,23 @@ def test_what_stands_out_is_told_by_how_much(asked: PartToCut) -> None:
     assert "stands out of the block by 12.81 mm" in measured.texts[0]
     # The block is 140 mm by 84: the part's corners stand out by 10 mm and 8 mm.
     assert np.isfinite(measured.part.placement.pose.x)
+
+
+def test_what_is_kept_of_a_fit_is_the_fit_again(asked: PartToCut) -> None:
+    fit = PartTrial().tried(seen(), asked, CALIBRATION).part
+    assert fit is not None
+    assert fit.drawn is not None
+    kept = json.loads(json.dumps(fit.kept()))
+    again = PartFit.of_kept(kept)
+    assert again.kept() == fit.kept()
+    assert again.fields() == fit.fields()
+    assert again.drawn is not None
+    assert (again.drawn.margin_px, again.drawn.tightest, again.drawn.fits) == (
+        fit.drawn.margin_px,
+        fit.drawn.tightest,
+        True,
+    )
+    np.testing.assert_allclose(again.part.contour.exterior, fit.part.contour.exterior, atol=1e-9)
 
 
 def test_the_journal_keeps_where_it_lies(asked: PartToCut) -> None:

@@ -16,10 +16,16 @@ import pytest
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
 from contour.acceptance.sent_evidence import SentStretch
+from contour.geometry.rings import Contour
+from contour.image.overlay import DrawnPart
+from contour.placement.place import Placement
+from contour.placement.pose import Pose
 from drivers.camera import Frame
 from service.config.recipes import Recipe
 from service.link.contour_message import Envelope, contour_pages
 from service.measuring.measure import Measurer
+from service.parts.fit import PartFit
+from service.parts.part import Part
 from service.reasons import Outcome, Reason
 from service.records.archive import Archive, ArchiveLimits, files_of
 from service.records.archive_writer import ArchiveWriter
@@ -30,6 +36,15 @@ from tests.support.service.cycle_rig import measured
 
 RECIPE = Recipe(number=1, name="one", exports=["dxf", "geojson"])
 FRAME = Frame(np.random.default_rng(1).integers(0, 255, (60, 80), dtype=np.uint8), 1.0, True, "a.png", 3, "cam")
+SQUARE = Contour(np.array([[1.0, 2.0], [11.0, 2.0], [11.0, 12.0], [1.0, 12.0]]))
+LAID = PartFit(
+    Part(Path("part.dxf"), Contour(SQUARE.exterior - (1.0, 2.0)), "mm"),
+    Placement(Pose(1.0, 2.0, 0.0), 1.5, ((1.0, 2.0), (1.0, 0.5))),
+    SQUARE,
+    asked_mm=1.0,
+    bound_mm=0.25,
+    drawn=DrawnPart(Contour(SQUARE.exterior * 3.0), 4.0, ((3.0, 6.0), (3.0, 1.5)), True),
+)
 TAKEN = Job(
     7, "2026-11-22T08:00:00.000+00:00", TriggerStamp("serial", line="/dev/ttyPanel"), terms=Terms({"number": 1})
 )
@@ -39,7 +54,9 @@ def evidence(job: Job = TAKEN) -> Evidence:
     """As a job has it when its pages are made."""
     quality = Quality(200.0, 60.0, 1.5, 0.8, 20.0, 0.01)
     rests_on = (SentStretch(0, 0.0, 40.0, "seen", None, 0.5), SentStretch(0, 40.0, 300.0, "covered", "object", 9.0))
-    found = measured(uncertainty_px=0.5, uncertainty=ErrorBudget(0.1, 0.2, None), quality=quality, evidence=rests_on)
+    found = measured(
+        uncertainty_px=0.5, uncertainty=ErrorBudget(0.1, 0.2, None), quality=quality, evidence=rests_on, part=LAID
+    )
     envelope = Envelope(job.job_id, 1, 60_000, 30_000, 9, 5, True)
     pages = contour_pages(found, envelope)
     return Evidence(job, Measurer(None), RECIPE, 20.0, FRAME, found, envelope, pages)

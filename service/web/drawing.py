@@ -1,4 +1,5 @@
-"""What is drawn over a job's frame: its contour, what of it was hidden, its uncertainty, fixed marks, and millimetres.
+"""What is drawn over a job's frame: its contour, what of it was hidden, its uncertainty, the part in it, fixed marks,
+and millimetres.
 
 All in pixels of the full frame, (0, 0) the centre of the top-left one.
 """
@@ -21,8 +22,9 @@ from contour.geometry.arrays import Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, area
 from service.measuring.calibration_file import CalibrationFileError, CalibrationRecord, record_of
+from service.parts.fit import PartFit
 from service.records.archived_job import ArchivedJob, EvidenceError
-from service.web.models import Axis, Drawing, Grid, HiddenPart, SentinelMark
+from service.web.models import Axis, Drawing, Grid, HiddenPart, LaidPart, SentinelMark
 
 GRID_COLUMNS, GRID_ROWS = 33, 25  # a browser interpolates between them: docs/how-to/operators-guide.md says how well
 LINES_WANTED = 10
@@ -49,6 +51,7 @@ def drawing(archived: ArchivedJob) -> Drawing:
         holes=[_pairs(hole) for hole in pixels.holes] if pixels else [],
         hidden=_hidden(archived.evidence or (), pixels) if measured and pixels else [],
         band_px=_band_px(measured["uncertainty_mm"] if measured else None, pixels, millimetres),
+        part=_part(archived.part) if measured else None,
         size_mm=None if millimetres is None else _size(millimetres),
         sentinels=list(backdrop.sentinels),
         grid=backdrop.grid,
@@ -91,6 +94,21 @@ def _hidden(evidence: Sequence[SentStretch], pixels: Contour) -> list[HiddenPart
         for part in evidence
         if part.state != "seen"
     ]
+
+
+def _part(fit: PartFit | None) -> LaidPart | None:
+    if fit is None or fit.drawn is None:
+        return None
+    return LaidPart(
+        exterior=_pairs(fit.drawn.outline.exterior),
+        holes=[_pairs(hole) for hole in fit.drawn.outline.holes],
+        tightest=_pairs(np.array(fit.drawn.tightest)),
+        fits=fit.fits,
+        margin_mm=round(fit.margin_mm, 3),
+        asked_mm=fit.asked_mm,
+        needed_mm=round(fit.needed_mm, 3),
+        px_per_mm=round(fit.drawn.margin_px / fit.needed_mm, 4),
+    )
 
 
 def _size(millimetres: Contour) -> tuple[float, float]:

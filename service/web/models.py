@@ -205,6 +205,19 @@ class HiddenPart(Answer):
     points: Points
 
 
+class LaidPart(Answer):
+    """The part in the block, in pixels of the frame: its rings, and its tightest place on its outline and the block's."""
+
+    exterior: Points
+    holes: list[Points]
+    tightest: Points
+    fits: bool
+    margin_mm: float = Field(description="The least distance to the block's edge that was reached.")
+    asked_mm: float = Field(description="The margin that the recipe asks for.")
+    needed_mm: float = Field(description="That and the contour's own bound.")
+    px_per_mm: float
+
+
 class Drawing(Answer):
     """What is drawn over a job's frame, in its pixels; (0, 0) is the centre of the top-left one."""
 
@@ -216,6 +229,7 @@ class Drawing(Answer):
     holes: list[Points]
     hidden: list[HiddenPart]
     band_px: float | None = Field(description="What the contour may be off by.")
+    part: LaidPart | None
     size_mm: tuple[float, float] | None
     sentinels: list[SentinelMark]
     grid: Grid | None

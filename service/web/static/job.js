@@ -3,8 +3,9 @@
 import { at, make, say } from "./dom.js";
 import { amount, moment, number, onLanguage, words } from "./words.js";
 import { reasonOf } from "./now.js";
+import { show as showPart } from "./part.js";
 
-const STAGES = ["frame", "table", "mask", "trace", "quality", "convert", "simplify", "judge", "guard", "pages", "transfer", "total"];
+const STAGES = ["frame", "table", "mask", "trace", "quality", "convert", "simplify", "judge", "guard", "part", "pages", "transfer", "total"];
 const WIDE = ["uncertainty", "recipe", "when", "origin"]; // a line of their own
 const ORIGINS = { controller: "controller_kind" };
 
@@ -25,6 +26,7 @@ function refresh() {
   say("outcome", `${words("job_runs", { job: job.job_id })}: ${words(kind)}`);
   because();
   values();
+  showPart(drawing?.part ?? null);
   stages();
   downloads();
 }

@@ -1,6 +1,7 @@
 // The frame with its contour over it: zoom, pan, and where the pointer is in millimetres.
 
 import { at, draw } from "./dom.js";
+import { drawn as drawnPart } from "./part.js";
 import { number, onLanguage, words } from "./words.js";
 
 const STEP = 1.25;
@@ -67,6 +68,7 @@ function contour() {
   group.append(draw("path", { class: "exterior", d: path(drawing.exterior) }));
   for (const { covered, points } of drawing.hidden) group.append(draw("path", { class: covered ? "covered" : "bridged", d: line(points) }));
   const corners = rings.flat();
+  if (drawing.part) group.append(drawnPart(drawing.part, path, drawing.width, drawing.height));
   if (corners.length <= MOST_MARKS) group.append(draw("path", { class: "vertices", d: corners.map(([x, y]) => `M${x} ${y}h0`).join("") }));
   return group;
 }

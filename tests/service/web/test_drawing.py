@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,12 @@ import numpy as np
 import pytest
 import yaml
 
+from contour.geometry.rings import Contour
+from contour.placement.place import Placement
+from contour.placement.pose import Pose
 from service.measuring.calibration_file import load_record
+from service.parts.fit import PartFit, in_picture
+from service.parts.part import Part
 from service.records.archived_job import ArchivedJob, EvidenceError
 from service.web.drawing import drawing, nice_step
 from service.web.models import Drawing, Grid
@@ -36,6 +42,30 @@ def archived(**changes: Any) -> ArchivedJob:
         },
     }
     return ArchivedJob(7, Path("7-accepted.json"), {**document, **changes})
+
+
+def laid() -> PartFit:
+    """A part of 20 mm in the square's lower left corner, 5 mm from its edges."""
+    corner = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]])
+    part, pose = Part(Path("part.dxf"), Contour(corner), "mm"), Pose(105.0, 105.0, 0.0)
+    placement = Placement(pose, 5.0, ((105.0, 105.0), (100.0, 105.0)))
+    fit = PartFit(part, placement, pose.placed(part.contour), asked_mm=3.0, bound_mm=1.0)
+    return in_picture(fit, RECORD.calibration, THICKNESS_MM)
+
+
+def test_the_part_is_drawn_where_it_lies_with_what_it_needs() -> None:
+    assert drawing(archived()).part is None
+    document = archived().document["measurement"]
+    shown = drawing(archived(measurement={**document, "part": json.loads(json.dumps(laid().kept()))})).part
+    assert shown is not None
+    back = RECORD.calibration.to_work(np.array(shown.exterior), THICKNESS_MM)
+    assert np.abs(RECORD.calibration.to_machine(back).min(axis=0) - 105.0).max() < 0.02
+    assert np.abs(RECORD.calibration.to_machine(back).max(axis=0) - 125.0).max() < 0.02
+    ends = RECORD.calibration.to_machine(RECORD.calibration.to_work(np.array(shown.tightest), THICKNESS_MM))
+    assert np.abs(ends - [[105.0, 105.0], [100.0, 105.0]]).max() < 0.02
+    assert (shown.fits, shown.margin_mm, shown.asked_mm, shown.needed_mm) == (True, 5.0, 3.0, 4.005)
+    length_px = math.dist(*shown.tightest)
+    assert shown.px_per_mm == pytest.approx(length_px / 5.0, rel=0.02)
 
 
 def interpolated(shown: Drawing, grid: Grid, x: float, y: float) -> tuple[float, float]:

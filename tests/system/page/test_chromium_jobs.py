@@ -114,6 +114,34 @@ def test_hidden_parts_of_the_edge_are_told_from_what_was_seen(panel: Panel) -> N
     page.unroute_all(behavior="wait")
 
 
+def test_the_part_is_drawn_and_the_slider_tells_what_another_margin_would_do(panel: Panel) -> None:
+    page = panel.page
+    square = [[300, 200], [400, 200], [400, 300], [300, 300]]
+    part = {
+        "exterior": square, "holes": [], "tightest": [[300, 250], [280, 250]], "fits": True,
+        "margin_mm": 8.0, "asked_mm": 3.0, "needed_mm": 3.5, "px_per_mm": 2.5,
+    }  # fmt: skip
+
+    def with_part(route: Route) -> None:
+        route.fulfill(json={**route.fetch().json(), "part": part})
+
+    page.route("**/drawing", with_part)
+    panel.ordered()
+    expect(page.locator("#view path.part-outline")).to_have_attribute("d", "M300 200L400 200L400 300L300 300Z")
+    expect(page.locator("#view path.part-tightest")).to_have_attribute("d", "M300 250L280 250")
+    expect(page.locator("#view path.part-margin")).to_have_attribute("stroke-width", "17.5")
+    expect(page.locator("#part-told")).to_have_text(
+        "The part fits with a margin of 3.0\u00a0mm: 8.00\u00a0mm is there."
+    )
+    page.locator("#part-margin").fill("9.5")
+    expect(page.locator("#part-told")).to_contain_text("short by 2.00\u00a0mm")
+    expect(page.locator("#view path.part-margin")).to_have_attribute("stroke-width", "50")
+    page.unroute_all(behavior="wait")
+    panel.ordered()
+    expect(page.locator("#part")).to_be_hidden()
+    expect(page.locator("#view path.part-outline")).to_have_count(0)
+
+
 def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:
     page = panel.page
     (number,) = panel.accepted(1)

@@ -206,7 +206,7 @@ class HiddenPart(Answer):
 
 
 class LaidPart(Answer):
-    """The part in the block, in pixels of the frame: its rings, and its tightest place on its outline and the block's."""
+    """The part in the block, in pixels of the frame; its tightest place is on its own outline and on the block's."""
 
     exterior: Points
     holes: list[Points]

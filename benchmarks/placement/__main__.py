@@ -92,7 +92,11 @@ def report(done: Sequence[Laid], refused: int) -> str:
         ("the same, the best dozen of them moved until nothing helped, worst", f"{max(0.0, *behind):.3f} mm"),
         (f"behind these by more than {CLOSE_MM:g} mm", str(sum(one > CLOSE_MM for one in behind))),
         ("our margin and shapely's of the same pose differ, worst", f"{max(differ):.1g} mm"),
-        ("parts nearer to the rendered edge than margin less bound", str(len(nearer))),
+        ("nearer to the rendered edge than margin less its 95 % bound", f"{len(nearer)} of {len(inside)}"),
+        (
+            "the worst of them, by",
+            f"{max((one.margin_mm - one.bound_mm - one.true_mm for one in nearer), default=0.0):.2f} mm",
+        ),
         ("time, median / worst", f"{statistics.median(seconds):.2f} / {max(seconds):.2f} s"),
         ("processor time, median / worst", f"{statistics.median(cpu):.2f} / {max(cpu):.2f} s"),
     ]

@@ -24,6 +24,7 @@ _MEASURED = 24
 """Candidates that are measured exactly: more found nothing better on drawn blocks and parts."""
 
 _MOST_MOVES = 40
+_GIVEN_UP_MOVES = 12
 _ROUGH_SHAPE_MM = 0.05
 _ROUGH_MOVE_MM = 0.05
 _LEAST_MOVE_MM = 1e-4
@@ -73,7 +74,7 @@ def best_placement(part: Contour, block: Contour, turns: Turns) -> Placement:
         # What the field may be off by, and a climb on it may have left, decide whether it can still win.
         if candidate.depth_mm < best_so_far - 2 * first_move:
             break
-        rough.append((candidate, lying.improved(candidate, first_move, _ROUGH_MOVE_MM)))
+        rough.append((candidate, lying.improved(candidate, first_move, _ROUGH_MOVE_MM, best_so_far)))
     lying = _Lying.of(part, block, field)
     rough.sort(key=lambda one: -one[1].margin)
     final = [
@@ -111,13 +112,16 @@ class _Lying:
         in_part = DepthField.of(part, _PART_PAD * float(np.ptp(part.exterior, axis=0).max()), _PART_NODES)
         return cls(Outline.of(part), Outline.of(block), in_part, in_block, pivot_of(part))
 
-    def improved(self, candidate: Candidate, move_mm: float, least_mm: float) -> Placement:
-        """From the candidate on, as far as moves lead, the first of them up to `move_mm`, the last `least_mm`."""
+    def improved(self, candidate: Candidate, move_mm: float, least_mm: float, beaten_by: float = -np.inf) -> Placement:
+        """From the candidate on, as far as moves lead, the first of them up to `move_mm`, the last `least_mm`.
+
+        It is given up where a dozen more of its moves would not reach a margin that another one has.
+        """
         pose, limits = candidate.pose, candidate.turn_range
         arm = max(float(np.hypot(*(self.part.start - self.pivot).T).max()), 1e-9)
         near = self._contacts(pose, 3 * move_mm)
         for _ in range(_MOST_MOVES):
-            if move_mm < least_mm:
+            if move_mm < least_mm or near.least + _GIVEN_UP_MOVES * move_mm < beaten_by:
                 break
             turns = (limits[0] - pose.angle, limits[1] - pose.angle)
             step = _best_step(near, self._place(pose), arm, move_mm, turns)

@@ -51,7 +51,7 @@ def candidates(part: Contour, block: Contour, turns: Turns) -> tuple[list[Candid
     coarse = fine.every(_STRIDE)
     samples = _samples(part, block, coarse.spacing_mm) - pivot
     angles = turns.samples()
-    levels = np.stack([_eroded(coarse, samples, angle) for angle, _ in angles])
+    levels = [_eroded(coarse, samples, angle) for angle, _ in angles]
     chosen = _peaks(levels, turns)
     starts = np.array(
         [
@@ -100,21 +100,24 @@ def _eroded(field: DepthField, samples: Float64s, angle: float) -> Float32s:
     return np.asarray(eroded, np.float32)
 
 
-def _peaks(levels: Float32s, turns: Turns) -> Indices:
+def _peaks(levels: list[Float32s], turns: Turns) -> Indices:
     """Places (turn, row, column) no worse than their neighbours, the best `_CLIMBERS`, shape (K, 3)."""
-    around = np.stack([np.asarray(cv2.dilate(level, np.ones((3, 3), np.uint8)), np.float32) for level in levels])
-    best = around.copy()
-    linked = turns.neighbours()
-    if linked:
-        both = np.array(linked)[:, None, None]
-        best[1:] = np.maximum(best[1:], np.where(both, around[:-1], -np.inf))
-        best[:-1] = np.maximum(best[:-1], np.where(both, around[1:], -np.inf))
-    if turns.cyclic:
-        best[0], best[-1] = np.maximum(best[0], around[-1]), np.maximum(best[-1], around[0])
-    # Where the part leaves the grid all is alike.
-    peaks = np.argwhere((levels >= best) & (levels > float(levels.min())))
-    order = np.argsort(-levels[tuple(peaks.T)], kind="stable")[:_CLIMBERS]
-    return np.asarray(peaks[order], np.intp)
+    around = [np.asarray(cv2.dilate(level, np.ones((3, 3), np.uint8)), np.float32) for level in levels]
+    linked = [turns.cyclic, *turns.neighbours(), turns.cyclic]
+    floor = min(float(level.min()) for level in levels)
+    places, depths = [], []
+    for k, level in enumerate(levels):
+        beside = [
+            around[k],
+            *([around[k - 1]] if linked[k] else []),
+            *([around[k + 1 - len(levels)]] if linked[k + 1] else []),
+        ]
+        # Where the part leaves the grid all is alike.
+        row, column = np.nonzero((level >= np.maximum.reduce(beside)) & (level > floor))
+        places.append(np.column_stack([np.full(len(row), k), row, column]))
+        depths.append(level[row, column])
+    order = np.argsort(-np.concatenate(depths), kind="stable")[:_CLIMBERS]
+    return np.asarray(np.concatenate(places)[order], np.intp)
 
 
 def _climbed(

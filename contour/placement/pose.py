@@ -15,7 +15,7 @@ from contour.geometry.rings import Contour
 MOST_STEPS = 360
 """Turns that are tried one by one: more would take longer than all of them together."""
 
-_FREE_STEP = math.radians(2.0)
+_FREE_STEP = math.radians(1.0)
 _FULL_TURN = 2 * math.pi
 _SLACK = 1e-9
 
@@ -96,7 +96,7 @@ class Turns:
         return Turns(kept)
 
     def samples(self) -> list[tuple[float, tuple[float, float]]]:
-        """Angles to begin from, each with its interval: all single ones, and every 2 degrees of an interval."""
+        """Angles to begin from, each with its interval: all single ones, and every degree of an interval."""
         found = []
         for low, high in self.intervals:
             if math.isinf(low):

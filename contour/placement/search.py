@@ -20,7 +20,7 @@ from contour.placement.pose import Pose, Turns
 _NODES = 640
 _STRIDE = 4
 _MOST_SAMPLES = 320
-_CLIMBERS = 96
+_CLIMBERS = 192
 _CLIMB_STEPS = 36
 _PAD_SHARE = 0.04
 """Of the block's size, besides what the part is larger by however it is turned: beyond the grid nothing is known."""

@@ -104,7 +104,8 @@ def report(done: Sequence[Laid], refused: int) -> str:
     return (
         f"## Parts laid into traced blocks\n\nRandom blocks {first} to {last}, {refused} of them refused, each with a "
         "part drawn at random of 8 to 50 % of its area, turned freely (`python -m benchmarks.placement`). Margins are "
-        "to the traced outline; the rendered edge is the true one.\n\n" + table(("", "measured"), rows)
+        "to the traced outline; the rendered edge is the true one. Processor time is what counts where a "
+        "machine has other work.\n\n" + table(("", "measured"), rows)
     )
 
 

@@ -1,0 +1,231 @@
+"""Flat lattices and plates with cells of any form, drawn from their truth: closed, cut and mixed borders, one a seed.
+
+Apart from the renderer of cut blocks: cells of square, triangular, hexagonal, over-expanded and flexed form and round
+holes, whose border is closed around whole cells, cut through them, or closed and then cut along one line. Light falls
+straight down; the floor of cells is the table, a little darker.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.geometry.rings import Contour
+
+Cells = Literal["hexagonal", "square", "triangular", "over-expanded", "flex", "round"]
+Border = Literal["closed", "cut", "mixed"]
+CELLS: tuple[Cells, ...] = ("hexagonal", "square", "triangular", "over-expanded", "flex", "round")
+BORDERS: tuple[Border, ...] = ("closed", "cut", "mixed")
+
+WIDTH, HEIGHT = 900, 700
+_FINER = 3
+_MARGIN_PX = 14.0
+_ROW = np.sqrt(3.0) / 2.0
+
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A picture, grey (H, W), uint8, with its true outline in pixels, the kind of its border, and its pitch."""
+
+    picture: NDArray[np.uint8]
+    outline: Contour
+    cells: Cells
+    border: Border
+    bright_table: bool
+    pitch_px: float
+
+
+def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
+    """The lattice of this seed; the same arguments give the same picture."""
+    rng = np.random.default_rng([seed, CELLS.index(cells), BORDERS.index(border)])
+    pitch = float(np.exp(rng.uniform(np.log(14.0), np.log(60.0))))
+    # Round holes leave more material between them than walls are wide.
+    wall = pitch * float(rng.uniform(0.2, 0.45) if cells == "round" else rng.uniform(0.06, 0.2))
+    wall = max(wall, 1.5)
+    y, x = np.mgrid[0 : HEIGHT * _FINER, 0 : WIDTH * _FINER].astype(np.float32)
+    x, y = (x + 0.5) / _FINER - 0.5, (y + 0.5) / _FINER - 0.5
+    # A hole that a later cut opens is a bay with closed cells: nobody can tell where it was meant to end.
+    outline = _box(rng, x, y, pitch, holed=border != "mixed")
+    into_wall, number, centre = _pattern(rng, cells, x, y, pitch, wall)
+    body = outline
+    if border != "cut":
+        body = _whole_cells(outline, number, centre, wall, rim=cells == "round", rng=rng)
+    if border == "mixed":
+        body = body & _half_plane(rng, x, y)
+    if cells == "round" and border != "cut":
+        # Only whole holes are drilled; the sheet goes on around them.
+        drilled = np.isin(number, _kept(outline, number, centre, x, y, pitch))
+        into_wall = np.where(drilled, into_wall, np.float32(1.0))
+    body = _largest(body)
+    material = body & (into_wall > 0)
+    bright_table = bool(rng.random() < 0.5)
+    picture = _rendered(rng, body, material, bright_table)
+    return Lattice(picture, _contour(body), cells, border, bright_table, pitch)
+
+
+def _box(rng: np.random.Generator, x: Floats, y: Floats, pitch: float, *, holed: bool) -> NDArray[np.bool_]:
+    """An L or a rectangle, turned."""
+    angle = float(rng.uniform(0, np.pi))
+    cx, cy = WIDTH / 2 + rng.uniform(-30, 30), HEIGHT / 2 + rng.uniform(-20, 20)
+    u = (x - cx) * np.cos(angle) + (y - cy) * np.sin(angle)
+    v = -(x - cx) * np.sin(angle) + (y - cy) * np.cos(angle)
+    half = float(rng.uniform(200, 250))
+    a, b = half, half * float(rng.uniform(0.6, 0.95))
+    box = (np.abs(u) < a) & (np.abs(v) < b)
+    if rng.random() < 0.4:
+        box &= ~((u > 0.1 * a) & (v > 0.0))
+    # Openings narrower than 2.2 cells are missing cells.
+    if rng.random() < 0.3 and holed and 0.3 * b > 2.2 * pitch:
+        box &= np.hypot(u + 0.45 * a, v + 0.3 * b) > 0.3 * b
+    return np.asarray(box)
+
+
+def _pattern(
+    rng: np.random.Generator, cells: Cells, x: Floats, y: Floats, pitch: float, wall: float
+) -> tuple[Floats, NDArray[np.int64], tuple[Floats, Floats]]:
+    """How far each place lies within a wall (px, negative in cells), its cell's number, and that cell's centre."""
+    angle = float(rng.uniform(0, np.pi))
+    u = x * np.cos(angle) + y * np.sin(angle) + rng.uniform(0, pitch)
+    v = -x * np.sin(angle) + y * np.cos(angle) + rng.uniform(0, pitch)
+    wide = 1.0
+    if cells == "flex":
+        v = v + 0.18 * pitch * np.sin(2 * np.pi * u / (5.3 * pitch))
+    if cells in ("over-expanded", "flex"):
+        wide = 1.45 if cells == "over-expanded" else 1.25
+    u, v = u / pitch / wide, v / pitch
+    if cells == "square":
+        i, j = np.rint(u), np.rint(v)
+        gap = 0.5 - np.maximum(np.abs(u - i), np.abs(v - j))
+    elif cells == "triangular":
+        # Three families of lines, one apart; a triangle is the place between them.
+        a, b, c = v / _ROW, (0.5 * v + _ROW * u) / _ROW, (0.5 * v - _ROW * u) / _ROW
+        gap = np.minimum.reduce([np.abs(k - np.rint(k)) for k in (a, b, c)]) * _ROW
+        i, j = np.floor(a) * 4096 + np.floor(b), np.floor(c)
+    else:
+        i, j, du, dv = _nearest_hex(u, v)
+        if cells == "round":
+            gap = 0.5 - np.hypot(du, dv)
+        else:
+            across = [np.abs(du * nx + dv * ny) for nx, ny in ((1.0, 0.0), (0.5, _ROW), (-0.5, _ROW))]
+            gap = 0.5 - np.maximum.reduce(across)
+    into = 0.5 * wall - np.asarray(gap, np.float32) * pitch
+    number = (np.rint(i) * 8192 + np.rint(j)).astype(np.int64)
+    _, index = np.unique(number, return_inverse=True)
+    index = index.reshape(number.shape)
+    count = np.maximum(np.bincount(index.ravel()), 1)
+    centre_x = (np.bincount(index.ravel(), x.ravel()) / count).astype(np.float32)
+    centre_y = (np.bincount(index.ravel(), y.ravel()) / count).astype(np.float32)
+    return into.astype(np.float32), index, (centre_x, centre_y)
+
+
+def _nearest_hex(u: Floats, v: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    tall = 2.0 * _ROW
+    row_a, col_a = np.rint(v / tall), np.rint(u)
+    row_b, col_b = np.rint(v / tall - 0.5), np.rint(u - 0.5)
+    a, b = (u - col_a, v - row_a * tall), (u - col_b - 0.5, v - row_b * tall - _ROW)
+    first = a[0] ** 2 + a[1] ** 2 < b[0] ** 2 + b[1] ** 2
+    i = np.where(first, 2 * col_a, 2 * col_b + 1)
+    j = np.where(first, 2 * row_a, 2 * row_b + 1)
+    return i, j, np.where(first, a[0], b[0]), np.where(first, a[1], b[1])
+
+
+def _depth(outline: NDArray[np.bool_]) -> Floats:
+    """Distance inside an outline, px of the picture; 0 outside."""
+    return np.asarray(cv2.distanceTransform(outline.astype(np.uint8), cv2.DIST_L2, 5) / _FINER, np.float32)
+
+
+def _kept(
+    outline: NDArray[np.bool_],
+    number: NDArray[np.int64],
+    centre: tuple[Floats, Floats],
+    x: Floats,
+    y: Floats,
+    pitch: float,
+) -> NDArray[np.int64]:
+    """Numbers of the holes that lie within the outline by 0.6 of a pitch from their middle."""
+    column = np.clip(np.rint((centre[0] + 0.5) * _FINER - 0.5).astype(int), 0, x.shape[1] - 1)
+    row = np.clip(np.rint((centre[1] + 0.5) * _FINER - 0.5).astype(int), 0, x.shape[0] - 1)
+    return np.flatnonzero(_depth(outline)[row, column] > 0.62 * pitch)
+
+
+def _whole_cells(
+    outline: NDArray[np.bool_],
+    number: NDArray[np.int64],
+    centre: tuple[Floats, Floats],
+    wall: float,
+    *,
+    rim: bool,
+    rng: np.random.Generator,
+) -> NDArray[np.bool_]:
+    """The cells whose centres lie inside, with the walls around them; a sheet with holes keeps its outline."""
+    if rim:
+        return outline
+    column = np.clip(np.rint((centre[0] + 0.5) * _FINER - 0.5).astype(int), 0, outline.shape[1] - 1)
+    row = np.clip(np.rint((centre[1] + 0.5) * _FINER - 0.5).astype(int), 0, outline.shape[0] - 1)
+    chosen = outline[row, column]
+    # All of a cell must lie in the picture's middle: what is cut off by the frame has no true centre.
+    cells = chosen[number]
+    away = cv2.distanceTransform(1 - cells.astype(np.uint8), cv2.DIST_L2, 5) / _FINER
+    return np.asarray(away < 0.5 * wall)
+
+
+def _half_plane(rng: np.random.Generator, x: Floats, y: Floats) -> NDArray[np.bool_]:
+    """All on one side of a line that cuts off a part of the block."""
+    angle = float(rng.uniform(0, 2 * np.pi))
+    away = (x - WIDTH / 2) * np.cos(angle) + (y - HEIGHT / 2) * np.sin(angle)
+    return np.asarray(away < rng.uniform(60, 110))
+
+
+def _largest(body: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(body.astype(np.uint8), connectivity=4)
+    return np.asarray(labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])))
+
+
+def _rendered(
+    rng: np.random.Generator, body: NDArray[np.bool_], material: NDArray[np.bool_], bright_table: bool
+) -> NDArray[np.uint8]:
+    low, high = float(rng.uniform(20, 70)), float(rng.uniform(150, 220))
+    table, walls = (high, low) if bright_table else (low, high)
+    floor = table * float(rng.uniform(0.7, 1.0))
+    fine = np.full(body.shape, table, np.float32)
+    # The block's soft shadow.
+    shift = (int(rng.uniform(-6, 6) * _FINER), int(rng.uniform(-6, 6) * _FINER))
+    shade = cv2.blur(np.roll(body, shift, (0, 1)).astype(np.float32), (16 * _FINER, 16 * _FINER))
+    fine *= 1.0 - float(rng.uniform(0.0, 0.25)) * shade
+    fine[body] = floor
+    fine[material] = walls
+    small = cv2.resize(fine, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+    seen = cv2.GaussianBlur(small, (0, 0), float(rng.uniform(0.5, 1.1)))
+    slope = np.linspace(-1, 1, WIDTH)[None, :] * rng.uniform(-0.1, 0.1) + np.linspace(-1, 1, HEIGHT)[
+        :, None
+    ] * rng.uniform(-0.1, 0.1)
+    noise = rng.normal(0.0, float(rng.uniform(0.5, 3.0)), small.shape)
+    return np.asarray(np.clip(np.rint(seen * (1.0 + slope) + noise), 0, 255), np.uint8)
+
+
+def _contour(body: NDArray[np.bool_]) -> Contour:
+    """The outline of a drawn body, in pixels of the picture; openings smaller than a pixel are none."""
+    chains, hierarchy = cv2.findContours(body.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    rings = []
+    for chain, node in zip(chains, hierarchy[0], strict=True):
+        ring = chain[:, 0, :].astype(np.float64)
+        if len(ring) < 4 * _FINER:
+            continue
+        # Pixel centres lie half a fine pixel inside of the body's edge.
+        grown = _moved_out(ring, 0.5)
+        rings.append((float(cv2.contourArea(chain)), bool(node[3] >= 0), (grown + 0.5) / _FINER - 0.5))
+    exterior = max((one for one in rings if not one[1]), key=lambda one: one[0])
+    return Contour(exterior[2], tuple(ring for _, hole, ring in rings if hole))
+
+
+def _moved_out(ring: NDArray[np.float64], by: float) -> NDArray[np.float64]:
+    """The chain moved to its free side, which lies at (−dy, dx) of findContours' direction."""
+    along = np.roll(ring, -2, axis=0) - np.roll(ring, 2, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    return ring + by * np.stack([-along[:, 1], along[:, 0]], axis=1)

@@ -4,11 +4,14 @@ ContourError
 ├── PictureError        the array is no usable picture (shape, dtype, empty)
 ├── ParameterError      a method's or renderer's parameter is out of its range
 ├── NoBlockFound        the picture was usable, but no block could be traced in it
+├── EdgeContradicted    the block's border is not of the kind that was promised
 ├── BoardNotSeen        the picture shows no calibration board that could be used
 ├── MarginImpossible    a contour that a margin tears, closes up or lets vanish
 ├── CalibrationFailed   views or points from which no calibration can be had
 └── CalibrationError    a calibration that contradicts itself, or does not fit the picture
 """
+
+from typing import Literal
 
 
 class ContourError(Exception):
@@ -25,6 +28,14 @@ class ParameterError(ContourError):
 
 class NoBlockFound(ContourError):
     """The picture is usable, but no block could be traced in it; the message says what was found instead."""
+
+
+class EdgeContradicted(ContourError):
+    """The block's border is not of the kind that was promised: what was promised, and what was seen (`edge`)."""
+
+    def __init__(self, message: str, edge: Literal["cut", "cells", "mixed"]) -> None:
+        super().__init__(message)
+        self.edge = edge
 
 
 class CalibrationError(ContourError):

@@ -41,6 +41,7 @@ class Reason(IntEnum):
     OUTSIDE_WORK_AREA = 115
     SEVERAL_BLOCKS = 116
     EDGE_COVERED = 117
+    EDGE_CONTRADICTED = 118
     PART_DOES_NOT_FIT = 119
     BUSY = 120
     NOT_READY = 121
@@ -208,6 +209,16 @@ _TABLE: dict[Reason, tuple[Explanation, Explanation]] = {
         Explanation(
             "Кромка заготовки чем-то закрыта.",
             "Уберите то, что лежит на кромке: ленту, прижим, руку, кабель; на снимке это место отмечено красным.",
+        ),
+    ),
+    Reason.EDGE_CONTRADICTED: (
+        Explanation(
+            "The block's border is not of the kind that the recipe's edge promises.",
+            "Put edge: auto into the recipe, or the kind that the text names; check that the right block lies there.",
+        ),
+        Explanation(
+            "Кромка заготовки не такова, как обещает edge в рецепте.",
+            "Укажите в рецепте edge: auto или тот вид, что назван в тексте; проверьте, та ли заготовка лежит.",
         ),
     ),
     Reason.PART_DOES_NOT_FIT: (

@@ -18,6 +18,7 @@ from contour.walls.pieces import Piece
 _EVERYWHERE = 0.125
 # Cell pitches: what is 95 % sure within a quarter of a cell is hardly anywhere off by half a one.
 _SURE_WITHIN_PITCHES = 0.25
+_SURE_WITHIN_SHARE = 0.01
 # Of two blocks whose areas differ by less than this the larger one is a matter of chance.
 _EQUAL_SHARE = 0.8
 
@@ -34,7 +35,8 @@ def no_comb(traced: CheckedTrace | None) -> Finding | None:
     """Cells that look like something else than a cut comb."""
     if traced is None or traced.trace.comb is None:
         return None
-    why = unlike_comb(traced.trace.comb, 0.0 if traced.quality is None else traced.quality.blur_px)
+    blur_px = 0.0 if traced.quality is None else traced.quality.blur_px
+    why = unlike_comb(traced.trace.comb, blur_px, cut=traced.trace.edge != "cells")
     return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
 
 
@@ -159,7 +161,9 @@ def vague(traced: Trace | None) -> Finding | None:
     if traced is None or traced.uncertainty_px is None or not traced.pitch_px:
         return None
     cells = traced.uncertainty_px / traced.pitch_px
-    if cells <= _SURE_WITHIN_PITCHES:
+    # The edge of material is seen without its cells: there a share of the block tells as well what is gross.
+    gross = _SURE_WITHIN_SHARE * area(traced.contour) ** 0.5 if traced.edge == "cells" else 0.0
+    if traced.uncertainty_px <= max(_SURE_WITHIN_PITCHES * traced.pitch_px, gross):
         return None
     return Finding(
         Refusal.UNCERTAINTY_TOO_LARGE,

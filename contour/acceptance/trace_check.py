@@ -51,6 +51,9 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
     `picture` and `rectifier` are those it was traced with.
     """
     quality = block_quality(picture, traced.light, traced.contour, traced.pitch_px)
+    # What is at full scale beside dark material is the table; the edge of the material is seen all the better.
+    if traced.polarity == "dark" and traced.edge == "cells":
+        quality = replace(quality, clipped_share=0.0)
     apart = narrow = alike = bare = None
     if traced.pitch_px is not None:
         flat = None if traced.look is None else traced.look.lit.astype(np.uint8)

@@ -7,6 +7,8 @@ through wall ends describes it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
@@ -22,33 +24,69 @@ _LEAST_SHARE = 0.004
 # How far behind the boundary, and before it, its own half level is looked for.
 _REACH_PX = 3.0
 _OUT_PX = 2.0
-# Gaps of a faint wall, in pitches, that do not open a cell.
-_GAP_PITCHES = 0.3
-_WALL_PITCHES = 0.62
-_CELL_AREA = 1.5
+# Gaps of a faint wall, in pitches, that do not open a cell, and of a broken one. The mouth of a bay between whole cells
+# is hardly wider: where it is narrower, the bay counts as a cell.
+_GAP_PITCHES, _BROKEN_PITCHES = 0.3, 0.5
+_NEARBY_PITCHES = 0.8
+# What the table passes into within two pixels by less than this share of the level is its shadow: edges are sharper.
+_SOFT = 0.2
+# Cells, in squares of the pitch: the least that a faint wall closes, and the most that a broken one opens.
+_LEAST_CELL, _LARGEST_CELL = 0.5, 1.5
+# An opening as large as this is a hole, however narrow; broken walls join fewer cells.
+_HOLE = 5.0
 _SIMPLE_PX = 0.25
+# Of the width of the edge: half a level off moves the outline by so much.
+_LEAST_BOUND_PX, _BOUND_OF_WIDTH = 0.3, 0.4
 
 
-def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> Contour:
-    """Boundary of the largest region that differs from the table, with holes wider than 2.2 pitches, in pixels.
+@dataclass(frozen=True)
+class MaterialEdge:
+    """The outline around material, pixels, and a 95 % bound of how far off it may be.
+
+    border: the material's own outermost pixels with all that stands out of it, walls a pixel wide too, rings (N, 2).
+    """
+
+    contour: Contour
+    bound_px: float
+    border: tuple[Ring, ...]
+
+
+def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge:
+    """Boundary of the largest region that differs from the table, in pixels, with holes wider than 2.2 pitches or as
+    large as five cells.
 
     `walls` (H, W), 255 where the picture shows cell walls, adds those that differ less than most. Exterior with
     negative shoelace, holes positive. The table is a smooth surface in every channel, learnt from the picture's border
     inwards. Raises NoBlockFound.
     """
     difference, noise = _difference(picture)
-    level = _level(difference, noise)
-    faint = (walls > 0) & (difference > OUTLIER * noise)
-    region = _region((difference > level) | faint, pitch_px)
-    chains, hierarchy = cv2.findContours(region, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
-    rings = [
-        (_sub_pixel(difference, chain[:, 0, :].astype(np.float64)), bool(node[3] >= 0))
+    level = _levels(difference, noise, pitch_px)
+    apart = _without_soft_shadow(difference, level)
+    faint = (walls > 0) & (difference > np.maximum(level // 2, OUTLIER * noise))
+    region = _with_faint_cells(_region(apart, pitch_px), _region(apart | faint, pitch_px), pitch_px)
+    border, _ = cv2.findContours(region, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    # Threads a pixel wide would cross themselves once they are moved.
+    body = cv2.morphologyEx(region, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    chains, hierarchy = cv2.findContours(body, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    found = [
+        (*_sub_pixel(difference, level, chain[:, 0, :].astype(np.float64)), bool(node[3] >= 0))
         for chain, node in zip(chains, hierarchy[0], strict=True)
         if len(chain) >= 8
     ]
-    exterior = max((ring for ring, hole in rings if not hole), key=lambda ring: abs(_shoelace(ring)))
-    holes = tuple(_turned(ring, 1.0) for ring, hole in rings if hole)
-    return Contour(_turned(exterior, -1.0), holes)
+    exterior, widths, _ = max((one for one in found if not one[2]), key=lambda one: abs(_shoelace(one[0])))
+    holes = [(_turned(ring, 1.0), wide) for ring, wide, hole in found if hole]
+    widths = np.concatenate([widths, *(wide for _, wide in holes)])
+    contour = Contour(_turned(exterior, -1.0), tuple(ring for ring, _ in holes))
+    bound_px = _LEAST_BOUND_PX + _BOUND_OF_WIDTH * float(np.quantile(widths, 0.95))
+    return MaterialEdge(contour, bound_px, tuple(ring[:, 0].astype(np.float64) for ring in border if len(ring) >= 8))
+
+
+def _with_faint_cells(surely: Bytes, perhaps: Bytes, pitch_px: float) -> Bytes:
+    """A region with what fainter walls add to it, where they close cells: less than half of one is something beside."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(perhaps & (1 - surely), connectivity=8)
+    cells = stats[:, cv2.CC_STAT_AREA] > _LEAST_CELL * pitch_px * pitch_px
+    cells[0] = False
+    return np.where(cells[labels], np.uint8(1), surely & perhaps)
 
 
 def _difference(picture: Bytes) -> tuple[Bytes, float]:
@@ -81,6 +119,33 @@ def _level(difference: Bytes, spread: float) -> float:
     return float(split)
 
 
+def _levels(difference: Bytes, spread: float, pitch_px: float) -> Bytes:
+    """The level for each pixel, shape (H, W): half of what material nearby differs by, so that fainter things beside it
+    stay out.
+    """
+    least = _level(difference, spread)
+    side = 2 * round(_NEARBY_PITCHES * pitch_px) + 1
+    # A grid is enough for what changes over a cell.
+    hop = max(1, side // 8)
+    small = cv2.resize(difference, None, fx=1 / hop, fy=1 / hop, interpolation=cv2.INTER_AREA)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * (side // hop // 2) + 1,) * 2)
+    nearby = cv2.blur(cv2.dilate(small, disc), (5, 5))
+    half = cv2.resize(nearby, difference.shape[::-1], interpolation=cv2.INTER_LINEAR) // 2
+    return np.maximum(np.asarray(half, np.uint8), np.uint8(min(255.0, least)))
+
+
+def _without_soft_shadow(difference: Bytes, level: Bytes) -> Bools:
+    """What differs from the table by more than the level, but for what the table passes into softly: its shadow."""
+    apart = difference > level
+    disc = np.ones((3, 3), np.uint8)
+    rough = cv2.morphologyEx(difference, cv2.MORPH_GRADIENT, disc) > np.maximum(_SOFT * level, 1.0)
+    _, labels = cv2.connectedComponents((~rough).astype(np.uint8), connectivity=4)
+    of_table = np.zeros(int(labels.max()) + 1, np.bool_)
+    of_table[labels[~apart & ~rough]] = True
+    of_table[0] = False
+    return np.asarray(apart & ~of_table[labels])
+
+
 def _region(apart: Bools, pitch_px: float) -> Bytes:
     """The largest piece with its cells filled; inner openings in which a disc of 1.1 pitches' radius fits stay open."""
     material = _closed(apart.astype(np.uint8), _GAP_PITCHES * pitch_px)
@@ -93,11 +158,13 @@ def _region(apart: Bools, pitch_px: float) -> Bytes:
         )
     piece = (labels == int(np.argmax(area))).astype(np.uint8)
     # Of the piece alone: specks of a table lie as close as walls, and enclose as much.
-    piece |= _leaking_cells(piece, pitch_px)
+    margin = round(pitch_px)
+    around = cv2.copyMakeBorder(piece, margin, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
+    piece |= _leaking_cells(around, pitch_px)[margin:-margin, margin:-margin]
     padded = cv2.copyMakeBorder(piece, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
-    _, inner, _, _ = cv2.connectedComponentsWithStats(1 - padded, connectivity=4)
+    _, inner, stats, _ = cv2.connectedComponentsWithStats(1 - padded, connectivity=4)
     room = cv2.distanceTransform(1 - padded, cv2.DIST_L2, 5)
-    open_ = np.zeros(int(inner.max()) + 1, np.bool_)
+    open_ = stats[:, cv2.CC_STAT_AREA] > _HOLE * pitch_px * pitch_px
     open_[inner[room > 1.1 * pitch_px]] = True
     open_[inner[0, 0]] = True
     open_[0] = False
@@ -118,9 +185,10 @@ def _leaking_cells(material: Bytes, pitch_px: float) -> Bytes:
     the table's is the cell.
     """
     away = cv2.distanceTransform(1 - material, cv2.DIST_L2, 5)
-    seeds = (away > 0.5 * _WALL_PITCHES * pitch_px).astype(np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=4)
-    cell = stats[:, cv2.CC_STAT_AREA] < _CELL_AREA * pitch_px * pitch_px
+    seeds = (away > 0.5 * _BROKEN_PITCHES * pitch_px).astype(np.uint8)
+    # As the labels below hang together: a cell that touches the table's seeds by a corner would make all of it a cell.
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=8)
+    cell = stats[:, cv2.CC_STAT_AREA] < _LARGEST_CELL * pitch_px * pitch_px
     cell[0] = False
     if not cell.any():
         return np.zeros_like(material)
@@ -130,8 +198,10 @@ def _leaking_cells(material: Bytes, pitch_px: float) -> Bytes:
     return np.asarray(of_cell[nearest] & (material == 0), np.uint8)
 
 
-def _sub_pixel(difference: Bytes, chain: Float64s) -> Ring:
-    """The chain moved to half of the material's own difference behind it, simplified to a quarter of a pixel."""
+def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s) -> tuple[Ring, Float64s]:
+    """The chain moved to half of the material's own difference behind it, simplified to a quarter of a pixel; and how
+    wide the edge is at each point of the chain, pixels: what material differs by over the steepest fall.
+    """
     smooth = _cyclic_mean(chain, 2)
     tangent = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
@@ -149,8 +219,11 @@ def _sub_pixel(difference: Bytes, chain: Float64s) -> Ring:
     part = (high - level[:, 0]) / np.maximum(high - low, 1e-6)
     shift = np.where(falls.any(axis=1), along[index] + 0.25 * part, 0.5)
     moved = smooth + shift[:, None] * normal
+    steepest = (values[:, :-4] - values[:, 4:]).max(axis=1)
+    behind = chain.astype(np.intp)
+    widths = 2.0 * levels[behind[:, 1], behind[:, 0]] / np.maximum(steepest, 1.0)
     simple = cv2.approxPolyDP(moved.astype(np.float32)[:, None, :], _SIMPLE_PX, True)[:, 0, :]
-    return np.asarray(simple, np.float64)
+    return np.asarray(simple, np.float64), widths
 
 
 def _cyclic_mean(points: Float64s, half: int) -> Float64s:

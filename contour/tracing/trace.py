@@ -16,6 +16,7 @@ from contour.walls.pieces import Piece
 
 Method = Literal["wall-tips", "sliding-matrix", "direct-scan", "find-contours"]
 Polarity = Literal["bright", "dark"]
+Edge = Literal["cut", "cells", "mixed"]
 OnStage = Callable[[str], None]
 
 
@@ -26,7 +27,7 @@ class TraceSettings:
     method: Method = "wall-tips"
     polarity: Literal["auto", "bright", "dark"] = "auto"
     binarize: Literal["flat", "otsu"] | int = "flat"
-    edge: Literal["cut", "cells"] = "cut"
+    edge: Literal["auto", "cut", "cells"] = "auto"
     core_px: int | None = None
     step_px: int | None = None
     threshold: float | None = None
@@ -40,6 +41,7 @@ class Trace:
 
     `light` is the channel in which its walls were seen, (H, W), uint8, of what was looked at. `others` are pieces of
     comb beside it, `comb` what a cut block's cells look like (None where no method looked).
+    `edge` says whether its border was cut through cells or closes them; None where no method looked.
     `reaches_frame`: its walls go on to the last pixels of what was looked at.
     `evidence`: what the contour rests on, stretches without gaps along each ring, and `look` what lies about it; None
     where the method does not say.
@@ -53,6 +55,7 @@ class Trace:
     uncertainty_px: float | None = None
     others: tuple[Piece, ...] = ()
     comb: Comb | None = None
+    edge: Edge | None = None
     reaches_frame: bool = False
     evidence: tuple[Stretch, ...] | None = None
     look: TableLook | None = field(default=None, compare=False, repr=False)

@@ -15,10 +15,11 @@ from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import uncertainty
-from contour.tracing.closed_cells import material_edge
+from contour.tracing.closed_cells import MaterialEdge, material_edge
+from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, few_ends
 from contour.tracing.evidence_check import check_against_evidence
 from contour.tracing.trace import OnStage, Trace, TraceSettings
-from contour.walls.cell_scale import probe
+from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import pieces_beside
 from contour.walls.see_block import see_block, see_walls
@@ -43,7 +44,7 @@ def wall_tips(
     pixels.
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `on_stage` hears
-    "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound.
+    "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound, EdgeContradicted.
     """
     if settings.binarize != "flat":
         raise ParameterError(
@@ -53,8 +54,30 @@ def wall_tips(
     if settings.edge == "cells":
         return _closed_cells(picture, light, settings, on_stage)
     seen, look = looked_at(picture, light, settings, on_stage)
+    closed = _closed_if_seen(picture, light, settings, on_stage, seen) if few_ends(seen) else None
+    if closed is not None:
+        return closed
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
+    try:
+        return _cut(picture, light, (seen, look), rectifier, on_stage)
+    except NoBlockFound:
+        # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
+        closed = None if settings.edge == "cut" else _closed_if_seen(picture, light, settings, on_stage, seen)
+        if closed is None:
+            raise
+        return closed
+
+
+def _cut(
+    picture: Bytes,
+    light: Bytes,
+    looked: tuple[BlockEvidence, TableLook],
+    rectifier: Rectifier | None,
+    on_stage: OnStage,
+) -> Trace:
+    """The line along which a block was cut, through the ends of its walls."""
+    seen, look = looked
     visible = visible_rings(picture, seen, look, rectifier)
     for one in visible:
         check_against_evidence(one.evidence, one.fitted.ring, seen.pitch_px, rectifier)
@@ -81,7 +104,7 @@ def wall_tips(
         for number, (ring, one) in enumerate(zip(contour.rings, visible, strict=True))
         for stretch in ring_evidence(number, ring, one, look, rectifier, sure_px)
     )
-    return replace(_trace(seen, contour, light, uncertainty_px=sure_px), evidence=evidence, look=look)
+    return replace(_trace(seen, contour, light, uncertainty_px=sure_px), edge="cut", evidence=evidence, look=look)
 
 
 def visible_rings(
@@ -138,15 +161,51 @@ def _trace(seen: BlockEvidence, contour: Contour, light: Bytes, *, uncertainty_p
     )
 
 
+def _closed_if_seen(
+    picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage, seen: BlockEvidence
+) -> Trace | None:
+    """The boundary of a block with closed border cells; None where they were cut, or where nothing tells it from the
+    table. Raises EdgeContradicted.
+    """
+    cells, walls = _cells_and_walls(light, settings)
+    try:
+        material = material_edge(picture, cells.pitch_px, walls)
+    except NoBlockFound:
+        return None
+    kind = edge_kind(material, seen)
+    check_promise(settings.edge, kind)
+    if kind == "cut":
+        return None
+    return replace(_around(material, light, cells, walls, on_stage), comb=cells.comb)
+
+
 def _closed_cells(picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage) -> Trace:
     """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
-    cells = probe(light, settings.polarity)
-    walls = wall_mask(light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
+    cells, walls = _cells_and_walls(light, settings)
     on_stage("mask")
-    contour = material_edge(picture, cells.pitch_px, walls)
-    others = pieces_beside(walls, contour.exterior, cells.pitch_px)
+    material = material_edge(picture, cells.pitch_px, walls)
+    check_closed(material.contour.exterior, cells.pitch_px, cells.wall_px)
+    return _around(material, light, cells, walls, on_stage)
+
+
+def _cells_and_walls(light: Bytes, settings: TraceSettings) -> tuple[CellScale, Bytes]:
+    cells = probe(light, settings.polarity)
+    return cells, wall_mask(light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
+
+
+def _around(material: MaterialEdge, light: Bytes, cells: CellScale, walls: Bytes, on_stage: OnStage) -> Trace:
+    others = pieces_beside(walls, material.contour.exterior, cells.pitch_px)
     on_stage("trace")
-    return Trace("wall-tips", "bright" if cells.bright else "dark", cells.pitch_px, contour, light, others=others)
+    return Trace(
+        "wall-tips",
+        "bright" if cells.bright else "dark",
+        cells.pitch_px,
+        material.contour,
+        light,
+        uncertainty_px=material.bound_px,
+        others=others,
+        edge="cells",
+    )
 
 
 def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:

@@ -33,6 +33,8 @@ _SAMPLED = 64
 # Six neighbours of a honeycomb's cell are 1 pitch away, of an over-expanded one 0.8 to 1.2, the next ones 1.5.
 _NEIGHBOUR_PITCHES = (0.75, 1.35)
 _NEIGHBOURS = 4
+# Of a triangle's, three lie 0.82 pitches away, and the next six 1.41.
+_NEXT_TRIANGLES = (1.1, 1.6)
 
 
 @dataclass(frozen=True)
@@ -60,15 +62,16 @@ def surely_comb(comb: Comb) -> bool:
     return many and comb.solid >= _CONVEX and comb.order >= _ORDER_OF_SCATTERED
 
 
-def unlike_comb(comb: Comb, blur_px: float) -> str | None:
-    """Why this is no cut honeycomb, as a sentence with what was measured and what to do; None where it may be one.
+def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
+    """Why this is no honeycomb, as a sentence with what was measured and what to do; None where it may be one.
 
-    `blur_px`: standard deviation of the picture's blur there; it makes walls look wider, and is taken off.
+    `blur_px`: standard deviation of the picture's blur there; it makes walls look wider, and is taken off. `cut`: its
+    border was cut through cells, so that it may be foam.
     """
     sharp_px = math.sqrt(max(comb.wall_px**2 - (_BLUR_WIDTH * blur_px) ** 2, 0.0))
     share = min(sharp_px, comb.wall_px - _WIDER_PX) / comb.pitch_px
-    # Foam has wide bright walls, and cells of all sizes between them.
-    even = not comb.bright or comb.regular > _REGULAR
+    # Foam has wide bright walls, and cells of all sizes between them; so has a sheet with letters, which closes them.
+    even = not (cut and comb.bright) or comb.regular > _REGULAR
     if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and even:
         return (
             f"what lies between patches {comb.pitch_px:.0f} px apart is {100 * share:.0f} % as wide as that, cell "
@@ -98,13 +101,19 @@ def unlike_comb(comb: Comb, blur_px: float) -> str | None:
 
 
 def lattice_order(places: Float64s, pitch_px: float) -> float:
-    """Share of cells with four neighbours or more about a pitch away, 0 to 1; centroids of cells (N, 2), pixels."""
+    """Share of cells with neighbours all around, 0 to 1; centroids of cells (N, 2), pixels: four or more about a pitch
+    away, or three nearer ones and then six, as triangles have.
+    """
     some = places[_spread(len(places))]
     near = np.abs(some[:, None, :] - places[None, :, :])
     square = (near[:, :, 0] ** 2 + near[:, :, 1] ** 2) / pitch_px**2
-    low, high = _NEIGHBOUR_PITCHES
-    neighbours = ((square > low**2) & (square < high**2)).sum(axis=1)
-    return float(np.mean(neighbours >= _NEIGHBOURS))
+
+    def between(low: float, high: float) -> Indices:
+        return np.asarray(((square > low**2) & (square < high**2)).sum(axis=1), np.intp)
+
+    around = between(*_NEIGHBOUR_PITCHES) >= _NEIGHBOURS
+    triangles = (between(0.0, _NEXT_TRIANGLES[0]) == 3) & (between(*_NEXT_TRIANGLES) >= _NEIGHBOURS)
+    return float(max(np.mean(around), np.mean(triangles)))
 
 
 def solidity(labels: Int32s, numbers: Indices, stats: Int32s) -> float:

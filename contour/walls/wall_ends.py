@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s, Int64s
+from contour.geometry.rings import Ring, densified
 from contour.walls.coarse_rings import CoarseBlock
 
 _BAND_PITCHES = 1.25
@@ -64,14 +65,7 @@ def edge_chains(mask: Bytes, coarse: CoarseBlock, pitch_px: float) -> Chains:
 
 def find_ends(chains: Chains, coarse: CoarseBlock, pitch_px: float, wall: float) -> WallEnds:
     """Points where the two arms along the chain lie about a wall's width apart and the point sticks out of them."""
-    arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch_px)))
-    everywhere = np.arange(len(chains.points))
-    gap, stick, out = _arms(chains, everywhere, arm)
-    # A sharp corner of a small cell has close arms too, but sticks out into the wall. A wall one pixel wide has none
-    # of both.
-    free = (chains.free_side(everywhere, arm) * out).sum(axis=1)
-    candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm) & (free > -0.5)
-    peak = _peaks(chains, np.where(candidate, stick - 0.5 * gap, -np.inf), arm)
+    arm, peak = _tips(chains, pitch_px, wall)
     depth = coarse.depth_at(chains.points[peak])
     peak = peak[np.abs(depth) < _DEPTH_PITCHES * pitch_px]
     # The arms are let out for as long as they stay a wall's width apart: that much of the wall is straight.
@@ -84,6 +78,27 @@ def find_ends(chains: Chains, coarse: CoarseBlock, pitch_px: float, wall: float)
         straight = np.where(still, stick, straight)
         axis = np.where(still[:, None], out, axis)
     return WallEnds(chains.points[peak], axis, straight)
+
+
+def ring_tips(ring: Ring, pitch_px: float, wall: float) -> Float64s:
+    """Where a ring around material, negative shoelace, comes back on itself within a wall's width: the ends of walls
+    that stand out of it, shape (K, 2), in its order.
+    """
+    points = densified(ring, 1.0)
+    one = Chains(points, np.zeros(len(points), np.int64), np.full(len(points), len(points), np.int64))
+    return points[_tips(one, pitch_px, wall)[1]]
+
+
+def _tips(chains: Chains, pitch_px: float, wall: float) -> tuple[int, Int64s]:
+    """How long arms along the chains are, and the points that stick out of two arms a wall's width apart."""
+    arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch_px)))
+    everywhere = np.arange(len(chains.points))
+    gap, stick, out = _arms(chains, everywhere, arm)
+    # A sharp corner of a small cell has close arms too, but sticks out into the wall. A wall one pixel wide has none
+    # of both.
+    free = (chains.free_side(everywhere, arm) * out).sum(axis=1)
+    candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm) & (free > -0.5)
+    return arm, _peaks(chains, np.where(candidate, stick - 0.5 * gap, -np.inf), arm)
 
 
 def _arms(chains: Chains, at: Int64s, arm: int) -> tuple[Float64s, Float64s, Float64s]:

@@ -30,7 +30,7 @@ class PlainRecipe:
     max_area_mm2: float = 4_000_000.0
     polarity: Literal["auto", "bright", "dark"] = "auto"
     binarize: Literal["flat", "otsu"] | int = "flat"
-    edge: Literal["cut", "cells"] = "cut"
+    edge: Literal["auto", "cut", "cells"] = "auto"
     pieces: Literal["one", "largest"] = "one"
     max_bridged_mm: float = 0.0
     bridge: Literal["straight", "arcs"] = "straight"

@@ -133,7 +133,9 @@ class Recipe(Model):
     binarize: Literal["flat", "otsu"] | Annotated[int, Field(ge=0, le=255)] = Field(
         "flat", description="How walls are told from gaps: flat, otsu, or a fixed grey level 0 to 255."
     )
-    edge: Literal["cut", "cells"] = Field("cut", description="cut: cells are cut open at the edge; cells: closed.")
+    edge: Literal["auto", "cut", "cells"] = Field(
+        "auto", description="auto: seen in the picture; cut: cells are cut open at the edge; cells: closed."
+    )
     pieces: Literal["one", "largest"] = Field(
         "one", description="one: other blocks in view are refused; largest: smaller ones are not."
     )

@@ -19,7 +19,7 @@ from contour.acceptance.picture_findings import judge_table
 from contour.acceptance.sent_evidence import ToMillimetres, sent_evidence
 from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
-from contour.errors import CalibrationError, NoBlockFound, ParameterError
+from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, ParameterError
 from contour.geometry.rectifier import CroppedRectifier, Rectifier
 from contour.geometry.rings import Contour, Ring, densified
 from contour.image.line_noise import without_line_noise
@@ -122,6 +122,8 @@ class Measurer:
         except NoBlockFound as error:
             watch.lap("trace")
             result = replace(result, findings=rejections(judge_without_block(picture, str(error))))
+        except EdgeContradicted as error:
+            result = replace(result, edge=error.edge, findings=((Reason.EDGE_CONTRADICTED, str(error)),))
         except CalibrationError as error:
             result = replace(result, findings=((Reason.CALIBRATION_MISMATCH, str(error)),))
         if self._guard is not None:
@@ -165,7 +167,12 @@ class Measurer:
         checked = _checked_trace(picture, recipe, region, rectifier, watch)
         traced = checked.trace
         result = replace(
-            result, polarity=traced.polarity, pitch_px=traced.pitch_px, pixels=traced.contour, quality=checked.quality
+            result,
+            polarity=traced.polarity,
+            pitch_px=traced.pitch_px,
+            edge=traced.edge,
+            pixels=traced.contour,
+            quality=checked.quality,
         )
         polygon = self._polygon(traced.contour, recipe, thickness_mm, watch)
         sure_px = None if traced.uncertainty_px is None else polygon.bound_px(traced.uncertainty_px)

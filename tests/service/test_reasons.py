@@ -16,11 +16,12 @@ ROOT = Path(__file__).parents[2]
 PROTOCOL = {
     100: "no_frame", 101: "stale_frame", 102: "image_quality", 103: "scene_moved", 110: "no_block_found",
     111: "touches_border", 112: "area_out_of_limits", 113: "methods_disagree", 114: "uncertainty_too_large",
-    115: "outside_work_area", 116: "several_blocks", 117: "edge_covered", 119: "part_does_not_fit", 120: "busy",
-    121: "not_ready", 122: "unknown_recipe", 130: "too_many_points", 131: "self_intersecting",
-    140: "calibration_missing", 141: "calibration_mismatch", 142: "sentinel_moved", 150: "controller_timeout",
-    151: "controller_refused", 152: "controller_lost", 153: "controller_restarted", 154: "service_restarted",
-    155: "other_service", 156: "expired", 160: "storage_full", 161: "aborted", 190: "internal_error",
+    115: "outside_work_area", 116: "several_blocks", 117: "edge_covered", 118: "edge_contradicted",
+    119: "part_does_not_fit", 120: "busy", 121: "not_ready", 122: "unknown_recipe", 130: "too_many_points",
+    131: "self_intersecting", 140: "calibration_missing", 141: "calibration_mismatch", 142: "sentinel_moved",
+    150: "controller_timeout", 151: "controller_refused", 152: "controller_lost", 153: "controller_restarted",
+    154: "service_restarted", 155: "other_service", 156: "expired", 160: "storage_full", 161: "aborted",
+    190: "internal_error",
 }  # fmt: skip
 
 

@@ -37,7 +37,9 @@ def add_tracing_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--min-width-px", type=int, metavar="PX", help="direct-scan: narrower pairs are noise")
     parser.add_argument("--polarity", choices=("auto", "bright", "dark"), help="walls against the table")
     parser.add_argument("--binarize", type=_binarize, metavar="flat|otsu|0…255", help="how walls are told from gaps")
-    parser.add_argument("--edge", choices=("cut", "cells"), help="cells: the border cells are closed")
+    parser.add_argument(
+        "--edge", choices=("auto", "cut", "cells"), help="cells: the border cells are closed; auto: seen"
+    )
     parser.add_argument(
         "--roi-px", type=_box, metavar="LEFT,TOP,RIGHT,BOTTOM", help="region of interest: nothing is seen outside of it"
     )

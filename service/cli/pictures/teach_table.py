@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Take, average, check, write."""
-    from contour.errors import NoBlockFound, PictureError
+    from contour.errors import EdgeContradicted, NoBlockFound, PictureError
     from contour.image.taught_table import teach
     from contour.tracing.trace import TraceSettings
     from contour.tracing.tracing import trace
@@ -65,6 +65,8 @@ def run(args: argparse.Namespace) -> int:
         pass
     except PictureError as error:
         raise UserError(str(error), EXIT_REFUSED) from error
+    except EdgeContradicted as error:
+        raise UserError(f"a block seems to lie on the table: {error}. Clear the table", EXIT_REFUSED) from error
     else:
         x, y = found.contour.exterior.mean(axis=0)
         if not found.reaches_frame:

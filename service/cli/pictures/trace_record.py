@@ -51,6 +51,7 @@ def record_of(image: Path, measurement: Measurement) -> dict[str, Any]:
         "method": measurement.method,
         "polarity": measurement.polarity,
         "pitch_px": measurement.pitch_px,
+        "edge": measurement.edge,
         "pixels": _rings(measurement.pixels),
         "area_px2": measurement.area_px2,
         "uncertainty_px": measurement.uncertainty_px,

@@ -235,6 +235,11 @@ def test_the_outline_comes_with_a_bound_that_it_keeps() -> None:
     assert apart(found, block().truth_px.rings) < 3 * found.uncertainty_px < 3.0
 
 
-def test_of_closed_cells_nobody_computes_an_uncertainty() -> None:
+def test_of_closed_cells_there_is_a_bound_too() -> None:
     picture, _ = closed_lattice()
-    assert wall_tips(picture, TraceSettings(method="wall-tips", edge="cells")).uncertainty_px is None
+    bound_px = wall_tips(picture, TraceSettings(method="wall-tips", edge="cells")).uncertainty_px
+    assert bound_px is not None
+    blurred = np.asarray(cv2.GaussianBlur(picture, (0, 0), 2.5), np.uint8)
+    wider_px = wall_tips(blurred, TraceSettings(method="wall-tips", edge="cells")).uncertainty_px
+    assert wider_px is not None
+    assert 0.5 < bound_px < 0.8 * wider_px

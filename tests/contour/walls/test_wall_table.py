@@ -102,7 +102,7 @@ def test_a_closed_cell_with_a_gap_in_its_outer_wall_stays_in_the_material() -> N
     torn[56:66, 126:137] = 5
     areas = []
     for light in (whole, torn):
-        edge = material_edge(light, 20.0, wall_mask(light, 20.0, bright=True).mask)
+        edge = material_edge(light, 20.0, wall_mask(light, 20.0, bright=True).mask).contour
         areas.append(abs(signed_area(edge.exterior)))
     # A cell without its walls has 289 px².
     assert areas[0] - areas[1] < 60.0
@@ -113,5 +113,5 @@ def test_specks_all_over_the_table_are_no_material() -> None:
     for x, y in np.stack(np.meshgrid(np.arange(4, 396, 13), np.arange(4, 296, 13)), axis=-1).reshape(-1, 2):
         if not block[max(0, y - 6) : y + 9, max(0, x - 6) : x + 9].any():
             light[y : y + 3, x : x + 3] = 120
-    edge = material_edge(light, 20.0, wall_mask(light, 20.0, bright=True).mask)
+    edge = material_edge(light, 20.0, wall_mask(light, 20.0, bright=True).mask).contour
     assert abs(signed_area(edge.exterior)) == pytest.approx(np.count_nonzero(block), rel=0.05)

@@ -23,8 +23,8 @@ RECTANGLE = SAMPLES / "1-rectangle.jpg"
 L_SHAPE = SAMPLES / "2-l-shape.jpg"
 CALIBRATION = SAMPLES / "calibration.yaml"
 KEYS = {
-    "image", "status", "reason", "reasons", "method", "polarity", "pitch_px", "pixels", "area_px2", "uncertainty_px",
-    "frame", "thickness_mm", "millimetres", "area_mm2", "uncertainty_mm", "evidence", "timings_ms",
+    "image", "status", "reason", "reasons", "method", "polarity", "pitch_px", "edge", "pixels", "area_px2",
+    "uncertainty_px", "frame", "thickness_mm", "millimetres", "area_mm2", "uncertainty_mm", "evidence", "timings_ms",
 }  # fmt: skip
 
 

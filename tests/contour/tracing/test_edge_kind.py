@@ -1,0 +1,65 @@
+"""Whether a border was cut or closes its cells is read from the picture, and a promise that it contradicts refused."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from contour.errors import EdgeContradicted
+from contour.geometry.agreement import agreement
+from contour.tracing.trace import Trace, TraceSettings
+from contour.tracing.wall_tips import wall_tips
+from tests.support.scenes.lattices import Border, Cells, Lattice, lattice
+
+# Drawn for these tests, and looked at by no rule.
+SEED = 977001
+
+
+@cache
+def drawn(cells: Cells, border: Border) -> Lattice:
+    return lattice(SEED, cells, border)
+
+
+def traced(one: Lattice, edge: Literal["auto", "cut", "cells"] = "auto") -> Trace:
+    return wall_tips(one.picture, TraceSettings(edge=edge))
+
+
+@pytest.mark.parametrize("cells", ["hexagonal", "square", "flex"])
+def test_closed_cells_are_seen_and_traced_as_if_they_were_promised(cells: Cells) -> None:
+    one = drawn(cells, "closed")
+    found = traced(one)
+    assert found.edge == "cells"
+    near = agreement(found.contour, one.outline)
+    assert near.mean_px < 0.7
+    assert near.hausdorff_px < 0.3 * one.pitch_px
+    assert found.uncertainty_px is not None
+    assert near.holds(found.uncertainty_px)
+    promised = traced(one, "cells")
+    assert all(np.array_equal(a, b) for a, b in zip(found.contour.rings, promised.contour.rings, strict=True))
+
+
+@pytest.mark.parametrize("cells", ["hexagonal", "square"])
+def test_cut_cells_are_seen_and_traced_as_if_they_were_promised(cells: Cells) -> None:
+    one = drawn(cells, "cut")
+    found = traced(one)
+    assert found.edge == "cut"
+    assert agreement(found.contour, one.outline).mean_px < 0.3
+    promised = traced(one, "cut")
+    assert all(np.array_equal(a, b) for a, b in zip(found.contour.rings, promised.contour.rings, strict=True))
+
+
+@pytest.mark.parametrize(("promise", "border"), [("cut", "closed"), ("cells", "cut")])
+def test_a_promise_that_the_picture_contradicts_is_refused(promise: Literal["cut", "cells"], border: Border) -> None:
+    with pytest.raises(EdgeContradicted, match=f"the recipe says edge: {promise}, but") as refused:
+        traced(drawn("hexagonal", border), promise)
+    assert refused.value.edge == {"closed": "cells", "cut": "cut"}[border]
+
+
+@pytest.mark.parametrize("cells", ["hexagonal", "square"])
+def test_closed_cells_that_were_cut_along_a_line_are_not_traced_as_one_or_the_other(cells: Cells) -> None:
+    with pytest.raises(EdgeContradicted, match="was cut there") as refused:
+        traced(drawn(cells, "mixed"))
+    assert refused.value.edge == "mixed"

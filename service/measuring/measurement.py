@@ -26,9 +26,9 @@ class Measurement:
 
     pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
     has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
-    was refused (116). edge: cut, cells or mixed, as the picture shows it. evidence: what the contour rests on, stretches
-    along its rings; None where nobody says. part: the recipe's part in it; None where the recipe has none, or the
-    contour was refused before it was tried.
+    was refused (116). edge: cut, cells or mixed, as the picture shows it. evidence: what the contour rests on,
+    stretches along its rings; None where nobody says. part: the recipe's part in it; None where the recipe has none,
+    or the contour was refused before it was tried.
     """
 
     method: str

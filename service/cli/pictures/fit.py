@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.file_names import check_outputs, output_path
-from service.cli.json_output import json_output
 from service.cli.options.export import Exports, add_export_arguments
 from service.cli.options.part import add_part_arguments, with_part
 from service.cli.options.tracing import Tracing, add_tracing_arguments
 from service.cli.pictures.trace_record import sentence
+from service.cli.text_output import text_output
 from service.config.plain_recipe import PlainRecipe
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     outputs = [("--json", Path(args.json))] if args.json not in (None, "-") else []
     outputs += [("--overlay", args.overlay)] if args.overlay is not None else []
     check_outputs([args.image, file], [*outputs, *exports.outputs])
-    with json_output(args.json) as write:
+    with text_output(args.json) as write:
         record, line, status = _fitted(args, tracing, exports)
         stream = sys.stderr if args.json == "-" or status == EXIT_UNUSABLE else sys.stdout
         print(painted(line, Colour.GOOD if status == EXIT_OK else Colour.BAD, stream), file=stream, flush=True)

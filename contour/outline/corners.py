@@ -140,15 +140,15 @@ def sweep(model: Models, start: complex, stop: complex, run: float) -> tuple[flo
     """Angle at which an arc starts, about its origin, and the angle it turns through until `stop` (radians, left
     positive).
 
-    run: about how long the arc is, pixels; it tells a long way round from a short one back. Never more than twice
-    around: no outline is, whatever the run of a fit that went wrong.
+    run: about how long the arc is, pixels; it tells a long way round from a short one back. Never more than a quarter
+    over a whole turn: no outline does, whatever the run of a fit that went wrong.
     """
     curvature = float(model.curvature)
     origin, tangent = complex(model.origin), complex(model.tangent)
     from_, to = (float(np.angle(1.0 + 1j * curvature * ((p - origin) * tangent.conjugate()))) for p in (start, stop))
     turn = to - from_
     turn += 2.0 * np.pi * round((curvature * run - turn) / (2.0 * np.pi))
-    return from_, turn if abs(turn) <= 4.0 * np.pi else float(np.fmod(turn, 2.0 * np.pi))
+    return from_, turn if abs(turn) <= 2.5 * np.pi else float(np.fmod(turn, 2.0 * np.pi))
 
 
 def arc_points(

@@ -1,4 +1,4 @@
-"""Writes the shipped part and the pictures of docs/how-to/parts.md: `… -m benchmarks.drawings.make_part_pictures`."""
+"""Writes the pictures of docs/how-to/parts.md: `… -m benchmarks.drawings.make_part_pictures`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ import sys
 from pathlib import Path
 
 import cv2
-import numpy as np
-from ezdxf import units
-from ezdxf.document import Drawing
 
 ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = ROOT / "service" / "samples"
@@ -24,22 +21,8 @@ CASES = (
 WIDTH = 800
 
 
-def write_part(path: Path = PART) -> None:
-    """A bracket: a plate of 130 mm by 80 mm with a rounded corner, a slope and a round hole."""
-    drawing = Drawing.new("R2000")
-    drawing.units = units.MM
-    space = drawing.modelspace()
-    corner = np.tan(np.pi / 8)  # a quarter of a circle
-    space.add_lwpolyline(
-        [(0, 0, 0), (130, 0, 0), (130, 45, 0), (95, 80, 0), (20, 80, corner), (0, 60, 0)], format="xyb", close=True
-    )
-    space.add_circle((40, 40), 14)
-    drawing.saveas(path)
-
-
 def main() -> None:
-    """Write the part, then each picture as the command draws it."""
-    write_part()
+    """Write each picture as the command draws it."""
     for sample, options, name in CASES:
         overlay = PICTURES / f"{name}.png"
         words = [SAMPLES / f"{sample}.jpg", "--part", PART, "--calibration", SAMPLES / "calibration.yaml", *options]

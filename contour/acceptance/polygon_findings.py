@@ -30,7 +30,7 @@ def too_unsure(millimetres: Contour | None, budget: ErrorBudget | None, limit: f
     if budget is None:
         return Finding(
             Refusal.UNCERTAINTY_TOO_LARGE,
-            f"How sure the contour is, is not known, {limit:g} mm are allowed. Use wall-tips with edge: cut, and a "
+            f"How sure the contour is, is not known, {limit:g} mm are allowed. Use wall-tips, and a "
             "calibration that knows the scale at the block's height, or set max_uncertainty_mm to 0.",
         )
     if budget.total_mm <= limit:

@@ -46,8 +46,8 @@ class PartTrial:
         if measured.uncertainty_mm is None:
             return _refused(
                 measured,
-                "Whether the part fits cannot be said, since it is not known how sure the contour is. Use wall-tips "
-                "with edge: cut, and a calibration that knows the scale at the block's height.",
+                "Whether the part fits cannot be said, since it is not known how sure the contour is. Use wall-tips, "
+                "and a calibration that knows the scale at the block's height.",
             )
         fit = fit_part(part, measured.millimetres, measured.uncertainty_mm, asked)
         measured = replace(measured, part=in_picture(fit, calibration, measured.thickness_mm or 0.0))

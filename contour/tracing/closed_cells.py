@@ -26,7 +26,7 @@ _REACH_PX = 3.0
 _OUT_PX = 2.0
 # Gaps of a faint wall, in pitches, that do not open a cell, and of a broken one. The mouth of a bay between whole cells
 # is hardly wider: where it is narrower, the bay counts as a cell.
-_GAP_PITCHES, _BROKEN_PITCHES = 0.3, 0.5
+_GAP_PITCHES, _BROKEN_PITCHES = 0.3, 0.62
 _NEARBY_PITCHES = 0.8
 # What the table passes into within two pixels by less than this share of the level is its shadow: edges are sharper.
 _SOFT = 0.2

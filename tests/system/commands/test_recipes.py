@@ -108,7 +108,8 @@ def test_the_controllers_register_chooses_the_recipe_and_one_that_is_gone_is_ref
         sent = lines(cell.accepted)[0]
         assert sent["recipe"] == 2
         ring = np.array(sent["millimetres"]["exterior"])
-        assert (ring @ [1, 1]).argmax() == 0
+        towards = ring @ [1, 1]
+        assert towards[0] > towards.max() - 0.05, "of its outermost cells several lie as far out"
         config = cell.folder / "config.yaml"
         config.write_text(config.read_text().replace(f", {two}", ""))
         cell.service.reload()

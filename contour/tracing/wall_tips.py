@@ -18,7 +18,7 @@ from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import MaterialEdge, material_edge
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, few_ends
 from contour.tracing.evidence_check import check_against_evidence
-from contour.tracing.trace import OnStage, Trace, TraceSettings
+from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import pieces_beside
@@ -54,16 +54,22 @@ def wall_tips(
     if settings.edge == "cells":
         return _closed_cells(picture, light, settings, on_stage)
     seen, look = looked_at(picture, light, settings, on_stage)
-    closed = _closed_if_seen(picture, light, settings, on_stage, seen) if few_ends(seen) else None
-    if closed is not None:
-        return closed
+    if few_ends(seen):
+        closed, kind = _if_closed(picture, light, settings, on_stage, seen)
+        # Where something hides the border no walls end either.
+        if kind != "mixed" or not doubtful(seen.rings[0], look).any():
+            check_promise(settings.edge, kind)
+        if closed is not None:
+            return closed
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
     try:
         return _cut(picture, light, (seen, look), rectifier, on_stage)
     except NoBlockFound:
+        if settings.edge == "cut":
+            raise
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
-        closed = None if settings.edge == "cut" else _closed_if_seen(picture, light, settings, on_stage, seen)
+        closed, _ = _if_closed(picture, light, settings, on_stage, seen)
         if closed is None:
             raise
         return closed
@@ -161,22 +167,21 @@ def _trace(seen: BlockEvidence, contour: Contour, light: Bytes, *, uncertainty_p
     )
 
 
-def _closed_if_seen(
+def _if_closed(
     picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage, seen: BlockEvidence
-) -> Trace | None:
-    """The boundary of a block with closed border cells; None where they were cut, or where nothing tells it from the
-    table. Raises EdgeContradicted.
+) -> tuple[Trace | None, Edge]:
+    """The boundary of a block with closed border cells, None where some were cut or nothing tells it from the table;
+    and which kind of border it is.
     """
     cells, walls = _cells_and_walls(light, settings)
     try:
         material = material_edge(picture, cells.pitch_px, walls)
     except NoBlockFound:
-        return None
+        return None, "cut"
     kind = edge_kind(material, seen)
-    check_promise(settings.edge, kind)
-    if kind == "cut":
-        return None
-    return replace(_around(material, light, cells, walls, on_stage), comb=cells.comb)
+    if kind != "cells":
+        return None, kind
+    return replace(_around(material, light, cells, walls, on_stage), comb=cells.comb), kind
 
 
 def _closed_cells(picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage) -> Trace:

@@ -6,16 +6,28 @@ import { amount, onLanguage, words } from "./words.js";
 const LEAST_MM = 10; // the slider goes that far at least
 
 let part = null;
+let set = null; // the part that the slider is set for, as text
 
-/** Show what the part of a job needs; null where it has none. */
+/** Show what the part of a job needs; null where it has none. The slider stays while a job is shown anew. */
 export function show(next) {
   part = next;
   at("part").hidden = part === null;
-  if (!part) return;
-  const slider = at("part-margin");
-  slider.max = Math.ceil(Math.max(LEAST_MM, 2 * part.asked_mm, 1.5 * part.margin_mm));
-  slider.value = part.asked_mm;
+  if (!isSetFor(part)) {
+    set = JSON.stringify(part);
+    const slider = at("part-margin");
+    slider.max = Math.ceil(Math.max(LEAST_MM, 2 * (part?.asked_mm ?? 0), 1.5 * (part?.margin_mm ?? 0)));
+    slider.value = part?.asked_mm ?? 0;
+  }
   refresh();
+}
+
+function isSetFor(one) {
+  return JSON.stringify(one) === set;
+}
+
+function needed(one) {
+  const asked = isSetFor(one) ? Number(at("part-margin").value) : one.asked_mm;
+  return asked + one.needed_mm - one.asked_mm;
 }
 
 /** What is drawn of a part over the frame, with its path by `path`, in a picture of that width and height. */
@@ -26,26 +38,25 @@ export function drawn(part, path, width, height) {
   const outside = draw("path", { d: `M-1 -1H${width}V${height}H-1Z${rings}`, "clip-rule": "evenodd" });
   return draw("g", { class: part.fits ? "part" : "part short" },
     draw("clipPath", { id: "part-outside" }, outside),
-    draw("path", { class: "part-margin", d: rings, "stroke-width": veil(part.needed_mm, part), "clip-path": "url(#part-outside)" }),
+    draw("path", { class: "part-margin", d: rings, "stroke-width": veil(part), "clip-path": "url(#part-outside)" }),
     draw("path", { class: "part-under", d: rings }),
     draw("path", { class: "part-outline", d: rings }),
     draw("path", { class: "part-tightest", d: `M${x} ${y}L${u} ${v}` }));
 }
 
-function veil(needed, of) {
-  return Math.max(2 * needed * of.px_per_mm, 0);
+function veil(of) {
+  return Math.max(2 * needed(of) * of.px_per_mm, 0);
 }
 
 /** Only the margin asked for changes: the part already lies where its least margin is largest. */
 function refresh() {
   if (!part) return;
   const asked = Number(at("part-margin").value);
-  const needed = asked + part.needed_mm - part.asked_mm;
-  const short = needed - part.margin_mm;
+  const short = needed(part) - part.margin_mm;
   const values = { margin: amount(asked, "mm", 1), reached: amount(part.margin_mm, "mm", 2), short: amount(Math.max(short, 0), "mm", 2) };
   at("part-told").dataset.kind = short > 0 ? "refused" : "accepted";
   say("part-told", short > 0 ? words("part_short", values) : words("part_fits", values));
-  document.querySelector("#view .part-margin")?.setAttribute("stroke-width", veil(needed, part));
+  document.querySelector("#view .part-margin")?.setAttribute("stroke-width", veil(part));
 }
 
 at("part-margin").addEventListener("input", refresh);

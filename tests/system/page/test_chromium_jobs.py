@@ -136,6 +136,10 @@ def test_the_part_is_drawn_and_the_slider_tells_what_another_margin_would_do(pan
     page.locator("#part-margin").fill("9.5")
     expect(page.locator("#part-told")).to_contain_text("short by 2.00\u00a0mm")
     expect(page.locator("#view path.part-margin")).to_have_attribute("stroke-width", "50")
+    for _ in range(2):  # shown anew, as a job is whenever something of it is told, and back again
+        page.locator("#language").click()
+        expect(page.locator("#part-margin")).to_have_value("9.5")
+        expect(page.locator("#view path.part-margin")).to_have_attribute("stroke-width", "50")
     page.unroute_all(behavior="wait")
     panel.ordered()
     expect(page.locator("#part")).to_be_hidden()

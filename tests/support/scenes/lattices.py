@@ -8,7 +8,7 @@ straight down; the floor of cells is the table, a little darker.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -23,7 +23,6 @@ BORDERS: tuple[Border, ...] = ("closed", "cut", "mixed")
 
 WIDTH, HEIGHT = 900, 700
 _FINER = 3
-_MARGIN_PX = 14.0
 _ROW = np.sqrt(3.0) / 2.0
 
 Floats = NDArray[np.float32]
@@ -54,14 +53,14 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
     outline = _box(rng, x, y, pitch, holed=border != "mixed")
     into_wall, number, centre = _pattern(rng, cells, x, y, pitch, wall)
     body = outline
-    if border != "cut":
-        body = _whole_cells(outline, number, centre, wall, rim=cells == "round", rng=rng)
+    if border != "cut" and cells != "round":
+        body = _whole_cells(outline, number, centre, wall)
     if border == "mixed":
         body = body & _half_plane(rng, x, y)
     if cells == "round" and border != "cut":
         # Only whole holes are drilled; the sheet goes on around them.
-        drilled = np.isin(number, _kept(outline, number, centre, x, y, pitch))
-        into_wall = np.where(drilled, into_wall, np.float32(1.0))
+        drilled = _at(_depth(outline), centre) > 0.62 * pitch
+        into_wall = np.where(drilled[number], into_wall, np.float32(1.0))
     body = _largest(body)
     material = body & (into_wall > 0)
     bright_table = bool(rng.random() < 0.5)
@@ -140,37 +139,17 @@ def _depth(outline: NDArray[np.bool_]) -> Floats:
     return np.asarray(cv2.distanceTransform(outline.astype(np.uint8), cv2.DIST_L2, 5) / _FINER, np.float32)
 
 
-def _kept(
-    outline: NDArray[np.bool_],
-    number: NDArray[np.int64],
-    centre: tuple[Floats, Floats],
-    x: Floats,
-    y: Floats,
-    pitch: float,
-) -> NDArray[np.int64]:
-    """Numbers of the holes that lie within the outline by 0.6 of a pitch from their middle."""
-    column = np.clip(np.rint((centre[0] + 0.5) * _FINER - 0.5).astype(int), 0, x.shape[1] - 1)
-    row = np.clip(np.rint((centre[1] + 0.5) * _FINER - 0.5).astype(int), 0, x.shape[0] - 1)
-    return np.flatnonzero(_depth(outline)[row, column] > 0.62 * pitch)
+def _at(field: NDArray[Any], centre: tuple[Floats, Floats]) -> NDArray[Any]:
+    """What a field over the fine picture has at the centres of cells."""
+    column, row = (np.rint((place + 0.5) * _FINER - 0.5).astype(int) for place in centre)
+    return field[np.clip(row, 0, field.shape[0] - 1), np.clip(column, 0, field.shape[1] - 1)]
 
 
 def _whole_cells(
-    outline: NDArray[np.bool_],
-    number: NDArray[np.int64],
-    centre: tuple[Floats, Floats],
-    wall: float,
-    *,
-    rim: bool,
-    rng: np.random.Generator,
+    outline: NDArray[np.bool_], number: NDArray[np.int64], centre: tuple[Floats, Floats], wall: float
 ) -> NDArray[np.bool_]:
-    """The cells whose centres lie inside, with the walls around them; a sheet with holes keeps its outline."""
-    if rim:
-        return outline
-    column = np.clip(np.rint((centre[0] + 0.5) * _FINER - 0.5).astype(int), 0, outline.shape[1] - 1)
-    row = np.clip(np.rint((centre[1] + 0.5) * _FINER - 0.5).astype(int), 0, outline.shape[0] - 1)
-    chosen = outline[row, column]
-    # All of a cell must lie in the picture's middle: what is cut off by the frame has no true centre.
-    cells = chosen[number]
+    """The cells whose centres lie inside, with the walls around them."""
+    cells = _at(outline, centre)[number]
     away = cv2.distanceTransform(1 - cells.astype(np.uint8), cv2.DIST_L2, 5) / _FINER
     return np.asarray(away < 0.5 * wall)
 

@@ -447,5 +447,7 @@ class FaultedCell:
             self.parts.health.state is State.READY
             and not self.parts.journal.unsettled()
             and not self.controller.trigger_open
+            and self.parts.executor.idle  # a job that is only being taken is in no journal yet
+            and not self.parts.executor.waiting
             and self.parts.executor._pending() is None
         )

@@ -93,7 +93,9 @@ class Page(Model):
     token_file: FilePath | None = Field(
         None, description="File of mode 0600, a line 'name token' a person; none = the page can only be looked at."
     )
-    language: Literal["en", "ru"] = Field("en", description="What the page speaks until a person chooses.")
+    language: Literal["auto", "en", "ru"] = Field(
+        "auto", description="What the page speaks until a person chooses; auto = as the browser asks, else English."
+    )
     certificate: FilePath | None = Field(None, description="TLS certificate chain, PEM; none = plain HTTP.")
     key: FilePath | None = Field(None, description="Private key of the certificate, PEM.")
 

@@ -38,10 +38,11 @@ KINDS = {
 class Pages:
     """The page and what it is made of, all in memory: a request names none of the file system's paths."""
 
-    def __init__(self, daemon: DaemonAccess, language: str) -> None:
-        """language: of visitors who have not chosen."""
+    def __init__(self, daemon: DaemonAccess, language: str, *, orders: bool) -> None:
+        """language: of visitors who have not chosen, auto = their browser's. orders: whether any can be given."""
         self._daemon = daemon
         self._language = language
+        self._orders = orders
         folder = files("service.web") / "static"
         self._files = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != PAGE}
         self._tags = {name: f'"{hashlib.sha256(data).hexdigest()[:16]}"' for name, data in self._files.items()}
@@ -70,16 +71,28 @@ class Pages:
 
     async def page(self, request: Request) -> Response:
         """The page as things are now."""
-        language = _one_of(request.cookies.get("language"), LANGUAGES, self._language)
+        language = _one_of(request.cookies.get("language"), LANGUAGES, self._language_of(request))
         theme = _one_of(request.cookies.get("theme"), THEMES, "auto")
         try:
             state: dict[str, Any] | None = await self._daemon.state()
         except DaemonSilent:
             state = None
         text = self._templates[language]
-        for name, value in {"theme": theme, **self._banner(state, language)}.items():
+        shown = {
+            "theme": theme,
+            "orders": "on" if self._orders else "off",
+            "view": ' data-view="kiosk"' if "kiosk" in request.query_params else "",
+            **self._banner(state, language),
+        }
+        for name, value in shown.items():
             text = text.replace(f"{{{{{name}}}}}", value)
         return Response(text, media_type="text/html")
+
+    def _language_of(self, request: Request) -> str:
+        """Of somebody who has not chosen."""
+        if self._language in LANGUAGES:
+            return self._language
+        return preferred(request.headers.get("accept-language", ""))
 
     def _banner(self, state: dict[str, Any] | None, language: str) -> dict[str, str]:
         texts = self._texts[language]
@@ -91,9 +104,11 @@ class Pages:
             "since": "",
             "whys": "",
             "why_hidden": " hidden",
+            **_last(None, language, texts),
         }
         if state is None:
             return {**shown, "kind": "lost", "state": texts["lost"]}
+        shown |= _last(state["last_job"], language, texts)
         whys = "".join(_why(fault["code"], fault["text"], language) for fault in state["faults"].values())
         if whys:
             shown |= {"whys": whys, "why_hidden": ""}
@@ -101,6 +116,17 @@ class Pages:
         if kind == "ready" and state["link"] is not None and state["link"]["not_ready"] is not None:
             kind, word = "waiting", "waiting"
         return {**shown, "kind": kind, "state": texts[word], "since": html.escape(state["reason"] or "")}
+
+
+def _last(job: dict[str, Any] | None, language: str, texts: dict[str, str]) -> dict[str, str]:
+    """What became of the last block."""
+    if job is None or job["outcome"] is None:
+        return {"last_kind": "none", "last_word": texts["none"], "last_of": "", "last_why": ""}
+    kind = job["outcome"]
+    told = Reason(job["code"]).explained(Language(language)) if job["code"] else None
+    why = f"{told.sentence} {told.next_action}" if told else ""
+    of = texts["job_runs"].replace("{job}", str(job["job"]))
+    return {"last_kind": kind, "last_word": texts[kind], "last_of": of, "last_why": html.escape(why)}
 
 
 def _why(code: int, text: str, language: str) -> str:
@@ -113,8 +139,21 @@ def _why(code: int, text: str, language: str) -> str:
 
 def _worded(template: str, texts: dict[str, str]) -> str:
     """The template with its words filled in: elements of `data-t`, and labels of `data-a`."""
-    filled = re.sub(r'data-t="(\w+)">', lambda found: f"{found[0]}{html.escape(texts[found[1]])}", template)
+    filled = re.sub(r'data-t="(\w+)"[^>]*>', lambda found: f"{found[0]}{html.escape(texts[found[1]])}", template)
     return re.sub(r'data-a="(\w+)"', lambda found: f'{found[0]} aria-label="{html.escape(texts[found[1]])}"', filled)
+
+
+def preferred(accept_language: str) -> str:
+    """Which of the page's languages a browser asks for first; English where none of them. By RFC 9110, 12.5.4."""
+    asked: list[tuple[float, str]] = []
+    for part in accept_language.split(","):
+        tag, _, quality = part.strip().partition(";q=")
+        try:
+            asked.append((float(quality or 1), tag.strip().lower().partition("-")[0]))
+        except ValueError:  # no quality of that standard
+            continue
+    known = [(quality, language) for quality, language in asked if language in LANGUAGES and quality > 0]
+    return max(known, key=lambda one: one[0], default=(1.0, LANGUAGES[0]))[1]
 
 
 def _one_of(value: str | None, known: tuple[str, ...], otherwise: str) -> str:

@@ -48,7 +48,7 @@ class PageServer:
             raise PageError(f"page: {error}") from error
         check_certificate(settings)
         self.daemon = DaemonAccess(sources)
-        self._pages = Pages(self.daemon, settings.language)
+        self._pages = Pages(self.daemon, settings.language, orders=tokens is not None)
         commands = Commands(self.daemon, sources.journal, tokens)
         self._make_api: Callable[[], Api] = lambda: Api(self.daemon, commands, version)
         self._socket: socket.socket | None = _bound(settings.host, settings.port)

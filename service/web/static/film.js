@@ -78,7 +78,7 @@ async function display() {
   const one = opened === null ? jobs.find((entry) => entry.outcome) ?? jobs[0] : jobs.find((entry) => entry.job_id === opened) ?? (await fetched(opened));
   if (mine !== turn) return;
   if (!one) {
-    picture.show(null);
+    picture.show(null, "", "no_jobs");
     return;
   }
   const state = `${one.job_id} ${one.outcome} ${one.files.length} ${one.settled_at}`;
@@ -122,7 +122,7 @@ function strip() {
 function item(one, as) {
   const kind = one.outcome ?? "running";
   const name = `${words("job_runs", { job: one.job_id })}: ${words(kind)}`;
-  const image = one.files.includes("frame.png") ? make("img", { src: frameOf(one, 320), alt: "", loading: "lazy" }) : make("div", { class: "no" });
+  const image = one.files.includes("frame.png") ? make("img", { src: frameOf(one, 320), alt: "", loading: "lazy" }) : make("div", { class: "no" }, words("no_frame"));
   const label = make("span", { "data-kind": kind }, shape(one.outcome ?? "busy"), String(one.job_id));
   const button = make("button", { type: "button", "aria-label": name, title: name, "data-job": one.job_id }, image, label);
   button.addEventListener("click", () => open(one.job_id));

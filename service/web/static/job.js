@@ -2,12 +2,11 @@
 
 import { at, make, say } from "./dom.js";
 import { amount, moment, number, onLanguage, words } from "./words.js";
-import { reasonOf } from "./now.js";
+import { ORIGINS, current, reasonOf } from "./now.js";
 import { show as showPart } from "./part.js";
 
 const STAGES = ["frame", "table", "mask", "trace", "quality", "convert", "simplify", "judge", "guard", "part", "pages", "transfer", "total"];
 const WIDE = ["uncertainty", "recipe", "when", "origin"]; // a line of their own
-const ORIGINS = { controller: "controller_kind" };
 
 let job = null;
 let drawing = null;
@@ -32,7 +31,8 @@ function refresh() {
 }
 
 function because() {
-  const told = job.reason === null ? null : reasonOf(job.reason);
+  const isTold = current()?.last_job?.job === job.job_id; // above, and larger
+  const told = job.reason === null || isTold ? null : reasonOf(job.reason);
   const parts = told ? [make("strong", {}, told.sentence), ` ${told.next_action}`] : [];
   if (job.detail) parts.push(make("small", {}, `${job.reason ?? ""} ${job.reason_name ?? ""} ${job.detail}`.trim()));
   at("because").hidden = !parts.length;

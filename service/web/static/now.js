@@ -9,11 +9,14 @@ const KINDS = {
   ContinuousExecution: "busy", Halted: "halted", Error: "fault",
 };
 
+/** Words of where a job came from, where they are not those of its name. */
+export const ORIGINS = { controller: "controller_kind" };
+
 let state = null;
 let heardAt = null;
 let isLost = false;
 let reasons = new Map();
-let byReason = { refused: [], failed: [] };
+let byReason = { refused: [], failed: [], missed: [] };
 
 export async function loadReasons() {
   const told = await get("/reasons");
@@ -43,9 +46,9 @@ export function current() {
 
 function refresh() {
   document.body.classList.toggle("stale", isLost);
-  for (const button of document.querySelectorAll("#orders button")) button.disabled = isLost;
   banner();
   if (!state) return;
+  last();
   counters();
   whys();
   glance();
@@ -64,12 +67,28 @@ function banner() {
   put(kind, words(kind === "waiting" ? "waiting" : state.state), [job, words("since", { time: duration(state.since_s) }), why].filter(Boolean).join(" · "));
 }
 
+/** What became of the last block; while the next one is measured it is of before, and not in the colour of a result. */
+function last() {
+  const { last_job: job, job: running } = state;
+  const outcome = job?.outcome ?? "none";
+  const told = job?.code ? reasonOf(job.code) : null;
+  mark("last", outcome);
+  at("last").classList.toggle("before", running !== null);
+  say("last-word", words(outcome));
+  say("last-of", job ? `${words("job_runs", { job: job.job })}, ${moment(job.settled_at)}` : "");
+  say("last-why", told ? `${told.sentence} ${told.next_action}` : "");
+}
+
+/** Colour and shape of one of the two words above. */
+function mark(id, kind) {
+  const element = at(id);
+  if (element.dataset.kind === kind) return;
+  element.dataset.kind = kind;
+  element.querySelector("use").setAttribute("href", `#s-${kind}`);
+}
+
 function put(kind, word, line) {
-  const header = at("banner");
-  if (header.dataset.kind !== kind) {
-    header.dataset.kind = kind;
-    at("shape").firstElementChild.setAttribute("href", `#s-${kind}`);
-  }
+  mark("banner", kind);
   say("state", word);
   say("since", line);
   document.title = `${word} – combtrace`;
@@ -77,7 +96,7 @@ function put(kind, word, line) {
 
 function counters() {
   const counts = { accepted: 0, refused: 0, failed: 0 };
-  byReason = { accepted: [], refused: [], failed: [] };
+  byReason = { accepted: [], refused: [], failed: [], missed: [] };
   for (const { outcome, reason, count } of state.outcomes) {
     const name = outcome === "written" ? "accepted" : outcome;
     counts[name] += count;
@@ -86,6 +105,9 @@ function counters() {
   for (const name of Object.keys(counts)) {
     say(`count-${name}`, number(counts[name]));
     at(`count-${name}`).title = byReason[name].map((line) => line.join(" ")).join("\n");
+  }
+  for (const { kind, what, count } of state.triggers) {
+    if (what !== "taken") byReason.missed.push([`${words(ORIGINS[kind] ?? kind)}: ${sentenceOf(what)}`, number(count)]);
   }
   say("count-missed", number(state.missed_triggers));
 }
@@ -99,7 +121,7 @@ function sentenceOf(name) {
 function showCounts(name) {
   say("counts-title", words(name));
   const rows = byReason[name].flatMap(([sentence, count]) => [make("dt", {}, count), make("dd", {}, sentence)]);
-  at("counts").replaceChildren(...(rows.length ? rows : [make("dd", {}, words("no_jobs"))]));
+  at("counts").replaceChildren(...(rows.length ? rows : [make("dd", {}, words(name === "missed" ? "none_missed" : "no_jobs"))]));
   at("counts-dialog").showModal();
 }
 
@@ -126,7 +148,7 @@ function glance() {
     link
       ? line("link", link.up, `${link.what}, ${link.up && link.round_trip_ms !== null ? words("round_trip", { ms: number(link.round_trip_ms, 1) }) : words(link.up ? "works" : "broken")}`)
       : line("link", null, words("no_link")),
-    line("calibration", !("calibration" in faults) && (calibration ? true : null), ageOf(calibration)),
+    line("calibration", !("calibration" in faults) && (calibration && calibration.age_days !== null ? true : null), ageOf(calibration)),
     line("disk", !("storage" in faults || "journal" in faults), disk.journal_free_bytes === null ? words("not_known") : words("disk_free", { free: bytes(disk.journal_free_bytes), kept: bytes(disk.archive_bytes) })),
   ];
   at("glance").replaceChildren(...lines);
@@ -147,5 +169,5 @@ function line(key, well, text) {
   return make("li", {}, mark, make("span", { class: "what" }, words(key)), make("span", {}, text));
 }
 
-for (const name of ["refused", "failed"]) at(`count-${name}`).addEventListener("click", () => showCounts(name));
+for (const name of ["refused", "failed", "missed"]) at(`count-${name}`).addEventListener("click", () => showCounts(name));
 onLanguage(refresh);

@@ -8,11 +8,13 @@ import { reasonOf } from "./now.js";
 let recipes = "";
 let pending = null;
 let heard = null;
-let told = () => "";
+let told = () => (areOff ? words("no_orders") : "");
 let isUnderWay = false; // an order that is not answered yet
 let isHaltTold = false;
 let measured = null; // the job that was ordered here, as long as it runs
 
+const CAN_MEASURE = ["Ready", "SingleExecution", "ContinuousExecution"];
+const areOff = document.body.dataset.orders === "off"; // the page can only be looked at
 const REFUSALS = { 401: "wrong_token", 403: "no_orders", 409: "not_now", 429: "too_often", 503: "cannot" };
 
 /** Follow the state: which orders make sense now. */
@@ -20,19 +22,32 @@ export function show(state) {
   const isHalted = state.state === "Halted";
   if (heard?.state === "Halted" && !isHalted && isHaltTold) tell(() => "", false); // somebody else has ended it
   heard = state;
+  allow(state);
   const focused = document.activeElement?.id;
   at("halt").hidden = isHalted;
   at("resume").hidden = !isHalted;
   if (focused === "halt" && isHalted) at("resume").focus();
   if (focused === "resume" && !isHalted) at("halt").focus();
   if (measured !== null && state.settled_job >= measured) ended(state.last_job);
-  const key = JSON.stringify(state.recipes) + document.documentElement.lang;
+  say("told", told());
+  fillRecipes();
+}
+
+function fillRecipes() {
+  const key = JSON.stringify(heard.recipes) + document.documentElement.lang;
   if (key === recipes) return;
   recipes = key;
   const chosen = at("recipe").value;
-  const options = state.recipes.map(({ number, name }) => make("option", { value: number }, `${number} ${name}`));
+  const options = heard.recipes.map(({ number, name }) => make("option", { value: number }, `${number} ${name}`));
   at("recipe").replaceChildren(make("option", { value: 0 }, words("default_recipe")), ...options);
   if (chosen) at("recipe").value = chosen;
+}
+
+/** What can be ordered now: what would be refused for the service's state, or for want of orders at all, cannot. */
+export function allow(state) {
+  const cannot = areOff || state === null;
+  at("trigger").disabled = cannot || !CAN_MEASURE.includes(state.state) || Boolean(state.link?.not_ready);
+  for (const id of ["halt", "resume", "recipe"]) at(id).disabled = cannot;
 }
 
 function ended(last) {
@@ -42,8 +57,8 @@ function ended(last) {
 }
 
 /** Have it done, one order at a time, after asking who orders it where that is not known. */
-export function ask(path, body, done) {
-  if (isUnderWay || at("trigger").disabled) return; // a key finds the service lost as the button does
+export function ask(button, path, body, done) {
+  if (isUnderWay || at(button).disabled) return; // a key finds it as the button does
   pending = { path, body, done };
   if (hasToken()) carryOut();
   else openDialog("");
@@ -88,14 +103,14 @@ function tell(text, isBad) {
 }
 
 export const measure = () =>
-  ask("/trigger", { recipe: Number(at("recipe").value) }, ({ job }) => {
+  ask("trigger", "/trigger", { recipe: Number(at("recipe").value) }, ({ job }) => {
     measured = job;
     return () => (job === null ? words("queued") : words("ordered", { job }));
   });
 
 at("trigger").addEventListener("click", measure);
-at("halt").addEventListener("click", () => ask("/halt", {}, () => () => words("halted_now")));
-at("resume").addEventListener("click", () => ask("/resume", {}, () => () => words("resumed_now")));
+at("halt").addEventListener("click", () => ask("halt", "/halt", {}, () => () => words("halted_now")));
+at("resume").addEventListener("click", () => ask("resume", "/resume", {}, () => () => words("resumed_now")));
 at("token-cancel").addEventListener("click", () => at("token-dialog").close());
 at("token-dialog").querySelector("form").addEventListener("submit", () => {
   const given = at("token").value.trim();
@@ -106,5 +121,5 @@ at("token-dialog").querySelector("form").addEventListener("submit", () => {
 });
 onLanguage(() => {
   say("told", told());
-  if (heard) show(heard);
+  if (heard) fillRecipes();
 });

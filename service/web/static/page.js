@@ -38,6 +38,7 @@ function heard(state) {
 function lost() {
   seen = "";
   now.lose();
+  orders.allow(null);
 }
 
 async function switchLanguage() {
@@ -77,5 +78,5 @@ at("help").addEventListener("click", help);
 onLanguage(() => at("help-dialog").open && help());
 
 await ready;
-for (const control of document.querySelectorAll(":disabled")) control.disabled = false; // whoever pressed sooner would wait in vain
+for (const control of document.querySelectorAll(":disabled")) if (!control.closest("#orders")) control.disabled = false; // whoever pressed sooner would wait in vain
 listen(heard, lost);

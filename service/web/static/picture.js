@@ -1,6 +1,6 @@
 // The frame with its contour over it: zoom, pan, and where the pointer is in millimetres.
 
-import { at, draw } from "./dom.js";
+import { at, draw, say } from "./dom.js";
 import { drawn as drawnPart } from "./part.js";
 import { number, onLanguage, words } from "./words.js";
 
@@ -19,10 +19,12 @@ const pointers = new Map();
 
 let settle = () => {}; // shows at once what waits for its frame
 
-/** Show a job's frame and its drawing; null shows that there is none. Until the frame has come, the job before stays. */
-export function show(next, address) {
+/** Show a job's frame and its drawing; null shows why there is none. Until the frame has come, the job before stays. */
+export function show(next, address, why = "no_picture") {
   settle();
   at("no-picture").hidden = next !== null;
+  at("no-picture").dataset.t = why;
+  say("no-picture", words(why));
   if (!next) {
     drawing = null;
     view.replaceChildren();
@@ -85,6 +87,7 @@ function axes() {
 }
 
 function fit() {
+  frame.style.aspectRatio = `${drawing.width} / ${drawing.height}`; // heeded on a narrow screen alone
   box = { x: -0.5, y: -0.5, width: drawing.width, height: drawing.height };
   look();
 }
@@ -108,8 +111,10 @@ function look() {
 /** A line's number where the line enters what is seen: below for x, at the left for y. */
 function place(text, size) {
   const isX = text.dataset.axis === "x";
-  const edge = isX ? Math.min(box.y + box.height, drawing.height) - size : Math.max(box.x, 0) + size / 2;
-  const crossing = crossed(text.points, isX ? 1 : 0, edge);
+  const bottom = Math.min(box.y + box.height, drawing.height);
+  const edge = isX ? bottom - size : Math.max(box.x, 0) + size / 2;
+  const found = crossed(text.points, isX ? 1 : 0, edge);
+  const crossing = !isX && found?.[1] > bottom - 2 * size ? null : found; // where the numbers of x stand
   text.style.display = crossing ? "" : "none";
   if (!crossing) return;
   text.setAttribute("font-size", size);

@@ -18,7 +18,7 @@ from tests.support.real_parts import missing, need_program
 HERE = Path(__file__).parent
 LIBMODBUS_INSTALL = "apt-get install gcc libc6-dev pkg-config libmodbus-dev"
 NODE_INSTALL = "apt-get install nodejs npm"
-MODBUS_SERIAL = "modbus-serial@8"
+NPM_PACKAGES = ("modbus-serial@8", "axe-core@4")
 
 
 @functools.cache
@@ -39,7 +39,7 @@ def compiled(name: str, folder: Path = HERE) -> Path:
 
 @functools.cache
 def node_modules() -> Path:
-    """The folder of npm packages, with modbus-serial in it; installed once a run."""
+    """The folder of npm packages, `NPM_PACKAGES` in it; installed once a run."""
     npm = need_program("npm", NODE_INSTALL)
     folder = _folder()
     command = [
@@ -52,9 +52,9 @@ def node_modules() -> Path:
         "--no-audit",
         "--no-fund",
     ]
-    done = subprocess.run([*command, MODBUS_SERIAL], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run([*command, *NPM_PACKAGES], capture_output=True, text=True, timeout=120, check=False)
     if done.returncode:
-        missing(f"npm cannot install {MODBUS_SERIAL}: {done.stderr.strip()[-300:]}")
+        missing(f"npm cannot install {' and '.join(NPM_PACKAGES)}: {done.stderr.strip()[-300:]}")
     return folder / "node_modules"
 
 

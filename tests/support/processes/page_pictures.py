@@ -40,10 +40,11 @@ def pictures_to_take(folder: Path) -> None:
     cv2.imwrite(str(folder / "3.jpg"), np.roll(moved, moved.shape[1] // 3, axis=1))
 
 
-def ordered(client: Client) -> None:
-    """One more job, to its end."""
+def ordered(client: Client) -> int:
+    """One more job, to its end: its number."""
     reply = until(lambda: (r := client.order("/api/v1/trigger")).status == 202 and r, what="a job")
     until(lambda: client.get(f"/api/v1/jobs/{reply.json['job']}").json["files"], what="its evidence")
+    return int(reply.json["job"])
 
 
 def take(page: Page, to: Path, name: str) -> None:
@@ -70,15 +71,14 @@ def main(to: Path) -> None:
     client = Client(port)
     try:
         cell.ready()
-        for _ in range(6):
-            ordered(client)
+        numbers = [ordered(client) for _ in range(6)]
         with sync_playwright() as playwright:
             browser = chromium(playwright)
             page = browser.new_page(viewport=PANEL, locale="en-GB")
             page.goto(client.url)
-            page.locator('#strip button[data-job="6"][aria-current="true"]').wait_for()
+            page.locator(f'#strip button[data-job="{numbers[-1]}"][aria-current="true"]').wait_for()
             take(page, to, "ready")
-            page.locator('#strip button[data-job="3"]').click()
+            page.locator(f'#strip button[data-job="{numbers[2]}"]').click()
             take(page, to, "refused")
             page.keyboard.press("Escape")
             cell.controller.stop()

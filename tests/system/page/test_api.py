@@ -430,6 +430,8 @@ def test_the_page_is_made_in_the_visitors_language_and_of_known_words_only(serve
     russian = served.client.get("/", Cookie="language=ru; theme=dark").body.decode()
     assert '<html lang="ru" data-theme="dark">' in russian
     assert ">Готов<" in russian
+    asked = served.client.get("/", Accept_Language="de-DE,ru-RU;q=0.8,en;q=0.5").body.decode()
+    assert '<html lang="ru"' in asked
     odd = served.client.get("/", Cookie='language="><script>; theme=x').body
     assert odd.split(b"since")[0] == english.body.split(b"since")[0]
     assert b"{{" not in english.body

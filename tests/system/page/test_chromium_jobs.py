@@ -40,6 +40,14 @@ def camera(tmp_path_factory: pytest.TempPathFactory) -> str:
     return f"{{kind: files, path: {folder}, loop: true}}"
 
 
+def test_before_any_job_it_says_that_there_was_none(panel: Panel) -> None:
+    page = panel.page
+    expect(page.locator("#last-word")).to_have_text("no job yet")
+    expect(page.locator("#no-picture")).to_have_text("No jobs.")
+    page.locator("#language").click()
+    expect(page.locator("#no-picture")).to_have_text("Заданий нет.")
+
+
 def test_a_job_appears_by_itself_with_its_contour_and_values(panel: Panel) -> None:
     page = panel.page
     page.evaluate("window.sameDocument = true")
@@ -198,8 +206,12 @@ def test_the_filmstrip_freezes_filters_and_opens_one_with_all_its_values(panel: 
     (good,) = panel.accepted(1)
     bad = panel.ordered(recipe=77)
     expect(page.locator("#outcome")).to_have_text(f"job {bad}: refused")
-    expect(page.locator("#because")).to_contain_text(Reason.UNKNOWN_RECIPE.explained().next_action)
-    expect(page.locator("#no-picture")).to_be_visible()
+    expect(page.locator("#last-word")).to_have_text("refused")
+    expect(page.locator("#last-of")).to_contain_text(f"job {bad}, ")
+    expect(page.locator("#last-why")).to_contain_text(Reason.UNKNOWN_RECIPE.explained().next_action)
+    expect(page.locator("#because")).to_contain_text("unknown_recipe")
+    expect(page.locator("#no-picture")).to_have_text("No picture is kept of this job.")
+    expect(page.locator(f'#strip button[data-job="{bad}"]')).to_contain_text("no picture")
     page.locator(f'#strip button[data-job="{good}"]').click()
     expect(page.locator("#outcome")).to_have_text(f"job {good}: accepted")
     later = panel.ordered()
@@ -214,6 +226,13 @@ def test_the_filmstrip_freezes_filters_and_opens_one_with_all_its_values(panel: 
     expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
     page.locator("#count-refused").tap()
     expect(page.locator("#counts")).to_contain_text(Reason.UNKNOWN_RECIPE.explained().sentence)
+    page.keyboard.press("Escape")
+    panel.client.order("/api/v1/halt")
+    panel.client.order("/api/v1/trigger")
+    expect(page.locator("#count-missed")).to_have_text("1")
+    panel.client.order("/api/v1/resume")
+    page.locator("#count-missed").tap()
+    expect(page.locator("#counts")).to_contain_text(f"this page: {Reason.NOT_READY.explained().sentence}")
     page.keyboard.press("Escape")
     page.keyboard.press("r")
     expect(page.locator("#strip button")).to_have_count(len(page.locator("#strip [data-kind=refused]").all()))

@@ -7,7 +7,6 @@ import re
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from service.reasons import Reason
 from tests.support.processes.page_client import TOKEN
 from tests.support.processes.page_panel import Panel, holding, settled_state
 
@@ -31,8 +30,10 @@ def test_a_wrong_token_is_told_and_a_right_one_measures_halts_and_resumes(panel:
     expect(page.locator("#whys strong")).to_have_text("Somebody halted it.")
     expect(page.locator("#resume")).to_be_focused()
     expect(page.locator("#told")).to_have_text("Halted. Nothing is measured until you resume.")
-    page.locator("#trigger").click()
-    expect(page.locator("#told")).to_contain_text(Reason.NOT_READY.explained().sentence)
+    expect(page.locator("#trigger")).to_be_disabled()
+    expect(page.locator("#resume")).to_have_text("Resume")
+    page.keyboard.press("m")
+    expect(page.locator("#told")).to_have_text("Halted. Nothing is measured until you resume.")
     page.locator("#resume").click()
     settled_state(panel, "ready")
     page.locator("#halt").click()
@@ -100,3 +101,21 @@ def test_an_order_that_is_refused_is_told_in_the_readers_language(
     page.locator("#token").fill("whatever")
     page.keyboard.press("Enter")
     expect(page.locator(place)).to_contain_text(text)
+
+
+def test_where_no_orders_can_be_given_that_is_said_before_anybody_presses(panel: Panel) -> None:
+    page = panel.page
+
+    def without_orders(route: Route) -> None:
+        answer = route.fetch()
+        route.fulfill(response=answer, body=answer.text().replace('data-orders="on"', 'data-orders="off"'))
+
+    page.route(panel.client.url, without_orders)
+    page.reload()
+    expect(page.locator("#told")).to_have_text("No orders can be given from here. Call the engineer.")
+    for order in ("#trigger", "#halt", "#recipe"):
+        expect(page.locator(order)).to_be_disabled()
+    page.keyboard.press("m")
+    expect(page.locator("#token-dialog")).to_be_hidden()
+    page.locator("#language").click()
+    expect(page.locator("#told")).to_contain_text("Отсюда команды")

@@ -1,0 +1,144 @@
+"""The operator's page in every state: sizes, languages and themes, judged by what is drawn and by axe-core."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from tests.support.interop.programs import node_modules
+from tests.support.processes.cell import Cell
+from tests.support.processes.page_client import Client
+from tests.support.processes.page_states import WIDTHS, play, states, tell
+
+BIG_PX = 56  # of letters, on a screen of 1920 × 1080, that are read from two metres
+# What is wrong with what is drawn now, in words.
+FAULTS = """() => {
+  const wrong = [];
+  if (document.documentElement.scrollWidth > innerWidth) wrong.push(`${document.documentElement.scrollWidth} px wide`);
+  for (const one of document.querySelectorAll("button, select, input, summary, a")) {
+    if (!one.checkVisibility()) continue;
+    const name = one.getAttribute("aria-label") || one.textContent.trim() || one.labels?.[0]?.textContent;
+    if (!name) wrong.push(`no name: ${one.outerHTML}`);
+    const box = one.getBoundingClientRect();
+    const inStrip = one.closest("#strip");
+    if (!inStrip && (box.left < 0 || box.right > innerWidth + 0.5)) wrong.push(`out of sight: ${one.outerHTML}`);
+  }
+  for (const id of ["last-word", "state"]) {
+    const one = document.getElementById(id);
+    if (one.scrollWidth > one.clientWidth + 1) wrong.push(`cut off: ${one.textContent}`);
+  }
+  for (const id of ["last-word", "state", "trigger", "halt", "resume"]) {
+    const one = document.getElementById(id);
+    const seen = ["halt", "resume"].includes(id) ? !one.hidden : true;
+    if (seen && !one.textContent.trim()) wrong.push(`no words: ${id}`);
+  }
+  return wrong;
+}"""
+# A capital letter's height, as the font draws it.
+CAPITALS = """(id) => {
+  const style = getComputedStyle(document.getElementById(id));
+  const context = document.createElement("canvas").getContext("2d");
+  context.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
+  return context.measureText("H").actualBoundingBoxAscent;
+}"""
+AXE = """async () => {
+  const told = await axe.run(document, { resultTypes: ["violations"] });
+  return told.violations.filter(({ impact }) => ["serious", "critical"].includes(impact))
+    .map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.target).join(" ")}`);
+}"""
+
+
+@pytest.fixture(scope="module")
+def told(cell: tuple[Cell, Client], browser: Browser) -> dict[str, dict[str, Any] | None]:
+    """What the page is told in each state."""
+    return states(cell[1].get("/api/v1/state").json)
+
+
+@pytest.fixture(scope="module")
+def played(cell: tuple[Cell, Client], browser: Browser) -> Iterator[Page]:
+    """The page, which hears what a test tells it."""
+    context = browser.new_context(locale="en-GB", bypass_csp=True)  # so that axe-core may be put into it
+    play(context)
+    page = context.new_page()
+    page.goto(cell[1].url)
+    page.wait_for_function("Boolean(window.played?.onmessage)")
+    yield page
+    context.close()
+
+
+def spoken(page: Page, language: str) -> None:
+    """Have the page speak it."""
+    if page.evaluate("document.documentElement.lang") != language:
+        page.locator("#language").click()
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_is_cut_off_or_without_a_name(
+    played: Page, told: dict[str, dict[str, Any] | None], width: int, language: str
+) -> None:
+    played.set_viewport_size({"width": width, "height": WIDTHS[width]})
+    spoken(played, language)
+    wrong = {}
+    for name, state in told.items():
+        tell(played, state)
+        if faults := played.evaluate(FAULTS):
+            wrong[name] = faults
+    assert wrong == {}
+
+
+def test_state_and_result_are_read_from_two_metres(played: Page, told: dict[str, dict[str, Any] | None]) -> None:
+    played.set_viewport_size({"width": 1920, "height": 1080})
+    spoken(played, "en")
+    tell(played, told["accepted"])
+    heights = {name: played.evaluate(CAPITALS, name) for name in ("last-word", "state")}
+    assert min(heights.values()) >= BIG_PX, heights
+    largest = "Math.max(...[...document.querySelectorAll('body *')].map(e => parseFloat(getComputedStyle(e).fontSize)))"
+    own = "parseFloat(getComputedStyle(document.getElementById('last-word')).fontSize)"
+    assert played.evaluate(largest) == played.evaluate(own), "nothing is larger than what became of the last block"
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_core_finds_nothing_serious(played: Page, told: dict[str, dict[str, Any] | None], theme: str) -> None:
+    played.evaluate((node_modules() / "axe-core" / "axe.min.js").read_text())
+    played.evaluate("(theme) => { document.documentElement.dataset.theme = theme; }", theme)
+    kinds = [
+        "starting",
+        "no job yet",
+        "measuring",
+        "accepted",
+        "refused edge_covered",
+        "failed",
+        "error",
+        "halted",
+        "lost",
+    ]
+    found = {}
+    for number, name in enumerate(kinds):
+        width = list(WIDTHS)[number % len(WIDTHS)]
+        played.set_viewport_size({"width": width, "height": WIDTHS[width]})
+        spoken(played, ("en", "ru")[number % 2])
+        tell(played, told[name])
+        if serious := played.evaluate(AXE):
+            found[name, width] = serious
+    played.evaluate("document.documentElement.dataset.theme = 'auto'")
+    assert found == {}
+
+
+def test_in_a_kiosk_there_is_the_picture_the_result_the_state_and_two_orders(
+    cell: tuple[Cell, Client], browser: Browser
+) -> None:
+    page = browser.new_page(viewport={"width": 1920, "height": 1080})
+    page.goto(f"{cell[1].url}?kiosk")
+    page.wait_for_selector("#trigger:enabled")
+    shown = (
+        "[...document.querySelectorAll('button, select, a, summary')].filter(e => e.checkVisibility()).map(e => e.id)"
+    )
+    assert page.evaluate(shown) == ["trigger", "halt"]
+    for visible in ("#last-word", "#state", "#frame"):
+        assert page.locator(visible).is_visible()
+    assert page.evaluate("document.documentElement.scrollHeight <= innerHeight")
+    page.close()

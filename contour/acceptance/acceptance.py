@@ -76,7 +76,7 @@ def judge(
         # Where something lies over the edge, that is why the picture says otherwise there, and where the edge is vague.
         *(() if covered else (disagrees(traced, limits.max_disagreement_pitches), vague(trace))),
         too_unsure(polygon.millimetres, budget, limits.max_uncertainty_mm),
-        outside_work_area(polygon.millimetres, limits.work_area_mm),
+        outside_work_area(polygon.millimetres, limits.work_area_mm, polygon.pixels),
         outside_calibration(polygon.pixels, limits.sure),
         several_blocks(trace, limits),
         covered,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.acceptance.findings import Finding, Limits, Refusal
+from contour.acceptance.findings import Finding, Limits, Refusal, around, closed, runs_where
 from contour.acceptance.quality import QualityLimits, lost_in_noise
 from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.rings import Ring, area
@@ -21,6 +21,8 @@ _SURE_WITHIN_PITCHES = 0.25
 _SURE_WITHIN_SHARE = 0.01
 # Of two blocks whose areas differ by less than this the larger one is a matter of chance.
 _EQUAL_SHARE = 0.8
+# How large a circle shows a place.
+_SHOWN_PITCHES = 2.0
 
 
 def no_walls(traced: CheckedTrace | None, limits: QualityLimits) -> Finding | None:
@@ -62,10 +64,13 @@ def touches_border(outlines: list[Ring], frame_size: tuple[int, int], border_px:
     side = min(sides, key=lambda name: float(sides[name]))
     if sides[side] > border_px:
         return None
+    last = np.asarray(frame_size) - 1.0
+    near = [np.minimum(outline, last - outline).min(axis=1) + 0.5 <= border_px for outline in outlines]
     return Finding(
         Refusal.TOUCHES_BORDER,
         f"The contour comes within {max(float(sides[side]), 0.0):.1f} px of the picture's {side} edge, at least "
         f"{border_px:g} px are needed. Move the block so that all of it is in view.",
+        tuple(path for outline, on in zip(outlines, near, strict=True) for path in runs_where(outline, on)),
     )
 
 
@@ -82,10 +87,11 @@ def touches_region(outlines: list[Ring], region: Region | None, border_px: float
         f"The contour comes within {max(margin, 0.0):.1f} px of the edge of the region of interest, at least "
         f"{border_px:g} px are needed. Move the block so that all of it lies in the region, or correct roi_px or "
         "roi_mm.",
+        (closed(region.ring),),
     )
 
 
-def other_blocks(traced: Trace, limits: Limits) -> list[Piece]:
+def _other_blocks(traced: Trace, limits: Limits) -> list[Piece]:
     """The pieces beside the traced block for which it is refused, largest first."""
     share = max(limits.block_share, _EQUAL_SHARE) if limits.pieces == "largest" else limits.block_share
     return [piece for piece in traced.others if piece.area_px2 >= share * area(traced.contour)]
@@ -93,7 +99,7 @@ def other_blocks(traced: Trace, limits: Limits) -> list[Piece]:
 
 def several_blocks(traced: Trace | None, limits: Limits) -> Finding | None:
     """Another block beside the traced one."""
-    blocks = [] if traced is None else other_blocks(traced, limits)
+    blocks = [] if traced is None else _other_blocks(traced, limits)
     if traced is None or not blocks:
         return None
     own = area(traced.contour)
@@ -102,16 +108,19 @@ def several_blocks(traced: Trace | None, limits: Limits) -> Finding | None:
         f"Beside the traced block of {own:.0f} px² lies another of {blocks[0].area_px2:.0f} px² "
         f"(x {left} to {right}, y {top} to {bottom} px)" + (f", and {len(blocks) - 1} more" if blocks[1:] else "")
     )
+    shown = tuple(closed(block.outline_px) for block in blocks if len(block.outline_px))
     if limits.pieces == "largest":
         return Finding(
             Refusal.SEVERAL_BLOCKS,
             f"{seen}. For pieces: largest others may reach {100 * _EQUAL_SHARE:.0f} % of it, else the largest is a "
             "guess. Take one of them away.",
+            shown,
         )
     return Finding(
         Refusal.SEVERAL_BLOCKS,
         f"{seen}. The recipe allows one, and offcuts up to {100 * limits.block_share:g} % of it. Leave one block on "
         "the table, or use a recipe with pieces: largest.",
+        shown,
     )
 
 
@@ -119,6 +128,7 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
     """Contour and busy picture farther apart than `limit` pitches, an edge without cells, or a chip's bump or dent."""
     if traced is None or traced.disagreement is None or limit is None:
         return None
+    shown_px = _SHOWN_PITCHES * (traced.trace.pitch_px or 0.0)
     if traced.narrow is not None:
         narrow = traced.narrow
         what = "stands out of its edge" if narrow.outwards else "goes into its edge"
@@ -128,6 +138,7 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
             f"The contour {what} by {narrow.depth_pitches:.1f} cells over {narrow.width_pitches:.1f} cells near "
             f"({x:.0f}, {y:.0f}) px: so narrow a part may be a chip, a strip or a label on the block, or cells lost. "
             "Look at the overlay; take it away, or set max_disagreement_pitches: 0 for parts that narrow.",
+            (around(x, y, shown_px),),
         )
     if traced.bare is not None:
         x, y = traced.bare.place_px
@@ -136,6 +147,7 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
             f"Along {traced.bare.length_pitches:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, no cells lie "
             "just within it: it may run over the table, a label or along a cable there. Look at the overlay; clear the "
             "edge, check light and table, or set max_disagreement_pitches: 0 for blocks with filled cells.",
+            (around(x, y, shown_px),),
         )
     apart = traced.disagreement
     advice = "Look at the overlay; check light and table, and that nothing lies against the block."
@@ -146,6 +158,7 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
             Refusal.METHODS_DISAGREE,
             f"The contour {what} near ({x:.0f}, {y:.0f}) px, by {apart.pitches:.1f} cells, {limit:g} are allowed. "
             f"{advice}",
+            (around(x, y, shown_px),),
         )
     if apart.outside_pitches > _EVERYWHERE * limit:
         return Finding(

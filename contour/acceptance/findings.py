@@ -6,8 +6,11 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Literal
 
+import numpy as np
+
 from contour.acceptance.quality import QualityLimits
 from contour.calibration.position_uncertainty import PositionUncertainty
+from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.rings import Ring
 
 
@@ -61,7 +64,33 @@ class Limits:
 
 @dataclass(frozen=True)
 class Finding:
-    """One reason to refuse, and a sentence with what was seen, what is expected and what to do."""
+    """One reason to refuse, and a sentence with what was seen, what is expected and what to do.
+
+    `shown_px`: paths in the picture, shape (N, 2), that show where, to be drawn; a ring repeats its first point.
+    """
 
     refusal: Refusal
     text: str
+    shown_px: tuple[Float64s, ...] = field(default=(), compare=False)
+
+
+def around(x: float, y: float, radius_px: float) -> Float64s:
+    """A circle as a path, to show a place by."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 33)
+    return np.array([x, y]) + radius_px * np.column_stack([np.cos(angles), np.sin(angles)])
+
+
+def closed(ring: Ring) -> Float64s:
+    """A ring as a path."""
+    return np.vstack([ring, ring[:1]])
+
+
+def runs_where(ring: Ring, chosen: Bools) -> tuple[Float64s, ...]:
+    """The ring's paths through vertices of `chosen` (N,), each with the vertex before and the one after."""
+    if chosen.all():
+        return (closed(ring),)
+    first = int(np.argmin(chosen))  # begins with one that is not
+    turned, flags = np.roll(ring, -first, axis=0), np.roll(chosen, -first)
+    edges = np.flatnonzero(np.diff(np.r_[flags, False].astype(int)))
+    path = np.vstack([turned, turned[:1]])
+    return tuple(path[start : end + 2] for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from contour.acceptance.error_budget import ErrorBudget
-from contour.acceptance.findings import Finding, Limits, Refusal
+from contour.acceptance.findings import Finding, Limits, Refusal, around, runs_where
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.geometry.rings import Contour, Ring, contour_defect
 from contour.geometry.segments import BoxTree, contains, first_meeting
 from contour.polygon.polygon import Polygon
+
+# How large a circle shows a vertex.
+_SHOWN_PX = 12.0
 
 
 def area_out_of_limits(area_mm2: float | None, limits: Limits) -> Finding | None:
@@ -42,12 +45,15 @@ def too_unsure(millimetres: Contour | None, budget: ErrorBudget | None, limit: f
     )
 
 
-def outside_work_area(millimetres: Contour | None, work_area: Ring | None) -> Finding | None:
-    """A contour that leaves the work area, in the machine frame."""
+def outside_work_area(
+    millimetres: Contour | None, work_area: Ring | None, pixels: Contour | None = None
+) -> Finding | None:
+    """A contour that leaves the work area, in the machine frame; `pixels`, where it has any, show where."""
     if millimetres is None or work_area is None:
         return None
     exterior = millimetres.exterior
-    outside = exterior[~contains(work_area, exterior)]
+    leaves = ~contains(work_area, exterior)
+    outside = exterior[leaves]
     if len(outside):
         place = f"vertex ({outside[0, 0]:.1f}, {outside[0, 1]:.1f}) mm and {len(outside) - 1} more lie outside"
     else:
@@ -60,6 +66,7 @@ def outside_work_area(millimetres: Contour | None, work_area: Ring | None) -> Fi
     return Finding(
         Refusal.OUTSIDE_WORK_AREA,
         f"The contour leaves the work area: {place}. Move the block, or check work_area_mm and the alignment.",
+        () if pixels is None else runs_where(pixels.exterior, leaves),
     )
 
 
@@ -74,6 +81,7 @@ def outside_calibration(pixels: Contour, sure: PositionUncertainty | None) -> Fi
         f"The contour leaves the part of the picture that the calibration covers: vertex ({x:.0f}, {y:.0f}) px and "
         f"{len(outside) - 1} more lie outside. Move the block towards the picture's middle, or calibrate again with "
         "views that reach there.",
+        tuple(around(x, y, _SHOWN_PX) for x, y in outside.tolist()),
     )
 
 

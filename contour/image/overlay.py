@@ -75,17 +75,15 @@ def draw_overlay(
     refused: bool = False,
     marks: bool = True,
     uncertainty_px: float | None = None,
-    others_px: Sequence[Ring] = (),
+    shown_px: Sequence[Float64s] = (),
     hidden: Sequence[Hidden] = (),
     part: DrawnPart | None = None,
 ) -> Bytes:
-    """The picture as BGR, shape (H, W, 3), with the contour, its vertices and lines of text; the input stays as it is.
-
-    Where `refused`, the text stands on rows of its own above the picture: what speaks against it may lie anywhere.
+    """The picture as BGR, shape (H + h, W, 3), with the contour and its vertices, below h rows with lines of text.
 
     Exterior green, or red where `refused`, holes blue, vertices yellow (without `marks` none). The first caption line
-    is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `others_px`,
-    outlines of what lies besides, are drawn like the exterior, without vertices. Of `hidden` parts bridged ones are
+    is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `shown_px`,
+    paths (N, 2) that show why it is refused, lie over all in yellow. Of `hidden` parts bridged ones are
     dashed, covered ones red and wide; the rest of a refused exterior then is orange. A `part` is drawn in violet, or
     red where it does not fit, its margin as a veil around it, its tightest place as a line with dots. Raises
     PictureError.
@@ -94,10 +92,6 @@ def draw_overlay(
     canvas = _cv.bgr(picture)
     unit = max(max(canvas.shape[:2]) / _UNIT_PX, 1.0)
     text = _Caption.fitted(caption, canvas.shape[1], unit)
-    if not refused:
-        text.darken(canvas)
-    for other in others_px:
-        _draw_ring(canvas, other, REFUSED if refused else ACCEPTED, unit)
     if contour_px is not None:
         if uncertainty_px is not None:
             _draw_band(canvas, contour_px, uncertainty_px, unit)
@@ -112,8 +106,10 @@ def draw_overlay(
                 _mark_vertices(canvas, ring, unit)
     if part is not None:
         _draw_part(canvas, part, unit)
-    if refused:
-        canvas = text.above(canvas)
+    for path in shown_px:
+        _draw_path(canvas, path, (0, 0, 0), 2 * _line_width(unit) + 2)
+        _draw_path(canvas, path, VERTEX, 2 * _line_width(unit))
+    canvas = text.above(canvas)
     text.write(canvas, REFUSED if refused else ACCEPTED, unit)
     return canvas
 
@@ -210,11 +206,6 @@ class _Caption:
     def height(self) -> int:
         """Rows that the text takes."""
         return self.margin + self.line_height * len(self.lines) if self.lines else 0
-
-    def darken(self, canvas: Bytes) -> None:
-        """Darken the band that the text will stand on."""
-        band = canvas[: self.height]
-        band[:] = band // 3
 
     def above(self, canvas: Bytes) -> Bytes:
         """The canvas with black rows above it that the text will stand on."""

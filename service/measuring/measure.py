@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import time
 from collections.abc import Callable
@@ -12,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.acceptance.acceptance import View, judge, judge_without_block
-from contour.acceptance.block_findings import other_blocks
 from contour.acceptance.error_budget import ErrorBudget, error_budget
-from contour.acceptance.findings import Finding, Limits
+from contour.acceptance.findings import Finding, Limits, Refusal, closed
 from contour.acceptance.picture_findings import judge_table
 from contour.acceptance.sent_evidence import ToMillimetres, sent_evidence
 from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, ParameterError
+from contour.geometry.arrays import Float64s
 from contour.geometry.rectifier import CroppedRectifier, Rectifier
 from contour.geometry.rings import Contour, Ring, densified
 from contour.image.line_noise import without_line_noise
@@ -186,7 +187,7 @@ class Measurer:
         return replace(
             result,
             pixels=polygon.pixels,
-            other_blocks_px=tuple(piece.outline_px for piece in other_blocks(traced, limits)),
+            shown_px=self._shown(findings, thickness_mm),
             millimetres=polygon.millimetres,
             area_px2=polygon.area_px2,
             area_mm2=polygon.area_mm2,
@@ -195,6 +196,17 @@ class Measurer:
             evidence=evidence,
             findings=rejections(findings),
         )
+
+    def _shown(self, findings: tuple[Finding, ...], thickness_mm: float) -> tuple[Float64s, ...]:
+        """Paths in the picture that show the findings, the work area's border with a contour that leaves it."""
+        shown = [path for finding in findings for path in finding.shown_px]
+        left = any(finding.refusal == Refusal.OUTSIDE_WORK_AREA for finding in findings)
+        if left and self._work_area_mm is not None and self._calibration is not None:
+            ring = self._work_area_mm
+            border = densified(ring, float(np.ptp(ring, axis=0).max()) / _ROI_STEPS)
+            with contextlib.suppress(CalibrationError):  # a border that the camera does not look at
+                shown.append(closed(self._calibration.to_pixels(border, thickness_mm)))
+        return tuple(shown)
 
     def _look_at_table(self, record: TableRecord, picture: NDArray[np.uint8], camera: str) -> TableLook:
         if camera and record.camera not in ("", camera):

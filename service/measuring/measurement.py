@@ -10,7 +10,8 @@ import numpy as np
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
 from contour.acceptance.sent_evidence import SentStretch
-from contour.geometry.rings import Contour, Ring
+from contour.geometry.arrays import Float64s
+from contour.geometry.rings import Contour
 from contour.image.overlay import Hidden
 from service.reasons import Reason, Rejection
 
@@ -25,8 +26,8 @@ class Measurement:
     """What was seen in one picture: the contour, where there is one, and the findings against it, lowest code first.
 
     pixels and millimetres hold the same vertices in the same order; millimetres are of the machine frame. timings_ms
-    has a figure for each stage that ran, and "total". other_blocks_px: rough outlines of the blocks for which this one
-    was refused (116). edge: cut, cells or mixed, as the picture shows it. evidence: what the contour rests on,
+    has a figure for each stage that ran, and "total". shown_px: paths in the picture that show what speaks
+    against it, (N, 2) each. edge: cut, cells or mixed, as the picture shows it. evidence: what the contour rests on,
     stretches along its rings; None where nobody says. part: the recipe's part in it; None where the recipe has none,
     or the contour was refused before it was tried.
     """
@@ -36,7 +37,7 @@ class Measurement:
     pitch_px: float | None = None
     edge: str | None = None
     pixels: Contour | None = None
-    other_blocks_px: tuple[Ring, ...] = ()
+    shown_px: tuple[Float64s, ...] = ()
     millimetres: Contour | None = None
     area_px2: float | None = None
     area_mm2: float | None = None

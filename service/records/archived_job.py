@@ -18,6 +18,7 @@ from pydantic import ValidationError
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.quality import Quality
 from contour.acceptance.sent_evidence import SentStretch
+from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour
 from drivers.camera import Frame
 from drivers.controller.mailbox.page_text import pages_from_text
@@ -84,6 +85,11 @@ class ArchivedJob:
         """What the polygon rests on; None where nobody said, as in documents of earlier versions."""
         found = self.document["measurement"].get("evidence")
         return None if found is None else tuple(SentStretch(**stretch) for stretch in found)
+
+    @property
+    def shown_px(self) -> tuple[Float64s, ...]:
+        """Paths in the picture that show what spoke against it; none in documents of earlier versions."""
+        return tuple(np.array(path) for path in self.document["measurement"].get("shown_px", ()))
 
     @property
     def part(self) -> PartFit | None:
@@ -207,6 +213,7 @@ def _measurement(draft: ArchivedJob) -> Measurement:
         pitch_px=known["pitch_px"],
         pixels=draft.contour("pixels"),
         millimetres=draft.contour("millimetres"),
+        shown_px=draft.shown_px,
         area_px2=known["area_px2"],
         area_mm2=known["area_mm2"],
         uncertainty_px=known["uncertainty_px"],

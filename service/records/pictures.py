@@ -29,7 +29,7 @@ def overlay(picture: NDArray[np.uint8], measurement: Measurement) -> NDArray[np.
         caption=caption(measurement),
         refused=bool(measurement.findings),
         uncertainty_px=measurement.uncertainty_px,
-        others_px=measurement.other_blocks_px,
+        shown_px=measurement.shown_px,
         hidden=measurement.hidden,
         part=None if measurement.part is None else measurement.part.drawn,
     )

@@ -50,6 +50,7 @@ def drawing(archived: ArchivedJob) -> Drawing:
         exterior=_pairs(pixels.exterior) if pixels else [],
         holes=[_pairs(hole) for hole in pixels.holes] if pixels else [],
         hidden=_hidden(archived.evidence or (), pixels) if measured and pixels else [],
+        shown=[_pairs(path) for path in archived.shown_px] if measured else [],
         band_px=_band_px(measured["uncertainty_mm"] if measured else None, pixels, millimetres),
         part=_part(archived.part) if measured else None,
         size_mm=None if millimetres is None else _size(millimetres),

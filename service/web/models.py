@@ -228,6 +228,7 @@ class Drawing(Answer):
     exterior: Points
     holes: list[Points]
     hidden: list[HiddenPart]
+    shown: list[Points] = Field(description="Paths that show why it was refused.")
     band_px: float | None = Field(description="What the contour may be off by.")
     part: LaidPart | None
     size_mm: tuple[float, float] | None

@@ -58,6 +58,14 @@ function path(points) {
 }
 
 function contour() {
+  const group = outline();
+  for (const points of drawing.shown) {
+    for (const name of ["shown-under", "shown"]) group.append(draw("path", { class: name, d: line(points) }));
+  }
+  return group;
+}
+
+function outline() {
   const told = drawing.hidden.length ? "told" : "";
   const group = draw("g", { class: drawing.refused ? `refused ${told}` : "" });
   for (const mark of drawing.sentinels) group.append(draw("path", { class: "sentinel", d: path(mark.corners) }));

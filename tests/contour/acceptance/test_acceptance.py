@@ -7,7 +7,7 @@ import pytest
 from contour.acceptance.acceptance import View, judge, judge_without_block
 from contour.acceptance.disagreement import Disagreement
 from contour.acceptance.error_budget import ErrorBudget
-from contour.acceptance.findings import Finding, Limits, Refusal
+from contour.acceptance.findings import Finding, Limits, Refusal, closed, runs_where
 from contour.acceptance.narrow_features import NarrowFeature
 from contour.acceptance.quality import Quality
 from contour.acceptance.trace_check import CheckedTrace
@@ -67,6 +67,10 @@ def test_a_contour_within_two_pixels_of_the_frame_touches_it(shift: tuple[int, i
     assert finding.refusal == Refusal.TOUCHES_BORDER
     assert "1.5 px" in finding.text
     assert side in finding.text
+    (shown,) = finding.shown_px
+    assert len(shown) == 4, "the edge that touches, from the vertex before to the one after"
+    along = {"left": 1.0, "top": 1.0, "right": 638.0, "bottom": 478.0}[side]
+    assert (shown[1:3, 0 if side in ("left", "right") else 1] == along).all()
     inwards = -np.sign(shift)
     assert judge(polygon(SQUARE * 10 + 100 + np.array(shift) + inwards), FRAME, LIMITS) == ()
 
@@ -136,6 +140,36 @@ def test_the_whole_contour_must_lie_in_the_work_area(work_area: np.ndarray, word
     else:
         assert [finding.refusal for finding in findings] == [Refusal.OUTSIDE_WORK_AREA]
         assert words in findings[0].text
+
+
+def test_what_lies_outside_the_work_area_is_shown_where_it_lies_in_the_picture() -> None:
+    (finding,) = judge(GOOD, FRAME, replace(LIMITS, work_area_mm=WORK_AREA + np.array([150, 0])))
+    (shown,) = finding.shown_px
+    right = GOOD.pixels.exterior[:, 0].max()
+    left = GOOD.pixels.exterior[:, 0].min()
+    np.testing.assert_array_equal(shown[:, 0], [right, left, left, right])
+    (far,) = judge(GOOD, FRAME, replace(LIMITS, work_area_mm=WORK_AREA + 5000))
+    np.testing.assert_array_equal(far.shown_px[0], closed(GOOD.pixels.exterior))
+
+
+@pytest.mark.parametrize(
+    ("chosen", "paths"),
+    [
+        ([], []),
+        ([0], [[5, 0, 1]]),
+        ([5, 0], [[4, 5, 0, 1]]),
+        ([1, 2, 4], [[3, 4, 5], [0, 1, 2, 3]]),
+        ([0, 1, 2, 3, 4, 5], [[0, 1, 2, 3, 4, 5, 0]]),
+        ([1, 2, 3, 4, 5], [[0, 1, 2, 3, 4, 5, 0]]),
+    ],
+)
+def test_the_parts_of_a_ring_that_are_shown_go_from_neighbour_to_neighbour(
+    chosen: list[int], paths: list[list[int]]
+) -> None:
+    ring = np.column_stack([np.arange(6.0), np.zeros(6)])
+    flags = np.isin(np.arange(6), chosen)
+    found = sorted(path[:, 0].astype(int).tolist() for path in runs_where(ring, flags))
+    assert found == sorted(paths)
 
 
 def test_an_uncertainty_is_judged_where_it_is_limited_and_told_with_its_parts() -> None:

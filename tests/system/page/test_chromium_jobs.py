@@ -103,14 +103,14 @@ def test_a_contour_whose_frame_does_not_come_is_shown_without_one(panel: Panel, 
         route.abort()
 
 
-def test_hidden_parts_of_the_edge_are_told_from_what_was_seen(panel: Panel) -> None:
+def test_hidden_parts_of_the_edge_and_what_speaks_against_it_are_told_from_what_was_seen(panel: Panel) -> None:
     """Seen is solid, bridged dashed, covered red, also where the contour was refused for it."""
     page = panel.page
     parts = [{"covered": covered, "points": [[300, y], [500, y]]} for covered, y in ((False, 200), (True, 300))]
 
     def with_parts(route: Route) -> None:
         drawing = route.fetch().json()
-        route.fulfill(json={**drawing, "refused": True, "hidden": parts})
+        route.fulfill(json={**drawing, "refused": True, "hidden": parts, "shown": [[[20, 30], [40, 50]]]})
 
     page.route("**/drawing", with_parts)
     panel.ordered()
@@ -119,6 +119,8 @@ def test_hidden_parts_of_the_edge_are_told_from_what_was_seen(panel: Panel) -> N
     expect(page.locator("#view path.bridged")).to_have_attribute("d", "M300 200L500 200")
     expect(page.locator("#view path.bridged")).to_have_css("stroke-dasharray", "6px, 6px")
     expect(page.locator("#view path.exterior")).to_have_css("stroke-dasharray", "none")
+    expect(page.locator("#view path.shown")).to_have_attribute("d", "M20 30L40 50")
+    expect(page.locator("#view path.shown")).to_have_css("stroke", "rgb(255, 225, 77)")
     page.unroute_all(behavior="wait")
 
 

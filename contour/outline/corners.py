@@ -18,6 +18,7 @@ _SLACK = 0.8
 _LONE = 1.6
 _SMOOTH_SINE = 0.26
 _ASIDE = 0.8
+_STEPS, _SETTLED_PX = 6, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +94,15 @@ def intersections(models: Models, following: Models, near: Complexes, far: Compl
     point = 0.5 * (near + far)
     foot, tangent = feet(models, near)
     other, other_tangent = feet(following, far)
-    for _ in range(6):
+    for _ in range(_STEPS):
+        before = point
         sine = (tangent.conj() * other_tangent).imag
         sine = np.where(np.abs(sine) > 0.004, sine, np.nan)
         ahead = ((other - foot).conj() * other_tangent).imag / sine
         point = foot + ahead * tangent
         point = np.where(np.isfinite(point), point, 0.5 * (near + far))
+        if (np.abs(point - before) < _SETTLED_PX).all():  # lines do after one step
+            break
         foot, tangent = feet(models, point)
         other, other_tangent = feet(following, point)
     met = (np.abs(distance(models, point)) < 0.02) & (np.abs(distance(following, point)) < 0.02)

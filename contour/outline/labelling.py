@@ -158,7 +158,9 @@ def _joint_cost(last: _Foot, following: _Foot, between: _Between, pitch_px: floa
     way = following.at - last.at
     turn = last.tangent.conj() * following.tangent
     sine = turn.imag
-    reflex = _REFLEX_PER_RADIAN * np.maximum(rare * np.angle(turn), 0.0)
+    dear = rare * sine > 0.0
+    angle = np.arctan2(np.abs(sine), turn.real, where=dear, out=np.zeros(turn.shape))
+    reflex = _REFLEX_PER_RADIAN * angle
     safe = np.where(np.abs(sine) > 0.05, sine, 1.0)
     ahead = (way.conj() * following.tangent).imag / safe
     behind = (last.tangent.conj() * way).imag / safe
@@ -167,7 +169,7 @@ def _joint_cost(last: _Foot, following: _Foot, between: _Between, pitch_px: floa
         np.maximum(np.maximum(-ahead - slack, ahead - most), 0.0) ** 2
         + np.maximum(np.maximum(-behind - slack, behind - most), 0.0) ** 2
     )
-    corner = _CORNER + reflex + _REFLEX * (rare * sine > 0.0) + 8.0 * excess / pitch_px**2
+    corner = _CORNER + reflex + _REFLEX * dear + 8.0 * excess / pitch_px**2
     # A cell in a corner touches its edges at a distance that goes with the cotangent of half the angle between them.
     hidden = (between.unseen + ahead + behind) / pitch_px + 1.0 - np.abs(sine) / np.maximum(1.0 + turn.real, 0.2)
     corner = corner + _MISSING_CELL * np.clip(hidden - _UNSEEN_CORNER + 2.0, 0.0, 1.0)
@@ -202,18 +204,15 @@ def _cheapest_cycle(step: Float64s, first: Float64s) -> tuple[Indices, float]:
 def _cheapest_path(step: Float64s, initial: Float64s, closing: int | None) -> tuple[Indices, float]:
     """Cheapest path from the initial prices, open or (where `closing` is a state) back to that state, and its price."""
     count, width = step.shape[0], step.shape[1]
-    back = np.empty((count, width), dtype=np.intp)
     room = np.empty((width, width))
-    total = initial
+    totals = np.empty((count, width))
+    totals[0] = initial
     for i in range(count - 1):
-        np.add(total[:, None], step[i], out=room)
-        room.argmin(axis=0, out=back[i])
-        total = room.min(axis=0)
-    if closing is not None:
-        total = total + step[count - 1, :, closing]
-    end = int(total.argmin())
+        np.minimum.reduce(np.add(totals[i, :, None], step[i], out=room), axis=0, out=totals[i + 1])
+    last = totals[count - 1] if closing is None else totals[count - 1] + step[count - 1, :, closing]
+    at = int(last.argmin())
     path = np.empty(count, dtype=np.intp)
-    path[count - 1] = end
+    path[count - 1] = at
     for i in range(count - 2, -1, -1):
-        path[i] = back[i, path[i + 1]]
-    return path, float(total[end])
+        path[i] = at = int((totals[i] + step[i, :, at]).argmin())
+    return path, float(last[path[count - 1]])

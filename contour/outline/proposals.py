@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contour.geometry.arrays import Bools, Complexes, Indices
-from contour.outline.lines_and_arcs import Models, distance, join, refine, through_pairs, through_triples
+from contour.outline.lines_and_arcs import Models, distance, distance_from_lines, join, refine, through_pairs, through_triples
 from contour.outline.witnesses import Witnesses, cost, weights, window_cost
 
 # Pairs and triples of sample places (shares of the window) that a fit starts from; far ones fix direction best.
@@ -203,12 +203,11 @@ def _best_starts(witnesses: Witnesses, points: Complexes, index: Indices, bend: 
         own = points[row]
         spots = np.rint(shares * (points.shape[1] - 1)).astype(np.intp)
         picked = own[:, spots]
-        starts = (
-            through_triples(*np.moveaxis(picked, 2, 0))
-            if shares is _TRIPLES
-            else through_pairs(*np.moveaxis(picked, 2, 0))
+        through, off = (
+            (through_triples, distance) if shares is _TRIPLES else (through_pairs, distance_from_lines)
         )
-        signed = distance(starts.take((..., None)), own[:, None, :])
+        starts = through(*np.moveaxis(picked, 2, 0))
+        signed = off(starts.take((..., None)), own[:, None, :])
         best = cost(witnesses, signed, index[row][:, None, :]).sum(axis=2).argmin(axis=1)
         found.append(starts.take((np.arange(len(row)), best)))
     order = np.argsort(np.concatenate(rows), kind="stable")

@@ -115,7 +115,8 @@ def _common_radius(witnesses: Witnesses, ring: _Ring, sign: float) -> float | No
     """Radius that the remaining corners of one sense share with each other or with those that were rounded, negative
     for reflex ones; None where they are better left as they are.
     """
-    corners = [corner for corner in _corners(witnesses, ring, (0,)) if corner.turn * sign > 0.0]
+    every = _corners(witnesses, ring, (0,))
+    corners = [corner for corner in every if corner.turn * sign > 0.0]
     if not corners or len(ring.segments) < 3:
         return None
     if not ring.made.any() and sum(corner.unexplained for corner in corners) < PRICE_ROUNDING - _LONELY:
@@ -123,8 +124,7 @@ def _common_radius(witnesses: Witnesses, ring: _Ring, sign: float) -> float | No
     curvature = ring.segments.models.curvature[ring.made]
     known = (_NEAR_KNOWN[:, None] / curvature[curvature * sign > 0.0]).ravel()
     radii = np.concatenate([sign * _RADII * witnesses.pitch_px, known])
-    lonely = len(_corners(witnesses, ring, (0,))) == 1
-    price = np.where(np.arange(len(radii)) < len(_RADII), PRICE_ROUNDING - _LONELY * lonely, 0.0)
+    price = np.where(np.arange(len(radii)) < len(_RADII), PRICE_ROUNDING - _LONELY * (len(every) == 1), 0.0)
     gains = [_arcs(witnesses, corner, radii).gain + PRICE_ROUNDING for corner in corners]
     together = np.maximum(gains, -_UNLIKE).sum(axis=0) - price
     best = int(together.argmax())

@@ -17,7 +17,7 @@ from contour.outline.free_curves import curve_points, within
 from contour.outline.labelling import label
 from contour.outline.lines_and_arcs import distance
 from contour.outline.missed_walls import overlooked, with_bounds
-from contour.outline.proposals import FEW, gather, propose
+from contour.outline.proposals import FEW, gather, propose, renewed
 from contour.outline.roundings import rounded
 from contour.outline.runs import Segments, around, fitted, runs
 from contour.outline.spread import Vertices, unseen_share, vertex_sigma
@@ -148,7 +148,7 @@ def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
             f"no outline: the {len(witnesses)} wall ends along a ring lie on no line and no arc; "
             "check that the block is in view, and that nothing else with an edge is"
         )
-    segments = runs(label(witnesses, proposals), proposals)
+    segments, first = runs(label(witnesses, proposals), proposals), proposals
     least = _LEAST_NOISE
     for round_ in range(_ROUNDS):
         segments = _refitted(witnesses, segments)
@@ -158,7 +158,7 @@ def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
         proposals = around(witnesses, segments)
         if round_ == 1:
             # With the noise known, and free of what the first labelling took for granted.
-            fresh = propose(witnesses)
+            fresh = renewed(witnesses, first)
         if round_ == 1 or (round_ > 1 and len(witnesses) <= FEW):
             proposals = gather([proposals, fresh])
         found = runs(label(witnesses, proposals), proposals)

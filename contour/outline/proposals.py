@@ -7,7 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from contour.geometry.arrays import Bools, Complexes, Indices
-from contour.outline.lines_and_arcs import Models, distance, distance_from_lines, join, refine, through_pairs, through_triples
+from contour.outline.lines_and_arcs import (
+    Models,
+    distance,
+    distance_from_lines,
+    join,
+    refine,
+    through_pairs,
+    through_triples,
+)
 from contour.outline.witnesses import Witnesses, cost, weights, window_cost
 
 # Pairs and triples of sample places (shares of the window) that a fit starts from; far ones fix direction best.
@@ -176,7 +184,13 @@ def window_fits(witnesses: Witnesses, first: Indices, length: Indices, bend: Boo
     twice."""
     index = samples(len(witnesses), first, length, places)
     points = witnesses.points[index]
-    starts = _best_starts(witnesses, points, index, bend)
+    return _refined(witnesses, _best_starts(witnesses, points, index, bend), bend, (first, length), index)
+
+
+def _refined(
+    witnesses: Witnesses, starts: Models, bend: Bools, window: tuple[Indices, Indices], index: Indices
+) -> Proposals:
+    points, (first, length) = witnesses.points[index], window
     for _ in range(2):
         starts = refine(
             starts, points, weights(witnesses, distance(starts.take((slice(None), None)), points), index), bend
@@ -185,7 +199,16 @@ def window_fits(witnesses: Witnesses, first: Indices, length: Indices, bend: Boo
     saved = witnesses.cap_inside[index] - cost(witnesses, signed, index)
     along = (starts.tangent[:, None] * witnesses.normal[index].conj()).imag.mean(axis=1)
     sound = (along > np.where(bend, 0.2, 0.5)) & gentle(witnesses, starts)
-    return Proposals(starts, bend, first, length, np.where(sound, saved.sum(axis=1) * (length / places) - 8.0, -1.0))
+    return Proposals(
+        starts, bend, first, length, np.where(sound, saved.sum(axis=1) * (length / index.shape[1]) - 8.0, -1.0)
+    )
+
+
+def renewed(witnesses: Witnesses, fits: Proposals) -> Proposals:
+    """The proposals fitted to their windows once more, by the noise that is known by now."""
+    index = samples(len(witnesses), fits.first, fits.length, 16)
+    again = _refined(witnesses, fits.models, fits.bend, (fits.first, fits.length), index)
+    return again.take(again.gain > 0.0)
 
 
 def gentle(witnesses: Witnesses, models: Models) -> Bools:
@@ -203,9 +226,7 @@ def _best_starts(witnesses: Witnesses, points: Complexes, index: Indices, bend: 
         own = points[row]
         spots = np.rint(shares * (points.shape[1] - 1)).astype(np.intp)
         picked = own[:, spots]
-        through, off = (
-            (through_triples, distance) if shares is _TRIPLES else (through_pairs, distance_from_lines)
-        )
+        through, off = (through_triples, distance) if shares is _TRIPLES else (through_pairs, distance_from_lines)
         starts = through(*np.moveaxis(picked, 2, 0))
         signed = off(starts.take((..., None)), own[:, None, :])
         best = cost(witnesses, signed, index[row][:, None, :]).sum(axis=2).argmin(axis=1)

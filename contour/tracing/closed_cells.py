@@ -15,6 +15,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.rings import Contour, Ring
+from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_sampling import sample_at
 from contour.tracing.table_surface import OUTLIER, table_surface
 
@@ -83,8 +84,8 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
 
 def _with_faint_cells(surely: Bytes, perhaps: Bytes, pitch_px: float) -> Bytes:
     """A region with what fainter walls add to it, where they close cells: less than half of one is something beside."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(perhaps & (1 - surely), connectivity=8)
-    cells = stats[:, cv2.CC_STAT_AREA] > _LEAST_CELL * pitch_px * pitch_px
+    labels, area = pieces_and_areas(perhaps & (1 - surely), 8)
+    cells = area > _LEAST_CELL * pitch_px * pitch_px
     cells[0] = False
     return np.where(cells[labels], np.uint8(1), surely & perhaps)
 
@@ -184,18 +185,25 @@ def _leaking_cells(material: Bytes, pitch_px: float) -> Bytes:
     Where walls are grown by half a gap, such cells lie apart from the table; what is nearer to a cell's rest than to
     the table's is the cell.
     """
-    away = cv2.distanceTransform(1 - material, cv2.DIST_L2, 5)
+    # Around the material lies the table: farther off there is no cell, and none nearer to it.
+    left, top, wide, high = cv2.boundingRect(material)
+    margin = round(pitch_px)
+    about = (slice(max(top - margin, 0), top + high + margin), slice(max(left - margin, 0), left + wide + margin))
+    free = 1 - material[about]
+    leaking = np.zeros_like(material)
+    away = cv2.distanceTransform(free, cv2.DIST_L2, 5)
     seeds = (away > 0.5 * _BROKEN_PITCHES * pitch_px).astype(np.uint8)
     # As the labels below hang together: a cell that touches the table's seeds by a corner would make all of it a cell.
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=8)
-    cell = stats[:, cv2.CC_STAT_AREA] < _LARGEST_CELL * pitch_px * pitch_px
+    labels, area = pieces_and_areas(seeds, 8)
+    cell = area < _LARGEST_CELL * pitch_px * pitch_px
     cell[0] = False
     if not cell.any():
-        return np.zeros_like(material)
+        return leaking
     _, nearest = cv2.distanceTransformWithLabels(1 - seeds, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
     of_cell = np.zeros(int(nearest.max()) + 1, np.uint8)
     of_cell[nearest[cell[labels]]] = 1
-    return np.asarray(of_cell[nearest] & (material == 0), np.uint8)
+    leaking[about] = of_cell[nearest] & free
+    return leaking
 
 
 def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s) -> tuple[Ring, Float64s]:

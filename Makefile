@@ -51,9 +51,10 @@ bench-page: install
 bench-start: install
 	$(BIN)/python -m benchmarks.start --write
 
-# Times, passes over the picture, arrays and the largest of them, step by step, at 2, 12 and 48 MP.
+# Times, passes over the picture, arrays and the largest of them, step by step, at 2, 12 and 48 MP; outlines a second.
 profile: install
 	$(BIN)/python -m benchmarks.profile --write
+	$(BIN)/python -m benchmarks.live --write
 
 accuracy: install
 	$(BIN)/python -m benchmarks.accuracy --random 300 --first 998000 --write

@@ -55,6 +55,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("combtrace grab --device /dev/video0 --size 1600x1200 --output frame.png", "Without a configuration."),
     ),
     "focus": (("combtrace focus --config config.yaml", "Turn the lens until the bar is full."),),
+    "live": (
+        ("combtrace live --config config.yaml --overlay live.jpg", "While the block is laid down; show live.jpg."),
+        ("combtrace live --simulated --frames 50", "Without a camera: how fast this machine is."),
+    ),
     "board": (
         (
             "combtrace board --board charuco --squares 11x8 --square-mm 25 --output board.svg",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ Indices = NDArray[np.intp]
 Float32s = NDArray[np.float32]
 Float64s = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+A = TypeVar("A", bound=NDArray[Any])
 
 
 def median(values: NDArray[Any]) -> float:
@@ -53,3 +54,10 @@ def quantiles(values: NDArray[Any], shares: tuple[float, ...]) -> Float64s:
 def distinct(numbers: NDArray[Any]) -> Indices:
     """The numbers, none negative, each once, rising."""
     return np.flatnonzero(np.bincount(numbers.ravel()))
+
+
+def rolled(values: A, by: int) -> A:
+    """The values shifted by so many places along the first axis, at most all of them either way, those at the end to
+    the other; np.roll takes several times as long for the few values of a ring.
+    """
+    return np.concatenate((values[-by:], values[:-by]))  # type: ignore[return-value]

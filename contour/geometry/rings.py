@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s
+from contour.geometry.arrays import Float64s, rolled
 from contour.geometry.segments import BoxTree, contains, distances_to_ring, first_meeting, self_meetings
 from contour.geometry.simplification import simplify_indices
 
@@ -77,7 +77,7 @@ def signed_area(ring: Ring) -> float:
     """Area by the shoelace formula, in the ring's unit squared: positive for counter-clockwise (y up)."""
     # Taken about the first vertex: far from the origin the products would cancel and cost digits.
     x, y = (ring - ring[0]).T
-    return float(0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+    return float(0.5 * (x * rolled(y, -1) - y * rolled(x, -1)).sum())
 
 
 def oriented(ring: Ring, counter_clockwise: bool) -> Ring:
@@ -126,7 +126,7 @@ def largest_loop(ring: Ring) -> Ring:
 
 def perimeter(ring: Ring) -> float:
     """Length of the closed ring."""
-    steps = np.roll(ring, -1, axis=0) - ring
+    steps = rolled(ring, -1) - ring
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
@@ -190,7 +190,7 @@ def _nesting_defect(contour: Contour, names: list[str]) -> str | None:
 
 def densified(ring: Ring, spacing: float) -> Ring:
     """The ring with points added along its edges so that neighbours are at most `spacing` apart; vertices stay."""
-    ends = np.roll(ring, -1, axis=0)
+    ends = rolled(ring, -1)
     steps = ends - ring
     counts = np.maximum(np.ceil(np.hypot(steps[:, 0], steps[:, 1]) / spacing), 1).astype(np.intp)
     edge = np.repeat(np.arange(len(ring)), counts)

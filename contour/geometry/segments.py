@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bools, Float64s, Indices
+from contour.geometry.arrays import Bools, Float64s, Indices, rolled
 
 _MOST_PAIRS = 1 << 18
 """Pairs handled at once: 256 Ki pairs of boxes are about 20 MB, whatever the ring."""
@@ -39,7 +39,7 @@ class BoxTree:
     def of_ring(cls, ring: Float64s) -> BoxTree:
         """The tree over the ring's N segments; segment i runs from vertex i to vertex i + 1 (cyclic)."""
         start = np.ascontiguousarray(ring, dtype=np.float64)
-        return cls.of_segments(start, np.roll(start, -1, axis=0))
+        return cls.of_segments(start, rolled(start, -1))
 
     @classmethod
     def of_segments(cls, start: Float64s, end: Float64s) -> BoxTree:
@@ -193,7 +193,7 @@ def _folds_back(a: Float64s, b: Float64s, c: Float64s) -> Bools:
 
 def contains(ring: Float64s, points: Float64s) -> Bools:
     """True where a point lies inside the ring by the even-odd rule, shape (P,); a point on the ring is either."""
-    start, end = ring, np.roll(ring, -1, axis=0)
+    start, end = ring, rolled(ring, -1)
     inside = np.zeros(len(points), np.bool_)
     for k, point in enumerate(points):
         crossing = np.flatnonzero((start[:, 1] > point[1]) != (end[:, 1] > point[1]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s
+from contour.geometry.arrays import Float64s, rolled
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 
@@ -24,7 +24,7 @@ def depth_inside(ring: Ring, points: Float64s, rectifier: Rectifier | None = Non
 
 
 def _depth_inside(ring: Ring, points: Float64s) -> Float64s:
-    start, following = ring, np.roll(ring, -1, axis=0)
+    start, following = ring, rolled(ring, -1)
     along = following - start
     square = np.maximum((along**2).sum(axis=1), 1e-12)
     # x and y apart: a last axis of two takes several times longer.

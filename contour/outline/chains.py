@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Float64s, Indices
+from contour.geometry.arrays import Bools, Float64s, Indices, rolled
 from contour.outline.corners import Joints
 from contour.outline.free_curves import Curve, Guide, smooth_curve
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE
@@ -89,16 +89,14 @@ def _bent(witnesses: Witnesses, segments: Segments, found: Joints) -> bool:
 
 def _supple(witnesses: Witnesses, segments: Segments, found: Joints) -> Bools:
     """Which segments may be part of a free curve: arcs, and straight edges that are short."""
-    length = np.abs(found.end - np.roll(found.begin, 1))
+    length = np.abs(found.end - rolled(found.begin, 1))
     return np.asarray(segments.bend | (length < _LONGEST_LINE_PITCHES * witnesses.pitch_px), np.bool_)
 
 
 def _links(witnesses: Witnesses, segments: Segments, found: Joints) -> Bools:
     """True where a segment may flow into the next: no sharp turn, an arc on either side, no long straight edge."""
     supple = _supple(witnesses, segments, found)
-    links: Bools = (
-        (found.kink < _SHARPEST) & supple & np.roll(supple, -1) & (segments.bend | np.roll(segments.bend, -1))
-    )
+    links: Bools = (found.kink < _SHARPEST) & supple & rolled(supple, -1) & (segments.bend | rolled(segments.bend, -1))
     return links
 
 
@@ -108,7 +106,7 @@ def _runs(segments: Segments, linked: Bools) -> list[tuple[list[int], bool]]:
     if total > 1 and linked.all():
         return [(list(range(total)), True)]
     found: list[tuple[list[int], bool]] = []
-    for begin in np.flatnonzero(~np.roll(linked, 1)):
+    for begin in np.flatnonzero(~rolled(linked, 1)):
         members = [int(begin)]
         while linked[members[-1]]:
             members.append((members[-1] + 1) % total)
@@ -121,8 +119,8 @@ def _guide(witnesses: Witnesses, segments: Segments, members: list[int], index: 
     """Feet of the witnesses at `index` on their own members."""
     owner = np.repeat(members, segments.length[members])
     foot, tangent = feet(segments.models.take(owner), witnesses.points[index])
-    way = np.roll(foot, -1) - foot
-    middle = tangent + np.roll(tangent, -1)
+    way = rolled(foot, -1) - foot
+    middle = tangent + rolled(tangent, -1)
     forward = np.maximum((way * middle.conj()).real / np.maximum(np.abs(middle), 1e-9), 0.0)
     place = np.concatenate([[0.0], np.cumsum(forward[:-1])])
     return Guide(foot, place, float(place[-1] + (forward[-1] if closed else 0.0)), closed)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median, rolled
 from contour.outline.lines_and_arcs import Models, distance, feet
 from contour.outline.runs import Segments
 from contour.outline.witnesses import Witnesses
@@ -53,7 +53,7 @@ def joints(witnesses: Witnesses, segments: Segments, inlier: Bools) -> Joints:
     """The joint after each segment: a corner at the intersection where it lies within reach of the evidence, a smooth
     join where the two all but touch, else a bevel from the last witness of one to the first of the next."""
     first, last = ends(witnesses, segments, inlier)
-    after = np.roll(np.arange(len(segments)), -1)
+    after = rolled(np.arange(len(segments)), -1)
     following = segments.models.take(after)
     near, far = last, first[after]
     point, met = intersections(segments.models, following, near, far)
@@ -115,7 +115,7 @@ def without_reversed(witnesses: Witnesses, segments: Segments, inlier: Bools) ->
         found = joints(witnesses, segments, inlier)
         if len(segments) < 4:
             return segments, found
-        begin = np.roll(found.begin, 1)
+        begin = rolled(found.begin, 1)
         _, tangent = feet(segments.models, 0.5 * (begin + found.end))
         run = ((found.end - begin) * tangent.conj()).real
         sweep = np.abs(segments.models.curvature) * segments.length * witnesses.pitch_px
@@ -185,7 +185,7 @@ def thinned(ring: Complexes, tolerance: float) -> Indices:
     keep = np.arange(len(ring))
     while len(keep) > 3:
         points = ring[keep]
-        back, ahead = np.roll(points, 1), np.roll(points, -1)
+        back, ahead = rolled(points, 1), rolled(points, -1)
         chord = ahead - back
         length = np.maximum(np.abs(chord), 1e-12)
         off = np.abs((chord.conj() * (points - back)).imag) / length

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, distinct, median
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, distinct, median, rolled
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.outline.bevels import bevelled
@@ -197,7 +197,7 @@ def _vertices(witnesses: Witnesses, segments: Segments, found: Joints, chains: l
     total = len(segments)
     curve_of = {chain.segments[0]: chain for chain in chains}
     inside = {k for chain in chains for k in chain.segments[1:]}
-    begin = np.roll(found.begin, 1)
+    begin = rolled(found.begin, 1)
     parts: list[Complexes] = []
     owners: list[tuple[int, int]] = []
     for k in range(total):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Complexes, Float64s, Indices
+from contour.geometry.arrays import Complexes, Float64s, Indices, rolled
 from contour.outline.lines_and_arcs import distance, feet
 from contour.outline.proposals import FEW, Proposals
 from contour.outline.reach import Reach, reach, supports
@@ -69,7 +69,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     facing = (tangent * witnesses.normal.conj()[:, None]).imag
     unary = np.where(facing > -0.2, unary, unary + 20.0)
     step = _steps(witnesses, proposals, here, foot, tangent, reached)
-    step = step + np.roll(unary, -1, axis=0)[:, None, :]
+    step = step + rolled(unary, -1)[:, None, :]
     path, energy = _cheapest_cycle(step, unary)
     return Labelling(here[np.arange(count), path], energy)
 
@@ -112,13 +112,13 @@ def _steps(
     """Price of going from state a at witness i to state b at witness i + 1, shape (N, A, A)."""
 
     def after(of_next: NDArray[Any]) -> NDArray[Any]:
-        return np.roll(of_next, -1, axis=0)[:, None, :]
+        return rolled(of_next, -1)[:, None, :]
 
-    following = np.roll(here, -1, axis=0)
+    following = rolled(here, -1)
     between = _Between(
         gap=witnesses.gap[:, None, None],
         unseen=reached.back[:, :, None] + after(reached.ahead),
-        sigma=np.maximum(witnesses.outer, np.roll(witnesses.outer, -1))[:, None, None],
+        sigma=np.maximum(witnesses.outer, rolled(witnesses.outer, -1))[:, None, None],
     )
     last = _Foot(foot[:, :, None], tangent[:, :, None])
     joint = _joint_cost(last, _Foot(after(foot), after(tangent)), between, witnesses.pitch_px, witnesses.rare)
@@ -189,7 +189,7 @@ def _cheapest_cycle(step: Float64s, first: Float64s) -> tuple[Indices, float]:
     """
     count = len(step)
     start = int((first < _FAR).sum(axis=1).argmin())
-    path, _ = _cheapest_path(np.roll(step, -start, axis=0), first[start], None)
+    path, _ = _cheapest_path(rolled(step, -start), first[start], None)
     change = np.flatnonzero(np.diff(path, prepend=-1, append=-1))
     longest = int(np.diff(change).argmax())
     anchor = int(change[longest] + change[longest + 1]) // 2
@@ -197,8 +197,8 @@ def _cheapest_cycle(step: Float64s, first: Float64s) -> tuple[Indices, float]:
     anchor = (anchor + start) % count
     initial = np.full(step.shape[1], _FAR)
     initial[state] = 0.0
-    path, energy = _cheapest_path(np.roll(step, -anchor, axis=0), initial, state)
-    return np.roll(path, anchor), energy
+    path, energy = _cheapest_path(rolled(step, -anchor), initial, state)
+    return rolled(path, anchor), energy
 
 
 def _cheapest_path(step: Float64s, initial: Float64s, closing: int | None) -> tuple[Indices, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices, distinct
+from contour.geometry.arrays import Float64s, Indices, distinct, rolled
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
@@ -34,11 +34,11 @@ def overlooked(walls: Float64s, ring: Ring, pitch_px: float, *, is_hole: bool) -
         return np.zeros(0, dtype=np.intp), 0.0
     height = (1.0 if is_hole else -1.0) * depth_inside(ring, walls) / pitch_px
     outside = height > _OUTSIDE
-    apart = np.hypot(*(walls - np.roll(walls, 1, axis=0)).T) > _CHAIN_BREAKS * pitch_px
-    starts = np.flatnonzero(outside & (~np.roll(outside, 1) | apart))
-    stops = np.flatnonzero(outside & (~np.roll(outside, -1) | np.roll(apart, -1)))
+    apart = np.hypot(*(walls - rolled(walls, 1)).T) > _CHAIN_BREAKS * pitch_px
+    starts = np.flatnonzero(outside & (~rolled(outside, 1) | apart))
+    stops = np.flatnonzero(outside & (~rolled(outside, -1) | rolled(apart, -1)))
     if len(stops) and stops[0] < starts[0]:
-        stops = np.roll(stops, -1)
+        stops = rolled(stops, -1)
     found, total = [np.zeros(0, dtype=np.intp)], 0.0
     for start, stop in zip(starts, stops, strict=True):
         run = (start + np.arange((stop - start) % len(walls) + 1)) % len(walls)

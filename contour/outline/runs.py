@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Float64s, Indices
+from contour.geometry.arrays import Bools, Float64s, Indices, rolled
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE, Labelling
 from contour.outline.lines_and_arcs import Models, distance, feet, join, refine, through_pairs, through_triples
 from contour.outline.proposals import Proposals, gather, gentle, window_fits
@@ -34,13 +34,13 @@ class Segments:
     def owner(self, count: int) -> Indices:
         """Segment of each of the `count` witnesses, shape (N,)."""
         owner = np.repeat(np.arange(len(self)), self.length)
-        return np.roll(owner, int(self.first[0]))[:count]
+        return rolled(owner, int(self.first[0]))[:count]
 
 
 def runs(labelling: Labelling, proposals: Proposals) -> Segments:
     """The labelling's runs as segments."""
     label = labelling.label
-    first = np.flatnonzero(label != np.roll(label, 1))
+    first = np.flatnonzero(label != rolled(label, 1))
     if not len(first):
         first = np.zeros(1, dtype=np.intp)
     length = np.diff(first, append=first[0] + len(label))
@@ -114,12 +114,12 @@ def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Indices, Ind
     count = len(witnesses)
     signed = distance(segments.models.take(segments.owner(count)), witnesses.points)
     off = np.abs(signed) > 3.0 * np.where(signed > 0.0, witnesses.outer, witnesses.inner)
-    off |= np.roll(off, 1) & np.roll(off, -1)
-    first = np.flatnonzero(off & ~np.roll(off, 1))
-    length = (np.flatnonzero(off & ~np.roll(off, -1)) - first) % count + 1 if len(first) else first
+    off |= rolled(off, 1) & rolled(off, -1)
+    first = np.flatnonzero(off & ~rolled(off, 1))
+    length = (np.flatnonzero(off & ~rolled(off, -1)) - first) % count + 1 if len(first) else first
     if len(first) and off[0] and off[-1]:
-        last = np.flatnonzero(off & ~np.roll(off, -1))
-        length = (np.roll(last, -1) - first) % count + 1
+        last = np.flatnonzero(off & ~rolled(off, -1))
+        length = (rolled(last, -1) - first) % count + 1
     long = (length >= 4) & (length + 2 < count)
     first, length = first[long], length[long]
     begins, sizes = [first, first - 1], [length, length + 2]

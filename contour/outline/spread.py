@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, rolled
 from contour.outline.lines_and_arcs import Models, feet
 from contour.outline.runs import Segments, stretch
 from contour.outline.witnesses import Witnesses
@@ -75,7 +75,7 @@ def _bend_unseen(witnesses: Witnesses, inlier: Bools, ring: Complexes) -> Float6
     """How far a curve may leave its vertices unseen, shape (M,), pixels: a share of the sagitta over the gap about
     each, whose middle is half of it away from any witness.
     """
-    ahead, back = np.roll(ring, -1) - ring, ring - np.roll(ring, 1)
+    ahead, back = rolled(ring, -1) - ring, ring - rolled(ring, 1)
     turn = np.abs(np.angle(ahead * back.conj()))
     curvature = 2.0 * turn / np.maximum(np.abs(ahead) + np.abs(back), 1e-9)
     seen = witnesses.points[inlier] if inlier.any() else witnesses.points

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median, quantile
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, median, quantile, rolled
 from contour.geometry.rectifier import Rectifier
 from contour.outline.lines_and_arcs import Models, distance
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
@@ -78,7 +78,7 @@ def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None
     ends = evidence.kind < WitnessKind.OUTERMOST
     sigma = np.maximum(evidence.sigma, _LEAST_SIGMA_PX)
     coarse = evidence.coarse
-    length = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
+    length = float(np.hypot(*(rolled(coarse, -1) - coarse).T).sum())
     gap = np.diff(evidence.position, append=evidence.position[:1] + length)
     inner = np.where(ends, sigma, np.maximum(sigma, _SERRATION * pitch_px))
     inner = np.where(evidence.kind == WitnessKind.BOUND, np.inf, inner)
@@ -169,17 +169,17 @@ def noise_from_neighbours(witnesses: Witnesses) -> float:
     if len(witnesses) < 8:
         return 1.0
     points = witnesses.points
-    back, ahead = np.roll(points, 1), np.roll(points, -1)
+    back, ahead = rolled(points, 1), rolled(points, -1)
     chord = ahead - back
     share = np.clip(((points - back) * chord.conj()).real / np.maximum(np.abs(chord) ** 2, 1e-12), 0.0, 1.0)
     off = ((points - back - share * chord) * witnesses.normal.conj()).real
-    sound = witnesses.clean & np.roll(witnesses.clean, 1) & np.roll(witnesses.clean, -1)
+    sound = witnesses.clean & rolled(witnesses.clean, 1) & rolled(witnesses.clean, -1)
     if sound.sum() < 8:
         return 1.0
     simple = off / (witnesses.outer * np.sqrt(1.0 + share**2 + (1.0 - share) ** 2))
     # 1.5, -1, -1, 1/4, 1/4 are the weights of five even neighbours in the excess: 2.09 is the root of their squares'
     # sum.
-    excess = (off - 0.5 * (np.roll(off, 1) + np.roll(off, -1))) / (2.09 * witnesses.outer)
+    excess = (off - 0.5 * (rolled(off, 1) + rolled(off, -1))) / (2.09 * witnesses.outer)
     level = min(quantile(np.abs(simple[sound]), 0.25), quantile(np.abs(excess[sound]), 0.25))
     most = _NOISIEST if len(witnesses) > _FEW else _NOISIEST_OF_FEW
     return float(np.clip(level / 0.36, 0.5, most))

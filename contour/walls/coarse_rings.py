@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, Int64s
+from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, Int64s, rolled
 from contour.geometry.rings import Ring
 from contour.image.pixel_grid import enlarged, pixels_of, samples_of
 from contour.image.pixel_sampling import sample_at
@@ -148,7 +148,7 @@ def _ring(chain: Int32s, is_hole: bool, step: int, samples: float) -> CoarseRing
     normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     # The chain runs through sample centres, half a sample inside the filled block (outside of it along a hole).
     vertices = pixels_of(smooth - PAD, step) + (0.5 * step) * normal
-    lengths = np.linalg.norm(np.roll(vertices, -1, axis=0) - vertices, axis=1)
+    lengths = np.linalg.norm(rolled(vertices, -1) - vertices, axis=1)
     arc = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
     base = pixels_of(ahead - PAD, step)
     return CoarseRing(vertices, base, arc, normal, float(lengths.sum()), is_hole)
@@ -169,5 +169,5 @@ def _turned(chain: Int32s, is_hole: bool) -> Int32s:
 
 
 def _shoelace(points: Float64s) -> float:
-    following = np.roll(points, -1, axis=0)
+    following = rolled(points, -1)
     return float(0.5 * (points[:, 0] * following[:, 1] - following[:, 0] * points[:, 1]).sum())

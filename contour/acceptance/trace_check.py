@@ -15,6 +15,7 @@ from contour.edge.edge_parts import EdgePart
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, densified
+from contour.image.side_by_side import side_by_side
 from contour.tracing.trace import Trace
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
@@ -54,16 +55,28 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
     # What is at full scale beside dark material is the table; the edge of the material is seen all the better.
     if traced.polarity == "dark" and traced.edge == "cells":
         quality = replace(quality, clipped_share=0.0)
-    apart = narrow = alike = bare = None
-    if traced.pitch_px is not None:
-        flat = None if traced.look is None else traced.look.lit.astype(np.uint8)
-        apart = disagreement(picture, _bent(traced, traced.pitch_px, rectifier), traced.pitch_px, flat)
-        # Only where the edge was cut: closed cells are serrated.
-        if traced.evidence is not None:
-            narrow = narrow_feature(traced.contour, traced.pitch_px)
-            alike = alike_edge(picture, traced.contour, traced.pitch_px, dark=traced.polarity == "dark")
-            bare = bare_edge(traced, traced.pitch_px)
-    return CheckedTrace(traced, quality, apart, narrow, alike, bare)
+    if traced.pitch_px is None:
+        return CheckedTrace(traced, quality)
+    pitch_px = traced.pitch_px
+    flat = None if traced.look is None else traced.look.lit.astype(np.uint8)
+    apart, edge = side_by_side(
+        lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat),
+        lambda: _checked_edge(picture, traced, pitch_px),
+    )
+    return CheckedTrace(traced, quality, apart, *edge)
+
+
+def _checked_edge(
+    picture: Bytes, traced: Trace, pitch_px: float
+) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None]:
+    """What is narrow, alike and bare of an edge, and only where it was cut: closed cells are serrated."""
+    if traced.evidence is None:
+        return None, None, None
+    return (
+        narrow_feature(traced.contour, pitch_px),
+        alike_edge(picture, traced.contour, pitch_px, dark=traced.polarity == "dark"),
+        bare_edge(traced, pitch_px),
+    )
 
 
 def _bent(traced: Trace, pitch_px: float, rectifier: Rectifier | None) -> Contour:

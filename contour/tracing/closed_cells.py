@@ -17,6 +17,7 @@ from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.rings import Contour, Ring
 from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_sampling import sample_at
+from contour.image.side_by_side import side_by_side
 from contour.tracing.table_surface import OUTLIER, table_surface
 
 _GRID_PX = 4
@@ -64,7 +65,8 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
     level = _levels(difference, noise, pitch_px)
     apart = _without_soft_shadow(difference, level)
     faint = (walls > 0) & (difference > np.maximum(level // 2, OUTLIER * noise))
-    region = _with_faint_cells(_region(apart, pitch_px), _region(apart | faint, pitch_px), pitch_px)
+    surely, perhaps = side_by_side(lambda: _region(apart, pitch_px), lambda: _region(apart | faint, pitch_px))
+    region = _with_faint_cells(surely, perhaps, pitch_px)
     border, _ = cv2.findContours(region, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     # Threads a pixel wide would cross themselves once they are moved.
     body = cv2.morphologyEx(region, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))

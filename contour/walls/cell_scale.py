@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,6 +12,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.opencv import pieces_and_areas
+from contour.image.side_by_side import side_by_side
 from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
 from contour.walls.wall_mask import wall_mask
 
@@ -142,8 +143,7 @@ def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> 
     """
     best: CellScale | None = None
     for guess in guesses:
-        for bright in senses:
-            cells = cells_of(part, guess, bright=bright)
+        for cells in _in_senses(part, guess, senses):
             if cells is not None and (best is None or cells.score > best.score):
                 best = cells
         # Good enough in one sense and guess, while the other sense was heard too.
@@ -155,6 +155,12 @@ def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> 
     # Faint fine cells are seen better through a wide window.
     same = again is None or abs(again.pitch_px - best.pitch_px) < _SAME_PITCH * best.pitch_px
     return best if again is None or (same and again.score < best.score) else again
+
+
+def _in_senses(part: Bytes, guess: float, senses: list[bool]) -> Sequence[CellScale | None]:
+    if len(senses) == 1:
+        return [cells_of(part, guess, bright=senses[0])]
+    return side_by_side(lambda: cells_of(part, guess, bright=True), lambda: cells_of(part, guess, bright=False))
 
 
 def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None:

@@ -67,7 +67,7 @@ class Controller(Protocol):
         """Write the commit register alone."""
 
     async def write_page(self, page: Page) -> None:
-        """Write payload and header without the commit register, in as few FC16 as the limit allows."""
+        """Write part block, payload and header without the commit register, in as few FC16 as the limit allows."""
 
-    async def read_page(self, payload_length: int) -> Page:
-        """Read header without the commit register and `payload_length` registers of payload back."""
+    async def read_page(self, payload_length: int, part_length: int = 0) -> Page:
+        """Read header without the commit register, `payload_length` registers of payload and the part block's back."""

@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 
 from drivers.controller.mailbox.blocks import BLOCK_REGISTERS
 from drivers.controller.mailbox.pages import HEADER_REGISTERS
+from drivers.controller.mailbox.part_block import PART_HEADER_REGISTERS
 from service.config.values import REGISTERS, Host, Model, Port, Register, Seconds
 
 
@@ -17,6 +18,15 @@ class NoController(Model):
 
     kind: Literal["none"]
     ready_timeout_s: Seconds = Field(30, description="Longest wait for the service to be ready, s.")
+
+
+class PartBlock(Model):
+    """The block by which a controller gets a recipe's parts in their place in the contour."""
+
+    address: Register = Field(2048, description="First register of the part block (PDU address).")
+    capacity: int = Field(
+        2000, ge=24, le=REGISTERS, description="Registers behind its header: 12 a part, 2 a ring, 4 a vertex."
+    )
 
 
 class ModbusController(Model):
@@ -41,6 +51,9 @@ class ModbusController(Model):
     )
     contour_address: Register = Field(32, description="First register of header and payload (PDU address).")
     payload_capacity: int = Field(1984, ge=8, le=REGISTERS, description="Registers of payload, an even number.")
+    part_block: PartBlock | None = Field(
+        None, description="Keys below; none = a controller that is told nothing of parts."
+    )
     longest_write: int = Field(
         123,
         ge=16,
@@ -80,6 +93,8 @@ class ModbusController(Model):
             "service_address": (self.service_address, BLOCK_REGISTERS),
             "contour_address": (self.contour_address, 1 + HEADER_REGISTERS + self.payload_capacity),
         }
+        if self.part_block is not None:
+            blocks["part_block"] = (self.part_block.address, PART_HEADER_REGISTERS + self.part_block.capacity)
         for name, (start, length) in blocks.items():
             if start + length > REGISTERS:
                 raise ValueError(f"{name} {start} and {length} registers end at {start + length - 1}, past 65535")

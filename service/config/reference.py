@@ -35,6 +35,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
         (controllers.ModbusTcp, controllers.ModbusRtu, controllers.ModbusRtuOverTcp, controllers.NoController),
     ),
     ("`controller.rs485`", (controllers.Rs485,)),
+    ("`controller.part_block`", (controllers.PartBlock,)),
     ("`triggers`", (triggers.IntervalTrigger, triggers.ControllerTrigger, triggers.SerialTrigger)),
     ("`recipes`", (recipes.Recipe,)),
     ("A recipe's `gcode`", (recipes.Gcode,)),

@@ -287,6 +287,7 @@ class Cycle:
             word_order=self._settings.mailbox.word_order,
             payload_capacity=self._settings.mailbox.payload_capacity,
             single_page=not self._settings.transfer.handshake,
+            part_capacity=self._settings.mailbox.part_capacity,
         )
 
     def _pages(self, measurement: Measurement, envelope: Envelope) -> tuple[Page, ...]:
@@ -388,7 +389,7 @@ def _figures(stamp: Stamp, pages: tuple[Page, ...]) -> dict[str, Any]:
         "session": stamp.session,
         "captured_at": stamp.clock_ms,
         "pages": len(pages),
-        "registers": sum(len(page.header) + len(page.payload) for page in pages),
+        "registers": sum(len(page.header) + len(page.payload) + len(page.part) for page in pages),
         "crc32": [f"{crc32_of(page.header, page.payload):08X}" for page in pages],
     }
 

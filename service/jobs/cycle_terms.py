@@ -23,10 +23,11 @@ from service.records.journal import Journal
 
 @dataclass(frozen=True)
 class MailboxFormat:
-    """How pages are laid out for this controller."""
+    """How pages are laid out for this controller. part_capacity: None = it has no part block."""
 
     word_order: Any = "big"
     payload_capacity: int = 1984
+    part_capacity: int | None = None
 
 
 @dataclass(frozen=True)

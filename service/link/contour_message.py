@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from drivers.controller.errors import ContourTooLarge
 from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages, micrometres
+from drivers.controller.mailbox.part_block import PlacedPart, with_parts
 from drivers.controller.mailbox.words import WordOrder
 from service.measuring.measurement import Measurement
 
+if TYPE_CHECKING:
+    from service.parts.fit import PartFit
+
 UNCERTAINTY_FACTOR = 1000.0  # mm to µm
+MICRODEGREES = 1e6
 
 
 @dataclass(frozen=True)
@@ -18,6 +25,7 @@ class Envelope:
 
     captured_at, valid_for_ms: on the controller's clock, ms. trigger: the counter it answers, 0 = another kind.
     single_page: nobody answers, so nobody knows when a page was read, and the next would overwrite it unseen.
+    part_capacity: registers of the part block behind its header; None = the controller has none.
     """
 
     job_id: int
@@ -30,6 +38,7 @@ class Envelope:
     word_order: WordOrder = "big"
     payload_capacity: int = 1984
     single_page: bool = False
+    part_capacity: int | None = None
 
 
 def contour_pages(measurement: Measurement, envelope: Envelope) -> tuple[Page, ...]:
@@ -57,4 +66,20 @@ def contour_pages(measurement: Measurement, envelope: Envelope) -> tuple[Page, .
             f"{contour.point_count} vertices need {len(pages)} pages of {envelope.payload_capacity} registers, "
             "a controller that cannot answer takes one: raise tolerance_mm or payload_capacity"
         )
-    return pages
+    if envelope.part_capacity is None:
+        return pages
+    parts = [_placed(number, fit) for number, fit in measurement.laid]
+    return with_parts(pages, parts, envelope.part_capacity, envelope.word_order)
+
+
+def _placed(number: int, fit: PartFit) -> PlacedPart:
+    pose = fit.placement.pose
+    return PlacedPart(
+        number=number,
+        x_um=round(pose.x * 1000),
+        y_um=round(pose.y * 1000),
+        angle_udeg=round(pose.angle_deg * MICRODEGREES),
+        margin_um=math.floor(fit.margin_mm * 1000),
+        needed_um=math.ceil(fit.needed_mm * 1000),
+        rings_um=tuple(micrometres(ring) for ring in fit.placed.rings),
+    )

@@ -14,6 +14,7 @@ from pathlib import Path
 from drivers.controller.mailbox.blocks import LINK_FIELDS, SERVICE_FIELDS, TEST_VALUE, Answer, ControllerState
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.mailbox.pages import HEADER_FIELDS, HEADER_REGISTERS, UNKNOWN_UNCERTAINTY
+from drivers.controller.mailbox.part_block import PART_HEADER_FIELDS, PART_HEADER_REGISTERS
 from drivers.controller.mailbox.words import Field
 from service.reasons import Reason
 from service.state import State
@@ -72,6 +73,14 @@ MEANINGS = {
     "flags": "bit 0 not from a live camera, 1 holes present, 2 last page, 3 machine frame aligned",
     "valid_for": "ms after `captured_at`; later it is refused; 0 = no limit",
     "trigger": "the `trigger_counter` that this contour answers; 0 = another kind of trigger",
+    "part_layout": "1",
+    "part_count": "parts of this job; 0 = it has none",
+    "part_length": "registers behind this header",
+    "part_crc32": "CRC-32 (zlib's) of this block from offset 0, these two taken as 0, as long as `part_length` says",
+    "page_crc32": "`crc32` of the page that is committed with it, a job's last",
+    "part_points": "vertices of all parts",
+    "part_rings": "rings of all parts",
+    "part_payload": "12 registers a part, then vertices of each ring (u32), then x, y of each vertex in µm (i32)",
     "payload": "on page 1 the ring table (vertices of each ring, u32), then x, y of each vertex in µm (i32)",
 }
 
@@ -90,6 +99,7 @@ def register_map(layout: MailboxLayout) -> str:
             *_table([*_block(SERVICE_FIELDS, layout.service_address), _reserved(layout)]),
             "\n## Contour block: the service writes, the controller reads\n",
             *_table(_contour_block(layout)),
+            *_part_block(layout),
             "\n## Values\n",
             *_values(
                 "`controller_state`", ((state, state.name.lower().replace("_", " ")) for state in ControllerState)
@@ -120,6 +130,21 @@ def _contour_block(layout: MailboxLayout) -> Iterator[Row]:
     yield start, 1, "transfer", "u16"
     yield from _block(HEADER_FIELDS, start)
     yield start + 1 + HEADER_REGISTERS, layout.payload_capacity, "payload", "u32, i32"
+
+
+def _part_block(layout: MailboxLayout) -> Iterator[str]:
+    """The part block's table, where the controller has one."""
+    start = layout.part_address
+    if start is None:
+        return
+    yield "\n## Part block: written by the service, read with a job's last page: [part-block.md](part-block.md)\n"
+    yield from _table(
+        [
+            *_block(PART_HEADER_FIELDS, start),
+            (start + 13, 3, "reserved", "3 × u16"),
+            (start + PART_HEADER_REGISTERS, layout.part_capacity, "part_payload", "u16, u32, i32"),
+        ]
+    )
 
 
 def _table(rows: Iterable[Row]) -> Iterator[str]:

@@ -290,8 +290,7 @@ class Transfer:
         await self._about_to_send()
         self._check_may_go_on(clean)
         await controller.write_page(page)
-        if self._settings.readback and await controller.read_page(len(page.payload)) != page:
-            self._note("read-back differs from what was written: check contour_address and payload_capacity")
+        if self._settings.readback and not await self._reads_back(page):
             return None
         if self._too_old():  # making it durable, or the requests, took longer than it had
             return None
@@ -306,6 +305,13 @@ class Transfer:
             if not await self._reconnected():
                 return None
         return await self._answer(transfer)
+
+    async def _reads_back(self, page: Page) -> bool:
+        """Step 4: whether the controller holds what was written."""
+        if await self._link.controller.read_page(len(page.payload), len(page.part)) == page:
+            return True
+        self._note("read-back differs from what was written: check the blocks' addresses and capacities")
+        return False
 
     async def _clear(self) -> tuple[int, int]:
         """Step 2: the connection on which `transfer` = 0 was confirmed, and since which start of ownership."""
@@ -408,13 +414,12 @@ class Transfer:
                 await self._about_to_send()
                 self._check_may_go_on(clean)
                 await controller.write_page(page)
-                if not self._settings.readback or await controller.read_page(len(page.payload)) == page:
+                if not self._settings.readback or await self._reads_back(page):
                     if self._too_old():
                         return Settlement(Outcome.FAILED, Reason.EXPIRED, self._trouble)
                     self._check_may_go_on(clean)
                     await controller.write_transfer(transfer)
                     return Settlement(Outcome.WRITTEN)
-                self._note("read-back differs from what was written: check contour_address and payload_capacity")
                 in_vain += 1
             except ForeignOwner as foreign:
                 if self._link.ownership.conflict:

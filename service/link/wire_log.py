@@ -85,10 +85,10 @@ class LoggedController:
         if self._registers:
             self._dump(page)
 
-    async def read_page(self, payload_length: int) -> Page:
+    async def read_page(self, payload_length: int, part_length: int = 0) -> Page:
         """As the controller's."""
-        page = await self._controller.read_page(payload_length)
-        _log(f"read   the page back, {len(page.header) + payload_length} registers")
+        page = await self._controller.read_page(payload_length, part_length)
+        _log(f"read   the page back, {len(page.header) + payload_length + part_length} registers")
         return page
 
     def _seen(self, block: LinkBlock) -> LinkBlock:
@@ -103,19 +103,23 @@ class LoggedController:
         if head["layout"] == 0:
             return f"the withdrawal of job {head['job_id']}, crc32 {head['crc32']:08X}"
         sure = "not known" if head["uncertainty"] == UNKNOWN_UNCERTAINTY else f"{head['uncertainty']} µm"
+        parts = f", and a part block of {len(page.part)} registers with {page.part[1]} part(s)" if page.part else ""
         return (
             f"page {head['page']} of {head['page_count']} of job {head['job_id']}: {head['ring_count']} rings, "
             f"{head['point_count']} vertices, payload {head['payload_length']} registers, crc32 {head['crc32']:08X}, "
             f"flags {head['flags']:04b}, uncertainty {sure}, captured_at {head['captured_at']}, valid_for "
-            f"{head['valid_for']}, session {head['session']}, trigger {head['trigger']}"
+            f"{head['valid_for']}, session {head['session']}, trigger {head['trigger']}{parts}"
         )
 
     def _dump(self, page: Page) -> None:
-        words = [*page.header, *page.payload]
-        first = self._layout.contour_address + 1
-        for start in range(0, len(words), WORDS_A_LINE):
-            line = " ".join(f"{word:04X}" for word in words[start : start + WORDS_A_LINE])
-            _log(f"       {first + start:5d}: {line}")
+        blocks = (
+            (self._layout.part_address or 0, page.part),
+            (self._layout.contour_address + 1, page.header + page.payload),
+        )
+        for first, words in blocks:
+            for start in range(0, len(words), WORDS_A_LINE):
+                line = " ".join(f"{word:04X}" for word in words[start : start + WORDS_A_LINE])
+                _log(f"       {first + start:5d}: {line}")
 
 
 def _changes(before: LinkBlock | ServiceBlock, after: LinkBlock | ServiceBlock) -> Iterator[str]:

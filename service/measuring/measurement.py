@@ -75,6 +75,11 @@ class Measurement:
         return width, height
 
     @property
+    def laid(self) -> tuple[tuple[int, PartFit], ...]:
+        """The parts that lie in it, each with its number in the recipe."""
+        return () if self.part is None else ((1, self.part),)
+
+    @property
     def evidence_fields(self) -> list[dict[str, Any]] | None:
         """The evidence as `combtrace trace --json` and documents tell it."""
         if self.evidence is None:

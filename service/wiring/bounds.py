@@ -9,7 +9,7 @@ from service.link.transfer_terms import TransferSettings
 
 TARGET_KEYS = {
     *("kind", "host", "port", "device_id", "word_order", "handshake", "mode"),
-    *("link_address", "service_address", "contour_address", "payload_capacity"),
+    *("link_address", "service_address", "contour_address", "payload_capacity", "part_block"),
 }
 
 
@@ -23,7 +23,11 @@ def cycle_settings(config: Config) -> CycleSettings:
         valid_for_s=settings.valid_for_s,
         job_timeout_s=settings.job_timeout_s,
         observe=settings.mode == "observe",
-        mailbox=MailboxFormat(settings.word_order, settings.payload_capacity),
+        mailbox=MailboxFormat(
+            settings.word_order,
+            settings.payload_capacity,
+            None if settings.part_block is None else settings.part_block.capacity,
+        ),
         transfer=TransferSettings(
             handshake=settings.handshake == "full",
             readback=settings.readback,
@@ -38,4 +42,5 @@ def cycle_settings(config: Config) -> CycleSettings:
 
 def target(config: Config) -> dict[str, str | int]:
     """Which controller it is and how it is laid out: the keys that must not change while a job is in flight there."""
-    return config.controller.model_dump(mode="json", include=TARGET_KEYS)
+    # Without what is not configured: a job that an older version sent knows no such key.
+    return config.controller.model_dump(mode="json", include=TARGET_KEYS, exclude_none=True)

@@ -77,6 +77,8 @@ def mailbox_layout(config: Config) -> MailboxLayout | None:
         settings.contour_address,
         settings.payload_capacity,
         settings.word_order,
+        None if settings.part_block is None else settings.part_block.address,
+        0 if settings.part_block is None else settings.part_block.capacity,
     )
 
 

@@ -38,8 +38,8 @@ RULES = (
         "Transfer 4: a read-back that differs starts again at step 2",
         f"{TRANSFER}::Transfer._attempt",
         f"{IN_TRANSFER}::test_a_readback_that_differs_starts_again_without_a_commit",
-        "if self._settings.readback and await controller.read_page(len(page.payload)) != page:",
-        "if self._settings.readback and not await controller.read_page(len(page.payload)):",
+        "if self._settings.readback and not await self._reads_back(page):",
+        "if self._settings.readback and (await self._reads_back(page)) is None:",
     ),
     Rule(
         "Transfer 5: the next transfer value is never 0 nor ack_transfer, and new at every attempt",

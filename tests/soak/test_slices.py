@@ -20,6 +20,7 @@ SLICES = [
     Terms(seed=901, jobs=15, risk=0.06),
     Terms(seed=902, jobs=12, risk=0.12, forgetful=True, slow_program=True, word_order="little"),
     Terms(seed=903, jobs=8, risk=0.12, has_clock=False),
+    Terms(seed=904, jobs=12, risk=0.12, slow_program=True, payload_capacity=64, part_capacity=600, word_order="little"),
 ]
 
 

@@ -16,12 +16,13 @@ import numpy as np
 
 from drivers.controller.mailbox.blocks import LinkBlock, ServiceBlock, encode_link, encode_service
 from drivers.controller.mailbox.pages import ContourMessage, Page, encode_pages, withdrawal
+from drivers.controller.mailbox.part_block import PlacedPart, with_parts
 from drivers.controller.mailbox.words import WordOrder
 
 FORMAT = (
     "Each page's header holds offsets 1 to 31 of the contour block, its payload what follows. The commit register, "
-    "offset 0, is written after them. Registers are numbers from 0 to 65535; coordinates and lengths are in µm, "
-    "areas in mm², times in ms."
+    "offset 0, is written after them, and after the part block where there is one. Registers are numbers from 0 to "
+    "65535; coordinates and lengths are in µm, areas in mm², times in ms, angles in millionths of a degree."
 )
 WORD_ORDERS: tuple[WordOrder, ...] = ("big", "little")
 
@@ -103,6 +104,19 @@ VECTORS = (
 )
 
 
+TILTED = [(20_000, 10_000), (79_999, 10_349), (79_766, 40_348), (19_767, 39_999)]
+PARTS: dict[str, tuple[PlacedPart, ...]] = {
+    "one part in the worked example's rectangle, turned by a third of a degree": (
+        PlacedPart(1, 20_000, 10_000, 333_333, 9_651, 3_205, (np.array(TILTED),)),
+    ),
+    "two parts, one with a hole, in negative places, one of them 0.5 mm short of its margin": (
+        PlacedPart(1, -5_000, 70_000, -90_000_000, 2_500, 3_000, (np.array(RECTANGLE), np.array(SQUARE_HOLE))),
+        PlacedPart(258, -2_147_483_648, 2_147_483_647, 180_000_000, -1, 65_537, (np.array(TILTED),)),
+    ),
+    "a job without a part": (),
+}
+
+
 def golden_vectors() -> dict[str, object]:
     """All of them, ready to become JSON."""
     return {
@@ -114,6 +128,7 @@ def golden_vectors() -> dict[str, object]:
             for job, session in ((7, 9), (0x01020304, 65535))
             for order in WORD_ORDERS
         ],
+        "parts": [_parts(name, parts, order) for name, parts in PARTS.items() for order in WORD_ORDERS],
         "blocks": [block for order in WORD_ORDERS for block in _blocks(order)],
     }
 
@@ -137,6 +152,30 @@ def _contour(vector: Vector, word_order: WordOrder) -> dict[str, object]:
         "from_a_live_camera": not message.simulated,
         "aligned": message.aligned,
         "pages": [_page(page) for page in encode_pages(message, vector.payload_capacity, word_order)],
+    }
+
+
+def _parts(name: str, parts: tuple[PlacedPart, ...], word_order: WordOrder) -> dict[str, object]:
+    """A part block with the worked example's page."""
+    (page,) = with_parts(encode_pages(_message(RECTANGLE), 1984, word_order), parts, 1984, word_order)
+    return {
+        "name": name,
+        "word_order": word_order,
+        "parts": [
+            {
+                "part": part.number,
+                "x": part.x_um,
+                "y": part.y_um,
+                "angle": part.angle_udeg,
+                "margin": part.margin_um,
+                "needed": part.needed_um,
+                "exterior": part.rings_um[0].tolist(),
+                "holes": [ring.tolist() for ring in part.rings_um[1:]],
+            }
+            for part in parts
+        ],
+        "page": _page(page),
+        "part_block": list(page.part),
     }
 
 

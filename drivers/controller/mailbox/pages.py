@@ -20,10 +20,14 @@ LARGEST_COORDINATE_UM = 2**31 - 1
 
 @dataclass(frozen=True)
 class Page:
-    """One page as registers: header offsets 1…31 (31 registers, without the commit register), then the payload."""
+    """One page as registers: header offsets 1…31 (31 registers, without the commit register), then the payload.
+
+    part: the part block that is committed with it, on a job's last page where the controller has one; else empty.
+    """
 
     header: tuple[int, ...]
     payload: tuple[int, ...]
+    part: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from drivers.controller.mailbox.blocks import (
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.mailbox.page_spans import PAYLOAD_OFFSET, header_spans, page_starts, spans
 from drivers.controller.mailbox.pages import HEADER_REGISTERS, Page
+from drivers.controller.mailbox.part_block import PART_HEADER_REGISTERS, part_starts
 from drivers.controller.modbus.late_replies import outlast_late_replies
 from drivers.controller.modbus.request_queue import RequestQueue
 from drivers.controller.modbus.requests import (
@@ -156,18 +157,25 @@ class ModbusController:
         )
 
     async def write_page(self, page: Page) -> None:
-        """Write payload and header without the commit register, in as few FC16 as the limit allows."""
+        """Write part block, payload and header without the commit register, in as few FC16 as the limit allows."""
         stream = self._stream(page)
         first = self._layout.contour_address
+        of_part = [
+            write_registers(self._part_address(page.part) + offset, _stream_of(page.part[offset : offset + count]))
+            for offset, count in (spans(part_starts(page.part), self._limits.write) if page.part else ())
+        ]
         await self._held().run(
             [
-                write_registers(first + offset, stream[2 * (offset - 1) : 2 * (offset - 1 + count)])
-                for offset, count in spans(page_starts(page.header, len(page.payload)), self._limits.write)
+                *of_part,
+                *(
+                    write_registers(first + offset, stream[2 * (offset - 1) : 2 * (offset - 1 + count)])
+                    for offset, count in spans(page_starts(page.header, len(page.payload)), self._limits.write)
+                ),
             ]
         )
 
-    async def read_page(self, payload_length: int) -> Page:
-        """Read header without the commit register and `payload_length` registers of payload back."""
+    async def read_page(self, payload_length: int, part_length: int = 0) -> Page:
+        """Read header without the commit register, `payload_length` registers of payload and the part block's back."""
         self._check_payload_length(payload_length)
         connection = self._held()
         first = self._layout.contour_address
@@ -178,7 +186,17 @@ class ModbusController:
         starts = [start for start in page_starts(header, payload_length) if start >= PAYLOAD_OFFSET]
         reads = [read_registers(first + offset, count) for offset, count in spans(starts, self._limits.read)]
         replies = await connection.run(reads)
-        return Page(header, tuple(register for reply in replies for register in registers_of(reply)))
+        payload = tuple(register for reply in replies for register in registers_of(reply))
+        return Page(header, payload, await self._read_part(connection, part_length))
+
+    async def _read_part(self, connection: RequestQueue, length: int) -> tuple[int, ...]:
+        if not length:
+            return ()
+        first = self._part_address((0,) * length)
+        # Values may be split here, since it is only compared; counts are even, as `header_spans` says why.
+        longest = self._limits.read // 2 * 2
+        reads = [read_registers(first + at, min(longest, length - at)) for at in range(0, length, longest)]
+        return tuple(register for reply in await connection.run(reads) for register in registers_of(reply))
 
     # --- connection ---------------------------------------------------------------------------------------------
 
@@ -234,17 +252,32 @@ class ModbusController:
         if len(page.header) != HEADER_REGISTERS:
             raise MailboxError(f"the page's header has {len(page.header)} registers, expected {HEADER_REGISTERS}")
         self._check_payload_length(len(page.payload))
-        try:
-            return stream_of(page.header) + stream_of(page.payload)
-        except struct.error as error:
+        return _stream_of(page.header) + _stream_of(page.payload)
+
+    def _part_address(self, part: Sequence[int]) -> int:
+        """Where the part block goes; raise MailboxError where it has no room."""
+        address, room = self._layout.part_address, PART_HEADER_REGISTERS + self._layout.part_capacity
+        if address is None or not PART_HEADER_REGISTERS <= len(part) <= room:
             raise MailboxError(
-                f"the page holds what is no register of 16 bits ({error}). Was it stored or changed by another program?"
-            ) from error
+                f"a part block of {len(part)} registers, the layout has "
+                + ("none" if address is None else f"{PART_HEADER_REGISTERS} to {room}")
+            )
+        return address
 
     def _check_payload_length(self, payload_length: int) -> None:
         capacity = self._layout.payload_capacity
         if not 0 <= payload_length <= capacity:
             raise MailboxError(f"a payload of {payload_length} registers, payload_capacity is {capacity}")
+
+
+def _stream_of(registers: Sequence[int]) -> bytes:
+    """Registers as they go on the wire; raise MailboxError where they are none."""
+    try:
+        return stream_of(registers)
+    except struct.error as error:
+        raise MailboxError(
+            f"the page holds what is no register of 16 bits ({error}). Was it stored or changed by another program?"
+        ) from error
 
 
 class ModbusTcpController(ModbusController):

@@ -9,6 +9,7 @@ import struct
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from drivers.controller.mailbox.words import WordOrder
 
@@ -26,10 +27,46 @@ class Contradiction(Exception):
 
 
 @dataclass(frozen=True)
+class AcceptedPart:
+    """A part that lies in an accepted contour. Millimetres, degrees; rings exterior first."""
+
+    number: int
+    x_mm: float
+    y_mm: float
+    angle_deg: float
+    margin_mm: float
+    needed_mm: float
+    rings: tuple[tuple[tuple[float, float], ...], ...]
+
+    def as_json(self) -> dict[str, object]:
+        """The part as the controller's log has it."""
+        exterior, *holes = ([list(point) for point in ring] for ring in self.rings)
+        pose = {"x_mm": self.x_mm, "y_mm": self.y_mm, "angle_deg": self.angle_deg}
+        margins = {"margin_mm": self.margin_mm, "needed_mm": self.needed_mm}
+        return {"part": self.number, **pose, **margins, "millimetres": {"exterior": exterior, "holes": holes}}
+
+    @classmethod
+    def from_json(cls, kept: dict[str, Any]) -> AcceptedPart:
+        """The part of a log line; KeyError, TypeError or ValueError where it is none."""
+        millimetres = kept["millimetres"]
+        rings = (millimetres["exterior"], *millimetres["holes"])
+        return cls(
+            int(kept["part"]),
+            float(kept["x_mm"]),
+            float(kept["y_mm"]),
+            float(kept["angle_deg"]),
+            float(kept["margin_mm"]),
+            float(kept["needed_mm"]),
+            tuple(tuple((float(x), float(y)) for x, y in ring) for ring in rings),
+        )
+
+
+@dataclass(frozen=True)
 class AcceptedContour:
     """A contour that the controller took. Millimetres; rings exterior first, first vertex not repeated.
 
-    flags: bit 0 frame not from a live camera, 1 holes present, 2 last page, 3 machine frame aligned.
+    flags: bit 0 frame not from a live camera, 1 holes present, 2 last page, 3 machine frame aligned. parts: None where
+    the controller has no part block.
     """
 
     job_id: int
@@ -38,6 +75,7 @@ class AcceptedContour:
     rings: tuple[tuple[tuple[float, float], ...], ...]
     area_mm2: int
     uncertainty_mm: float | None
+    parts: tuple[AcceptedPart, ...] | None = None
 
     def as_json(self) -> dict[str, object]:
         """The line of the controller's log for this contour."""
@@ -49,10 +87,11 @@ class AcceptedContour:
             "millimetres": {"exterior": exterior, "holes": holes},
             "area_mm2": self.area_mm2,
             "uncertainty_mm": self.uncertainty_mm,
+            **({} if self.parts is None else {"parts": [part.as_json() for part in self.parts]}),
         }
 
     @classmethod
-    def from_json(cls, line: dict[str, object]) -> AcceptedContour:
+    def from_json(cls, line: dict[str, Any]) -> AcceptedContour:
         """The contour of a log line; KeyError, TypeError or ValueError where it is none."""
         millimetres = line["millimetres"]
         if not isinstance(millimetres, dict):
@@ -66,6 +105,7 @@ class AcceptedContour:
             rings=tuple(tuple((float(x), float(y)) for x, y in ring) for ring in rings),
             area_mm2=int(str(line["area_mm2"])),
             uncertainty_mm=None if uncertainty is None else float(str(uncertainty)),
+            parts=tuple(AcceptedPart.from_json(part) for part in line["parts"]) if "parts" in line else None,
         )
 
 

@@ -25,7 +25,7 @@ FaultKind = Literal[
     "half-open",
     "late-write",
 ]
-Target = Literal["any", "read", "write", "link", "owner", "readback", "service", "clear", "page", "commit"]
+Target = Literal["any", "read", "write", "link", "owner", "readback", "service", "clear", "page", "part", "commit"]
 
 FAULT_KINDS: dict[FaultKind, str] = {
     "lost-request": "never done, never answered",
@@ -51,6 +51,7 @@ TARGETS: dict[Target, str] = {
     "service": "writing the service block",
     "clear": "writing transfer = 0",
     "page": "writing header or payload",
+    "part": "writing the part block",
     "commit": "writing transfer, not 0",
 }
 assert set(FAULT_KINDS) == set(get_args(FaultKind))
@@ -128,21 +129,27 @@ def targets_of(pdu: bytes, layout: MailboxLayout) -> frozenset[str]:
     """The names under which a fault may strike the request."""
     code, address = pdu[0], int.from_bytes(pdu[1:3], "big")
     if code == READ:
-        return frozenset({"any", "read", _block_of(address, layout, {"link": 0, "owner": 1, "readback": 2})})
+        return frozenset({"any", "read", _block_of(address, layout, _READ_FROM)})
     if code not in (WRITE_ONE, WRITE_MANY):
         return frozenset({"any"})
     if address == layout.contour_address:  # by FC16 the value stands behind the count and the length
         return frozenset({"any", "write", "commit" if any(pdu[3:5] if code == WRITE_ONE else pdu[6:8]) else "clear"})
-    return frozenset({"any", "write", _block_of(address, layout, {"service": 1, "page": 2})})
+    return frozenset({"any", "write", _block_of(address, layout, _WRITTEN_TO)})
 
 
-def _block_of(address: int, layout: MailboxLayout, names: dict[str, int]) -> str:
-    blocks = list(layout.blocks.values())
-    for name, block in names.items():
-        start, end = blocks[block]
-        if start <= address < end:
-            return name
-    return ""
+_READ_FROM = {
+    "link_address": "link",
+    "service_address": "owner",
+    "contour_address": "readback",
+    "part_address": "readback",
+}
+_WRITTEN_TO = {"service_address": "service", "contour_address": "page", "part_address": "part"}
+
+
+def _block_of(address: int, layout: MailboxLayout, names: dict[str, str]) -> str:
+    """What a fault calls the block that has the address; "" = it calls it nothing."""
+    found = (name for name, (start, end) in layout.blocks.items() if start <= address < end)
+    return names.get(next(found, ""), "")
 
 
 def foreign(pdu: bytes) -> bytes:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 from drivers.controller.errors import ControllerError
 from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.simulated import parts
 from drivers.controller.simulated.contour import HEADER, AcceptedContour, Assembly, Contradiction, PageCopy, u32
 from drivers.controller.simulated.memory import RetainedMemory
+from drivers.controller.simulated.parts import PartCopy
 from drivers.controller.simulated.watch import ClientWatch, ring_fault
 
 MODULUS = 1 << 32
@@ -100,7 +102,8 @@ class ControllerProgram:
         self._startup = start
         self._scans = 0
         self._copied: list[int] = []
-        self._to_copy = 0
+        self._to_copy: list[int] = []
+        self._part_copy: PartCopy | None = None
         self._checks_left = 0
         self._to_write: deque[dict[int, int]] = deque()
         self._second_halves: dict[int, int] = {}
@@ -259,24 +262,41 @@ class ControllerProgram:
         return contour
 
     def _copy(self) -> list[int] | None:
-        """Header and payload as copied, once the last part of them was, and checked for long enough; else None."""
+        """The page as copied, once the last share of it was, and checked for long enough; else None."""
         start, end = self._layout.blocks["contour_address"]
         if not self._copied and self._registers[start] in (0, self._link(6)):
             return None
         if not self._copied:
-            self._to_copy = min(HEADER + self._registers[start + 7], end - start)
-        if len(self._copied) < self._to_copy:
-            part = -(-self._to_copy // max(1, self.pace.copy_scans))
-            here = start + len(self._copied)
-            self._copied += self._registers[here : min(here + part, start + self._to_copy)]
+            page = range(start, min(start + HEADER + self._registers[start + 7], end))
+            self._to_copy = [*page, *self._part_registers()]
+        if len(self._copied) < len(self._to_copy):
+            share = -(-len(self._to_copy) // max(1, self.pace.copy_scans))
+            here = len(self._copied)
+            self._copied += [self._registers[address] for address in self._to_copy[here : here + share]]
             self._checks_left = self.pace.check_scans
-            if len(self._copied) < self._to_copy:
+            if len(self._copied) < len(self._to_copy):
                 return None
         if self._checks_left > 0:
             self._checks_left -= 1
             return None
         block, self._copied = self._copied, []
-        return block
+        return self._without_part(block)
+
+    def _part_registers(self) -> range:
+        """Addresses of the part block, as long as it says that it is; none where the controller has no such block."""
+        address = self._layout.part_address
+        if address is None:
+            return range(0)
+        end = self._layout.blocks["part_address"][1]
+        return range(address, min(address + parts.HEADER + self._registers[address + parts.LENGTH], end))
+
+    def _without_part(self, block: list[int]) -> list[int]:
+        """The page of what was copied; the part block behind it is put aside."""
+        if self._layout.part_address is None:
+            return block
+        length = next(k for k, address in enumerate(self._to_copy) if address == self._layout.part_address)
+        self._part_copy = PartCopy(block[length:], self._layout.word_order)
+        return block[:length]
 
     def _write_answer(self) -> None:
         """Write the next field of the answer, or all up to one that is torn, in the protocol's order."""
@@ -324,13 +344,18 @@ class ControllerProgram:
             return Reply.PAGE_MISSING, None
         if place == "held":
             return Reply.ACCEPTED, None
+        own = self._part_copy if copy.page == copy.page_count else None
+        if own is not None and not own.belongs_to(copy):
+            return Reply.BAD_CRC, None
         try:
+            placed = None if own is None else own.parts()
             contour = self._assembly.take(copy)
         except Contradiction as contradiction:
             self._watch.contradiction(copy, str(contradiction))
             return Reply.BAD_LAYOUT, None
         if contour is None:
             return Reply.ACCEPTED, None
+        contour = replace(contour, parts=placed)
         self._watch.contour(contour)
         verdict = self._startup.judge(contour)
         return verdict, contour if verdict == Reply.ACCEPTED else None

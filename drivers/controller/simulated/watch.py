@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivers.controller.mailbox.layout import MailboxLayout
+from drivers.controller.mailbox.layout import REGISTERS, MailboxLayout
 from drivers.controller.simulated.contour import HEADER, AcceptedContour, PageCopy, signed_area_mm2, u32
+from drivers.controller.simulated.parts import HEADER as PART_HEADER
+from drivers.controller.simulated.parts import PartCopy, may_be_cut
 from drivers.controller.simulated.verdict import Verdict
 
 HEARTBEAT_LIMIT_S = 1.0
@@ -39,6 +41,7 @@ class ClientWatch:
         self._transfer: int | None = None  # as the client wrote it: late writes of the line's are not its own
         self._service: tuple[int, ...] | None = None
         self._service_at_commit: tuple[int, ...] | None = None
+        self._part_cuts: set[int] = set()
         self._page: dict[int, int] = {}  # offsets and values that the client wrote since it cleared `transfer`
         self._owner = 0
         self._owner_at = 0.0
@@ -79,9 +82,9 @@ class ClientWatch:
     # --- requests -----------------------------------------------------------------------------------------------
 
     def unanswered(self, function_code: int, address: int) -> None:
-        """A request's reply never leaves: of the contour block, only `transfer` = 0 may be written next."""
-        start, end = self._layout.blocks["contour_address"]
-        if function_code != 3 and start <= address < end:
+        """A request's reply never leaves: of contour and part block, only `transfer` = 0 may be written next."""
+        of_page = (block for name, block in self._layout.blocks.items() if name in ("contour_address", "part_address"))
+        if function_code != 3 and any(start <= address < end for start, end in of_page):
             self._lost_write = f"FC{function_code} at {address}"
 
     def too_early(self, function_code: int) -> None:
@@ -101,10 +104,13 @@ class ClientWatch:
         end = address + len(values)
         service, service_end = self._layout.blocks["service_address"]
         contour, contour_end = self._layout.blocks["contour_address"]
+        part, part_end = self._layout.blocks.get("part_address", (REGISTERS, REGISTERS))
         if service <= address and end <= service_end:
             self._service_write(function_code, address, values, held, now)
         elif contour <= address and end <= contour_end:
             self._contour_write(function_code, address - contour, values, held)
+        elif part <= address and end <= part_end:
+            self._part_write(function_code, address - part, values, held)
         else:
             self._verdict.note(
                 "outside-blocks", f"FC{function_code} of {len(values)} registers at {address}", address, values
@@ -168,9 +174,8 @@ class ClientWatch:
         contour = self._layout.contour_address
         transfer = held[contour] if self._transfer is None else self._transfer
         alone = function_code == 6 or (len(values) == 1 and not self._write_single)
-        if self._lost_write and not (offset == 0 and alone and values[0] == 0):
-            text = f"FC{function_code} at {contour + offset}, after the unanswered {self._lost_write}"
-            self._verdict.note("went-on-after-lost-reply", text, contour + offset, values)
+        if not (offset == 0 and alone and values[0] == 0):
+            self._went_on(function_code, contour + offset, values)
         self._lost_write = None
         if offset == 0:
             if alone:
@@ -188,9 +193,27 @@ class ClientWatch:
         self._cuts |= {offset, offset + len(values)}
         self._page |= dict(enumerate(values, start=offset))
 
+    def _went_on(self, function_code: int, address: int, values: Sequence[int]) -> None:
+        if self._lost_write:
+            text = f"FC{function_code} at {address}, after the unanswered {self._lost_write}"
+            self._verdict.note("went-on-after-lost-reply", text, address, values)
+
+    def _part_write(self, function_code: int, offset: int, values: Sequence[int], held: Sequence[int]) -> None:
+        """The part block is written as a page is: by FC16, with `transfer` 0, no value over two requests."""
+        address = self._layout.blocks["part_address"][0] + offset
+        transfer = held[self._layout.contour_address] if self._transfer is None else self._transfer
+        self._went_on(function_code, address, values)
+        self._lost_write = None
+        if function_code != 16:
+            self._verdict.note("page-by-single-registers", f"FC{function_code} in the part block", address, values)
+        if transfer != 0:
+            text = f"part block's offset {offset} while transfer was {transfer}"
+            self._verdict.note("written-while-valid", text, address, values)
+        self._part_cuts |= {offset, offset + len(values)}
+
     def _commit(self, transfer: int, before: int, held: Sequence[int]) -> None:
         if transfer == 0:
-            self._cuts, self._page = set(), {}
+            self._cuts, self._page, self._part_cuts = set(), {}, set()
             return
         layout = self._layout
         block = held[layout.contour_address : layout.blocks["contour_address"][1]]
@@ -210,6 +233,16 @@ class ClientWatch:
             split and own and copy.layout in (0, 1) and copy.job_id
         ):  # job 0: the program has restarted and cleared the page in between
             self._verdict.note("value-split", f"requests begin or end at offsets {split} of job {copy.job_id}")
+        self._judge_part_cuts(held, copy)
+
+    def _judge_part_cuts(self, held: Sequence[int], page: PageCopy) -> None:
+        if not self._part_cuts:
+            return
+        start, end = self._layout.blocks["part_address"]
+        block = held[start : min(start + PART_HEADER + held[start + 5], end)]
+        split = sorted(cut for cut in self._part_cuts if not may_be_cut(cut, block))
+        if split and PartCopy(block, self._layout.word_order).belongs_to(page):
+            self._verdict.note("value-split", f"part block: requests begin or end at offsets {split}")
 
     def _is_own(self, copy: PageCopy) -> bool:
         """True where the page is as the client wrote it, not spoilt by late writes and restarts."""

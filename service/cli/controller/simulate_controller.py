@@ -15,6 +15,8 @@ from service.atomic_file import write_whole
 from service.cli.errors import EXIT_OK, UserError
 
 if TYPE_CHECKING:
+    from drivers.controller.mailbox.layout import MailboxLayout
+    from drivers.controller.mailbox.words import WordOrder
     from drivers.controller.simulated.contour import AcceptedContour
     from drivers.controller.simulated.controller import SimulatedController
     from drivers.controller.simulated.scenario import Scenario
@@ -54,9 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--word-order", choices=("big", "little"), default="big", help="default big (ABCD)")
     parser.add_argument(
         "--layout",
-        metavar="LINK,SERVICE,CONTOUR,CAPACITY",
+        metavar="LINK,SERVICE,CONTOUR,CAPACITY[,PART,CAPACITY]",
         default="0,16,32,1984",
-        help="addresses of the blocks and registers of payload; default 0,16,32,1984",
+        help="addresses of the blocks and registers of payload; default 0,16,32,1984, without a part block",
     )
     parser.add_argument("--trigger-every", type=float, metavar="S", help="request a measurement every S seconds")
     parser.add_argument("--recipe", type=int, default=0, metavar="N", help="recipe of those requests; default 0")
@@ -119,7 +121,6 @@ def _scenario(args: argparse.Namespace) -> Scenario:
 
 
 def _build(args: argparse.Namespace, scenario: Scenario, log: TextIO | None) -> SimulatedController:
-    from drivers.controller.mailbox.layout import MailboxLayout
     from drivers.controller.simulated.controller import SimulatedController
     from drivers.controller.simulated.scenario import machine_options
 
@@ -136,7 +137,7 @@ def _build(args: argparse.Namespace, scenario: Scenario, log: TextIO | None) -> 
 
     options: dict[str, Any] = {
         **machine_options(scenario),
-        "layout": MailboxLayout(*_numbers(args.layout), word_order=args.word_order),
+        "layout": _layout(args.layout, args.word_order),
         "device_id": args.device_id,
         "memory_path": args.memory,
         "on_accepted": accepted,
@@ -236,9 +237,12 @@ def _address(option: str, text: str) -> tuple[str, int]:
     return host.strip("[]"), int(port)
 
 
-def _numbers(text: str) -> tuple[int, int, int, int]:
+def _layout(text: str, word_order: WordOrder) -> MailboxLayout:
+    from drivers.controller.mailbox.layout import MailboxLayout
+
     fields = text.split(",")
-    if len(fields) != 4 or not all(field.strip().isdigit() for field in fields):
-        raise UserError(f"--layout {text}: expected four numbers, for example 0,16,32,1984")
-    link, service, contour, capacity = (int(field) for field in fields)
-    return link, service, contour, capacity
+    if len(fields) not in (4, 6) or not all(field.strip().isdigit() for field in fields):
+        raise UserError(f"--layout {text}: expected four numbers, or six, for example 0,16,32,1984,2048,2000")
+    link, service, contour, capacity, *part = (int(field) for field in fields)
+    address, room = part or (None, 0)
+    return MailboxLayout(link, service, contour, capacity, word_order, address, room)

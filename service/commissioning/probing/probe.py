@@ -67,6 +67,8 @@ class Probe:
         yield probed.longest("read", longest_read, LONGEST_READ)
         readable = await reading.readable(longest_read)
         yield probed.contour_block("readable", readable)
+        if layout.part_address is not None:
+            yield await reading.part_block(layout.part_address, longest_read)
         yield reading.heartbeat(ways)
         if not write:
             return

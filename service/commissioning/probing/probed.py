@@ -123,7 +123,10 @@ class Probed:
         addresses = {name: first + shift for name, (first, _) in self.layout.blocks.items()}
         if min(addresses.values()) < 0:
             return "below the configured 0, where no register is. Let its blocks begin one register later"
+        part = addresses.pop("part_address", None)
         self.changes.update(addresses)
+        if part is not None:
+            self.changes["part_block"] = {"address": part, "capacity": self.layout.part_capacity}
         why = {1: ": the controller counts registers from 1", -1: ": the controller counts registers from 0"}
         return ("higher" if shift > 0 else "lower") + " than configured" + why.get(shift, "")
 

@@ -97,6 +97,15 @@ class ReadProbe:
                 return start + await largest(count, partial(self.probed.reads_all, first))
         return self.probed.contour_registers if longest else 0
 
+    async def part_block(self, address: int, longest: int) -> CheckResult:
+        """Whether all of the part block can be read."""
+        count = self.probed.layout.blocks["part_address"][1] - address
+        for start, length in pieces(count, longest) if longest else ():
+            if not await self.probed.reads_all(address + start, length):
+                text = f"registers {people(address + start, length)} of {people(address, count)} cannot be read"
+                return fault("part block", f"{text}. Set part_block.address to where the controller has them")
+        return ok("part block", f"registers {people(address, count)} can be read")
+
     async def movement(self) -> list[Signature]:
         """Every way of seeing the mailbox in which its heartbeat moves where it is configured, or next to it."""
         looks: list[Registers] = []

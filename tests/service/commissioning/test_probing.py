@@ -115,6 +115,20 @@ async def test_another_numbering_and_another_order_of_words_are_told(
         assert write == ("writing" in findings)
 
 
+async def test_a_part_block_is_read_and_numbered_along(client: ModbusTcpController) -> None:
+    layout = MailboxLayout(100, 116, 132, part_address=3000, part_capacity=24)
+    async with program(port_of(client), 101):
+        findings, probe = await probed(port_of(client), layout, write=False)
+    assert findings["part block"].well
+    assert probe.changes["part_block"] == {"address": 3001, "capacity": 24}
+
+
+async def test_a_part_block_that_is_not_there_is_told() -> None:
+    with libmodbus_tcp(2100) as (_, port):
+        findings, _ = await probed(port, MailboxLayout(part_address=2048, part_capacity=100), write=False)
+    assert "Set part_block.address" in findings["part block"].text
+
+
 async def test_a_numbering_below_0_is_told_in_words(client: ModbusTcpController) -> None:
     async with program(port_of(client), 0):
         findings, probe = await probed(port_of(client), MailboxLayout(1, 17, 33), write=False)

@@ -293,3 +293,16 @@ def test_the_schema_is_json_and_names_its_dialect() -> None:
     schema = json.loads(config_reference.schema_text())
     assert schema["$schema"].endswith("2020-12/schema")
     assert schema["additionalProperties"] is False
+
+
+@pytest.mark.parametrize(
+    ("address", "seen"),
+    [(2047, "contour_address (32 to 2047) and part_block (2047 to 2162) overlap"), (65_500, "past 65535")],
+)
+def test_a_part_block_that_has_no_room_of_its_own_is_refused(tmp_path: Path, address: int, seen: str) -> None:
+    file = tmp_path / "config.yaml"
+    block = f"{{address: {address}, capacity: 100}}"
+    file.write_text(f"controller: {{kind: modbus-tcp, part_block: {block}}}\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load_config(file)
+    assert seen in str(error.value)

@@ -10,6 +10,7 @@ import pytest
 from drivers.controller.mailbox.blocks import LINK_FIELDS, SERVICE_FIELDS
 from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.mailbox.pages import HEADER_FIELDS
+from drivers.controller.mailbox.part_block import PART_HEADER_FIELDS
 from service.cli.main import main
 from service.link.register_map import MEANINGS, register_map
 
@@ -33,7 +34,7 @@ def test_the_page_is_what_the_codec_makes_now() -> None:
 
 
 def test_every_register_of_the_layout_has_one_row_and_no_other_has() -> None:
-    layout = MailboxLayout(1000, 200, 5000, 502, "little")
+    layout = MailboxLayout(1000, 200, 5000, 502, "little", 6000, 300)
     shown = rows(register_map(layout))
     covered = sorted(address for (first, _), (last, _, _) in shown.items() for address in range(first, last + 1))
     assert covered == sorted(address for start, end in layout.blocks.values() for address in range(start, end))
@@ -43,9 +44,10 @@ def test_every_register_of_the_layout_has_one_row_and_no_other_has() -> None:
 
 
 def test_each_name_stands_at_its_offset() -> None:
-    layout = MailboxLayout(1000, 200, 5000)
+    layout = MailboxLayout(1000, 200, 5000, part_address=8000, part_capacity=24)
     shown = rows(register_map(layout))
-    for fields, start in ((LINK_FIELDS, 1000), (SERVICE_FIELDS, 200), (HEADER_FIELDS, 5000)):
+    tables = ((LINK_FIELDS, 1000), (SERVICE_FIELDS, 200), (HEADER_FIELDS, 5000), (PART_HEADER_FIELDS, 8000))
+    for fields, start in tables:
         for field in fields:
             assert shown[start + field.offset, field.name][0] == start + field.offset + field.width - 1
             assert MEANINGS[field.name]

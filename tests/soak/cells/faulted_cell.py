@@ -44,6 +44,7 @@ LINE_FAULTS = ("lost-request", "lost-reply", "garbled-request", "garbled-reply",
 CONNECTION_FAULTS = ("reset-before", "reset-after", "half-open")
 LATE = (0.02, 0.1, 0.3, 0.9)  # below and above the time-out, and past a reconnection
 EXCEPTIONS = (2, 3, 4, 5, 6)
+PART_ADDRESS = 3000
 CALIBRATION = """version: 1
 kind: simple
 image_width: 8
@@ -59,7 +60,7 @@ rotation_deg: 0
 class Terms:
     """One campaign: how many jobs, over what, and under which faults.
 
-    risk: chance of a fault, of one write. incidents: how many at least.
+    risk: chance of a fault, of one write. incidents: how many at least. part_capacity: 0 = without a part block.
     """
 
     seed: int
@@ -72,11 +73,13 @@ class Terms:
     payload_capacity: int = 1984
     slow_program: bool = False
     incidents: int = 0
+    part_capacity: int = 0
 
     def __str__(self) -> str:
         words = [f"seed {self.seed}", self.transport, f"risk {self.risk:g}", f"word order {self.word_order}"]
         words += [f"{self.payload_capacity} registers"]
         words += ["no clock"] * (not self.has_clock) + ["forgetful"] * self.forgetful + ["slow"] * self.slow_program
+        words += ["parts"] * bool(self.part_capacity)
         return ", ".join(words)
 
 
@@ -92,6 +95,14 @@ class Outcome:
     acknowledged: int
     pages: int
     seconds: float
+
+
+def parts_as_rings(contour: AcceptedContour) -> list[Any]:
+    """What came of the parts, in millimetres and degrees, as rings among the contour's: they are judged with them."""
+    rings: list[Any] = []
+    for part in contour.parts or ():
+        rings += [[(part.number, part.x_mm), (part.y_mm, part.angle_deg)], *part.rings]
+    return rings
 
 
 def fault_rules(risk: float) -> list[LineFault]:
@@ -131,7 +142,8 @@ class FaultedCell:
         self.chance = random.Random(terms.seed)
         self.folder = folder
         self.terms = terms
-        self.layout = MailboxLayout(payload_capacity=terms.payload_capacity, word_order=terms.word_order)
+        part = (PART_ADDRESS, terms.part_capacity) if terms.part_capacity else (None, 0)
+        self.layout = MailboxLayout(0, 16, 32, terms.payload_capacity, terms.word_order, *part)
         self.faults = FaultPlan(fault_rules(terms.risk), terms.seed)
         self.taken: list[Taken] = []
         self.events: list[dict[str, Any]] = []
@@ -147,7 +159,8 @@ class FaultedCell:
 
     def note_accepted(self, contour: AcceptedContour) -> None:
         session, trigger = self.controller.registers(13, 1)[0], self.controller.registers(2, 1)[0]
-        self.taken.append(Taken(contour.job_id, micrometres(contour.rings), time.monotonic(), session, trigger))
+        rings = [*contour.rings, *parts_as_rings(contour)]
+        self.taken.append(Taken(contour.job_id, micrometres(rings), time.monotonic(), session, trigger))
 
     def note_event(self, event: dict[str, Any]) -> None:
         self.events.append({**event, "at_s": time.monotonic()})
@@ -156,6 +169,9 @@ class FaultedCell:
         assert seen.measurement.millimetres is not None
         self.exposed[seen.job.job_id] = seen.frame.exposed_at_s
         rings = [ring.tolist() for ring in seen.measurement.millimetres.rings]
+        for number, fit in seen.measurement.laid if self.terms.part_capacity else ():
+            pose = fit.placement.pose
+            rings += [[(number, pose.x), (pose.y, pose.angle_deg)], *(ring.tolist() for ring in fit.placed.rings)]
         self.measured[seen.job.job_id] = micrometres(rings)
 
     def picture(self, _number: int) -> np.ndarray:
@@ -202,6 +218,7 @@ class FaultedCell:
     def config(self, folder: Path | None = None, **changed: Any) -> Config:
         """The service's configuration. folder: of its own files; changed: settings of the controller."""
         terms, folder = self.terms, folder or self.folder
+        part = {"address": PART_ADDRESS, "capacity": terms.part_capacity} if terms.part_capacity else None
         wires: dict[str, Any] = {
             "tcp": {"kind": "modbus-tcp", "port": self.port},
             "rtu-over-tcp": {"kind": "modbus-rtu-over-tcp", "port": self.port},
@@ -222,6 +239,7 @@ class FaultedCell:
                     "job_timeout_s": self.valid_for_s,
                     "word_order": terms.word_order,
                     "payload_capacity": terms.payload_capacity,
+                    "part_block": part,
                     **changed,
                 },
                 "triggers": [{"kind": "controller"}],
@@ -240,7 +258,8 @@ class FaultedCell:
         """A daemon as wired for the shop floor, but for its camera and its measurer."""
         parts = build(config, observe=observe)
         cycle: Any = parts.executor._runner
-        measurer = RandomContours(self.chance, 12 if self.terms.payload_capacity < 64 else 40)
+        most = 12 if self.terms.payload_capacity < 64 else 40
+        measurer = RandomContours(self.chance, most, parts=bool(self.terms.part_capacity))
         cycle._plan = replace(cycle._plan, measurer=measurer)
         cycle._camera = parts.camera = SimulatedCamera(self.picture)
         cycle._abort = lambda _job: None  # it is killed, not stopped: nobody tidies up

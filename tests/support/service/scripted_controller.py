@@ -94,7 +94,7 @@ class ScriptedController:
         self.page = page
         self._reply(with_reply)
 
-    async def read_page(self, payload_length: int) -> Page:
+    async def read_page(self, payload_length: int, part_length: int = 0) -> Page:
         self._meet("read_page")
         assert self.page is not None
         assert payload_length == len(self.page.payload)

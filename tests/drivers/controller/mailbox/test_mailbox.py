@@ -270,6 +270,8 @@ def test_a_ring_that_micrometres_cannot_hold_is_refused(ring: np.ndarray, seen: 
         ({"payload_capacity": 1983}, "even number"),
         ({"payload_capacity": 2}, "even number from 4 on"),
         ({"word_order": "middle"}, "'big' or 'little'"),
+        ({"part_address": 2047}, "contour_address 32 to 2047 runs into part_address at 2047"),
+        ({"part_address": 65_000, "part_capacity": 521}, "part_address 65000 to 65536 runs into the end"),
     ],
 )
 def test_a_layout_whose_blocks_overlap_or_end_nowhere_is_refused(layout: dict[str, object], seen: str) -> None:

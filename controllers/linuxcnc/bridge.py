@@ -3,10 +3,11 @@
 
     bridge.py --listen 127.0.0.1:5020 --folder /var/lib/combtrace-bridge --safe-z 50 --cut-z 1 [--run]
 
-An accepted contour is written as a program and opened in LinuxCNC, whose screens then show it; it runs when the
-operator presses cycle start, or at once with --run. E-stop, limits, feed hold and override stay LinuxCNC's own. A
-contour outside of the machine's limits is refused. Needs only Debian's linuxcnc-uspace; runs as the user who runs
-LinuxCNC. `request` on standard input, or the HAL pin combtrace.request, asks for a measurement.
+An accepted contour, or the parts that lie in it (--part-capacity), is written as a program and opened in LinuxCNC,
+whose screens then show it; it runs when the operator presses cycle start, or at once with --run. E-stop, limits, feed
+hold and override stay LinuxCNC's own. What lies outside of the machine's limits is refused. Needs only Debian's
+linuxcnc-uspace; runs as the user who runs LinuxCNC. `request` on standard input, or the HAL pin combtrace.request, asks
+for a measurement.
 """
 
 import argparse
@@ -126,6 +127,9 @@ class Bridge:
         stat = self.machine.stat
         if G54 not in stat.gcodes or stat.rotation_xy != 0:
             yield f"expected work coordinates G54, not turned; others are in force, or turned by {stat.rotation_xy:g}°"
+        for part in contour.parts:
+            if part.margin_mm < part.needed_mm:
+                yield f"part {part.number} keeps {part.margin_mm:.3f} mm, needed are {part.needed_mm:.3f}"
         outside = out_of_limits(contour, self.cutting, self.machine.limits_mm(), self.machine.offset_mm())
         if outside is not None:
             yield outside
@@ -136,7 +140,7 @@ class Bridge:
         vertices = sum(len(ring) for ring in contour.rings)
         self.say(
             f"job {contour.job_id} accepted: {vertices} vertices, {len(contour.rings) - 1} holes, "
-            f"{contour.area_mm2} mm2, within {bound}"
+            f"{contour.area_mm2} mm2, within {bound}; {len(contour.parts)} parts"
         )
         self.mailbox.set_state(BUSY_STATE)  # no second contour until this one has been cut or let go
         self.machine.open(f"job-{contour.job_id}.ngc", program(contour, self.cutting))
@@ -281,6 +285,12 @@ def main():
     parser.add_argument("--hal", action="store_true", help="offer the HAL pins combtrace.*")
     parser.add_argument("--word-order", choices=("big", "little"), default="big")
     parser.add_argument("--payload-capacity", type=capacity, default=1984)
+    parser.add_argument(
+        "--part-capacity",
+        type=capacity,
+        metavar="N",
+        help="take parts: a part block of so many registers behind the rest",
+    )
     args = parser.parse_args()
     cutting = Cutting(args.safe_z, args.cut_z, args.feed, args.plunge, args.path_tolerance)
     machine = _machine(args.folder)
@@ -293,6 +303,7 @@ def main():
         simulated_too=args.simulated_too,
         word_order=args.word_order,
         payload_capacity=args.payload_capacity,
+        part_capacity=args.part_capacity,
     )
     host, port = args.listen
     try:

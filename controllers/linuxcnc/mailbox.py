@@ -11,6 +11,8 @@ import struct
 import threading
 import time
 
+import part_block
+
 LINK, SERVICE, CONTOUR = 0, 16, 32
 HEADER = 32
 ACCEPTED, BAD_CRC, BAD_LAYOUT, BAD_GEOMETRY, EXPIRED, BEFORE, OPERATOR, OUTDATED, MISSING, NOT_READY, WITHDRAWN = range(
@@ -24,8 +26,11 @@ WRAP = 1 << 32
 class Contour:
     """An accepted contour: rings of (x, y) in mm, exterior first and counter-clockwise, holes clockwise.
 
-    expires_at_ms: on the clock of `Mailbox.clock_ms`, None = never; whoever cuts later compares again.
+    expires_at_ms: on the clock of `Mailbox.clock_ms`, None = never; whoever cuts later compares again. parts: what is
+    to be cut from it, by part-block.md; without any, the contour itself.
     """
+
+    parts = ()
 
     def __init__(self, job_id, recipe, rings, area_mm2, uncertainty_um, flags, expires_at_ms):
         self.job_id = job_id
@@ -84,17 +89,21 @@ class Mailbox:
     """Registers, and what the controller does with them.
 
     judge: called with a whole contour, gives ACCEPTED, BAD_GEOMETRY or OPERATOR. on_accepted: called with it once it
-    is in memory. word_order: "big" or "little".
+    is in memory. word_order: "big" or "little". part_capacity: of the part block, which begins where the contour block
+    ends; None = there is none.
     """
 
-    def __init__(self, memory, judge, on_accepted, word_order="big", payload_capacity=1984):
+    def __init__(self, memory, judge, on_accepted, word_order="big", payload_capacity=1984, part_capacity=None):
         self.lock = threading.Lock()
-        self.registers = [0] * (CONTOUR + HEADER + payload_capacity)
+        self.part_address = CONTOUR + HEADER + payload_capacity
+        self.has_parts = part_capacity is not None
+        self.registers = [0] * (self.part_address + (part_block.HEADER + part_capacity if self.has_parts else 0))
         self.capacity = payload_capacity
         self.writable = range(SERVICE, len(self.registers))
         self._memory, self._judge, self._on_accepted = memory, judge, on_accepted
         self._big = word_order == "big"
         self._held = []
+        self._part_block = []
         self._heartbeat = 0
         self._open = False  # a trigger of ours is neither answered by a contour nor told that there will be none
         self._taken = None  # the job that the service made of it
@@ -170,7 +179,8 @@ class Mailbox:
                 self.registers[LINK + 1] = (self.registers[LINK + 1] + 1) % 65536
             self._put32(LINK + 14, self.clock_ms())
             self._put32(LINK + 8, (self._get32(SERVICE + 8) + 1) % WRAP)
-            page = self.registers[CONTOUR:]
+            page = self.registers[CONTOUR : self.part_address]
+            self._part_block = self.registers[self.part_address :]
             state, counter = self.registers[LINK], self.registers[LINK + 2]
             is_open = self._open
             if page[0] in (0, self.registers[LINK + 6]):
@@ -229,15 +239,19 @@ class Mailbox:
             return ACCEPTED, job_id, None
         if number != len(self._held) + 1:
             return MISSING, job_id, None
+        if self.has_parts and number == count and not part_block.belongs_to(self._part_block, page, self._of32):
+            return BAD_CRC, job_id, None
         self._held.append((common, page[HEADER : HEADER + page[7]]))
         if number < count:
             return ACCEPTED, job_id, None
         rings = self._rings(page)
-        if rings is None:
+        placed = part_block.parts(self._part_block, self._of32, self._signed) if self.has_parts else ()
+        if rings is None or placed is None:
             self._held = []
             return BAD_LAYOUT, job_id, None
         expires = (self._of32(page, 24) + valid_for) % WRAP if valid_for else None
         contour = Contour(job_id, page[26], rings, self._of32(page, 20), self._of32(page, 22), page[27], expires)
+        contour.parts = placed
         verdict = self._judge(contour)
         return verdict, job_id, contour if verdict == ACCEPTED else None
 

@@ -1,4 +1,4 @@
-"""A contour as a program for LinuxCNC: holes first, along the rings, at the height of cut; standard library only."""
+"""A contour, or its parts, as a program for LinuxCNC: holes first, along the rings; standard library only."""
 
 
 class Cutting:
@@ -15,17 +15,24 @@ class Cutting:
 
 def program(contour, cutting):
     """The program's text, absolute millimetres of the work coordinates G54, which the calibration is aligned to."""
+    rings = driven(contour)
     lines = [
-        f"(combtrace job {contour.job_id}, recipe {contour.recipe}, {len(contour.rings)} rings)",
+        f"(combtrace job {contour.job_id}, recipe {contour.recipe}, {len(contour.parts)} parts, {len(rings)} rings)",
         "G17 G21 G40 G49 G54 G80 G90 G94",
         f"G64 P{cutting.path_tolerance_mm:g}",
         f"G0 Z{cutting.safe_z_mm:g}",
     ]
-    for ring in [*contour.rings[1:], contour.rings[0]]:
+    for ring in rings:
         lines += [f"G0 {_point(ring[0])}", f"G1 Z{cutting.cut_z_mm:g} F{cutting.plunge_mm_min:g}"]
         lines += [f"G1 {_point(point)} F{cutting.feed_mm_min:g}" for point in [*ring[1:], ring[0]]]
         lines += [f"G0 Z{cutting.safe_z_mm:g}"]
     return "\n".join([*lines, "M2", ""])
+
+
+def driven(contour):
+    """The rings in the order in which they are cut: of its parts where it has any, else its own; holes first."""
+    shapes = [part.rings for part in contour.parts] or [contour.rings]
+    return [ring for rings in shapes for ring in [*rings[1:], rings[0]]]
 
 
 def out_of_limits(contour, cutting, limits, offset):
@@ -34,7 +41,7 @@ def out_of_limits(contour, cutting, limits, offset):
     limits: (least, most) of X, Y, Z in machine units of mm. offset: of the work coordinates in force, mm.
     """
     for axis, name in enumerate("XY"):
-        values = [point[axis] + offset[axis] for ring in contour.rings for point in ring]
+        values = [point[axis] + offset[axis] for ring in driven(contour) for point in ring]
         low, high = limits[axis]
         if min(values) < low or max(values) > high:
             return f"{name} from {min(values):.3f} to {max(values):.3f} mm, the machine goes from {low:g} to {high:g}"

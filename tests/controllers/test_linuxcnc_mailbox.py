@@ -23,10 +23,10 @@ VECTORS = json.loads((ROOT / "docs" / "reference" / "golden-vectors.json").read_
 class FixedMailbox(bridge.Mailbox):
     """A mailbox whose clock and session are those of a vector."""
 
-    def __init__(self, memory, vector, judge=lambda _: bridge.ACCEPTED):
+    def __init__(self, memory, vector, judge=lambda _: bridge.ACCEPTED, part_capacity=None):
         self.taken = []
         capacity = vector.get("payload_capacity", 1984)
-        super().__init__(memory, judge, self.taken.append, vector["word_order"], capacity)
+        super().__init__(memory, judge, self.taken.append, vector["word_order"], capacity, part_capacity)
         self.now_ms = vector.get("captured_at", 0) + 10
         self.session = self.registers[13] = vector["session"]
         self.registers[2] = vector.get("trigger", 0)
@@ -62,6 +62,46 @@ def test_every_golden_contour_arrives_as_it_was_written(vector, memory):
     assert memory.last_job == vector["job_id"]
     assert mailbox.send(vector["pages"][-1], 77) == bridge.BEFORE
     assert len(mailbox.taken) == 1
+
+
+def with_parts(vector, memory, torn=None, part_capacity=200):
+    """The mailbox that got a golden part block, a bit of which may be wrong, and its answer to the page."""
+    example = {"captured_at": 60_000, "session": 9, "trigger": 5, "word_order": vector["word_order"]}
+    mailbox = FixedMailbox(memory, example, part_capacity=part_capacity)
+    block = vector["part_block"][: 16 + part_capacity]
+    mailbox.registers[2048 : 2048 + len(block)] = block
+    if torn is not None:
+        mailbox.registers[2048 + torn] ^= 0x10
+    return mailbox, mailbox.send(vector["page"], 1)
+
+
+@pytest.mark.parametrize("vector", VECTORS["parts"], ids=lambda vector: vector["name"])
+def test_every_golden_part_block_arrives_with_its_contour(vector, memory):
+    mailbox, given = with_parts(vector, memory)
+    assert given == bridge.ACCEPTED
+    (contour,) = mailbox.taken
+    for part, sent in zip(contour.parts, vector["parts"], strict=True):
+        rings = [[(x / 1000, y / 1000) for x, y in ring] for ring in (sent["exterior"], *sent["holes"])]
+        assert part.rings == rings
+        assert (part.number, part.margin_mm, part.needed_mm) == (
+            sent["part"],
+            sent["margin"] / 1000,
+            sent["needed"] / 1000,
+        )
+
+
+@pytest.mark.parametrize("place", range(38))
+def test_a_part_block_with_one_wrong_bit_is_never_taken_and_its_repeat_is(place, memory):
+    vector = next(vector for vector in VECTORS["parts"] if len(vector["parts"]) == 1)
+    mailbox, given = with_parts(vector, memory, place)
+    assert given == bridge.BAD_CRC
+    assert (mailbox.taken, memory.last_job) == ([], 0)
+    mailbox.registers[2048 + place] ^= 0x10
+    assert mailbox.send(vector["page"], 2) == bridge.ACCEPTED
+
+
+def test_a_part_block_longer_than_its_room_is_answered_2(memory):
+    assert with_parts(VECTORS["parts"][0], memory, part_capacity=12)[1] == bridge.BAD_CRC
 
 
 @pytest.mark.parametrize("vector", VECTORS["withdrawals"], ids=lambda vector: vector["word_order"])

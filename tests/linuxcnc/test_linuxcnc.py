@@ -126,6 +126,42 @@ def test_the_machine_moves_along_the_true_outline_of_the_block_in_the_picture(ma
         draw_way(Path(picture), *[[(part - SHIFT_MM) @ back.T for part in parts] for parts in (truth, sent, [cutting])])
 
 
+MARGIN_MM = 10.0
+
+
+def test_the_machine_drives_along_the_part_inside_the_block_by_its_margin(machine, tmp_path):
+    """The way that was driven, and the block as it was rendered: neither is what the service believed."""
+    way = machine.folder / "part-way.json"
+    with bridge_on(machine, "--run", "--cut-z", str(CUT_Z), "--simulated-too", "--part-capacity", "4000") as bridge:
+        sampling = machine.sampling(way)
+        cell = Cell(tmp_path, bridge)
+        shutil.copy(ROOT / "samples" / "part.dxf", tmp_path)
+        config = tmp_path / "config.yaml"
+        text = config.read_text().replace("valid_for_s", "part_block: {address: 2048, capacity: 4000}, valid_for_s")
+        part = f"part: {{file: part.dxf, margin_mm: {MARGIN_MM:g}}}"
+        config.write_text(text.replace("thickness_mm: 20", f"thickness_mm: 20, {part}"))
+        status, told = cell.run_once()
+        assert status == 0, told + bridge.log.read_text()
+        bridge.says(r"job \d+ done", 60)
+        assert sampling.wait(30) == 0
+    positions = np.array(json.loads(way.read_text()))
+    positions = positions[int(np.argmax(positions[:, 2] >= SAFE_Z - 1e-3)) :]
+    cutting = positions[positions[:, 2] < CUT_Z + 1e-3][:, :2]
+    assert len(cutting) > 200
+    (path,) = tmp_path.glob("archive/*/*-accepted.json")
+    laid = json.loads(path.read_text())["measurement"]["part"]["millimetres"]
+    rings = [np.array(ring) for ring in (laid["exterior"], *laid["holes"])]
+    driven = shapely.points(cutting)
+    assert shapely.distance(driven, lines_of(rings)).max() <= PATH_TOLERANCE_MM + 0.01
+    for ring in rings:
+        along = [shapely.LinearRing(ring).interpolate(s, normalized=True) for s in np.linspace(0, 1, 200)]
+        assert shapely.distance(along, shapely.MultiPoint(cutting)).max() <= FEED_MM_PER_S * 2 * STATUS_S
+    exterior, *holes = in_machine_frame(next(scene for scene in sample_scenes() if scene.name == PICTURE).outline)
+    block = shapely.Polygon(exterior, holes)
+    assert shapely.contains(block, driven).all()
+    assert shapely.distance(driven, block.boundary).min() >= MARGIN_MM - PATH_TOLERANCE_MM - 0.01
+
+
 def test_without_run_it_is_shown_and_waits_for_the_operators_cycle_start(machine, tmp_path):
     with bridge_on(machine, "--simulated-too") as bridge:
         status, told = Cell(tmp_path, bridge).run_once()

@@ -37,10 +37,12 @@ class SceneMoved(FrameUnusable):
 class Frame:
     """One exposure.
 
-    pixels: shape (H, W) grey or (H, W, 3) BGR, uint8. exposed_at_s: start of the exposure on `time.monotonic`'s
-    scale; a file counts as exposed when it is read. simulated: not from a live camera. source: what it came from,
-    for log and journal. sequence: counts frames of this camera from 1. camera: which device took it, its name with its
-    serial number or, without one, its place on the bus; a calibration holds for that one. "" = not told, as of files.
+    pixels: shape (H, W) grey or (H, W, 3) BGR, uint8. deep: uint16 of the same shape where the source has more than
+    eight bits: pixels are the eight of them that the picture uses, and follow from them alone. exposed_at_s: start of
+    the exposure on `time.monotonic`'s scale; a file counts as exposed when it is read. simulated: not from a live
+    camera. source: what it came from, for log and journal. sequence: counts frames of this camera from 1. camera:
+    which device took it, its name with its serial number or, without one, its place on the bus; a calibration holds for
+    that one. "" = not told, as of files.
     """
 
     pixels: NDArray[np.uint8]
@@ -49,6 +51,7 @@ class Frame:
     source: str
     sequence: int
     camera: str = ""
+    deep: NDArray[np.uint16] | None = None
 
 
 class Camera(Protocol):

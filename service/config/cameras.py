@@ -74,4 +74,65 @@ class V4l2Camera(Model):
     )
 
 
-Camera = Annotated[FilesCamera | V4l2Camera, Field(discriminator="kind")]
+class GenicamCamera(Model):
+    """A GigE Vision or USB3 Vision camera, through Aravis (`apt install gir1.2-aravis-0.8 python3-gi`)."""
+
+    kind: Literal["genicam"]
+    serial: str = Field("", max_length=64, description="Serial number of the camera, in quotes.")
+    user_name: str = Field("", max_length=64, description="Name that the camera was given; instead of serial.")
+    width: int | None = Field(None, ge=16, le=32_768, description="Width of the region, px; none = as it has it.")
+    height: int | None = Field(None, ge=16, le=32_768, description="Height of the region, px; none = as it has it.")
+    offset_x: int = Field(0, ge=0, le=32_768, description="Left edge of the region on the sensor, px.")
+    offset_y: int = Field(0, ge=0, le=32_768, description="Upper edge of the region on the sensor, px.")
+    pixel_format: str = Field(
+        "Mono8",
+        min_length=1,
+        max_length=40,
+        description="Name of the pixel format: Mono8, 10, 12, 14, 16, BayerRG8 to 16, packed ones (p, Packed), RGB8.",
+    )
+    exposure_us: float | None = Field(None, gt=0, le=60_000_000, description="Exposure time, µs; none = as it has it.")
+    gain_db: float | None = Field(None, ge=-100, le=10_000, description="Gain in the camera's unit, mostly dB.")
+    black_level: float | None = Field(None, ge=0, le=65_535, description="Black level in the camera's unit.")
+    white_balance: dict[Literal["red", "green", "blue"], float] = Field(
+        default_factory=dict, description="Gain of each colour."
+    )
+    frame_rate: float | None = Field(None, gt=0, le=10_000, description="Frames a second; none = as it has it.")
+    trigger: Literal["software", "line", "free"] = Field(
+        "software", description="What exposes a frame: the job itself, an edge on a line, or the camera's own clock."
+    )
+    line: str = Field("Line1", min_length=1, max_length=40, description="With trigger line: the input.")
+    trigger_activation: str | None = Field(
+        None, max_length=40, description="With trigger line: RisingEdge, FallingEdge and the like; none = as it has it."
+    )
+    strobe: str | None = Field(
+        None, max_length=40, description="Output line that is on while the sensor is exposed; none = none is set."
+    )
+    packet_size: Literal["auto"] | Annotated[int, Field(ge=220, le=65_000)] = Field(
+        "auto", description="Bytes of a network packet; auto = negotiated."
+    )
+    packet_delay_ns: int | None = Field(
+        None, ge=0, le=10_000_000, description="Pause between two packets, ns: for cameras that share a cable."
+    )
+    features: dict[str, bool | int | float | str] = Field(
+        default_factory=dict, description="Any other feature by its name in the camera's own description."
+    )
+    timeout_s: Seconds = Field(5.0, description="Longest wait for a frame, s.")
+    latency_ms: float = Field(
+        0, ge=0, le=10_000, description="With trigger line or free: how long the camera keeps a frame, ms."
+    )
+    average: int = Field(
+        1, ge=1, le=64, description="Frames of a still scene that are averaged; 103 where it moves. 1 = none."
+    )
+    warm_up_s: float = Field(
+        0, ge=0, le=7200, description="Time after opening in which no trigger is taken, s, as for V4L2."
+    )
+
+    @model_validator(mode="after")
+    def _one_name(self) -> Self:
+        if bool(self.serial) == bool(self.user_name):
+            seen = "both serial and user_name are" if self.serial else "neither serial nor user_name is"
+            raise ValueError(f"{seen} given, expected one: `combtrace cameras` lists them")
+        return self
+
+
+Camera = Annotated[FilesCamera | V4l2Camera | GenicamCamera, Field(discriminator="kind")]

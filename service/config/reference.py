@@ -28,7 +28,7 @@ JSON schema.
 
 SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("Top level", (config.Config,)),
-    ("`camera`", (cameras.FilesCamera, cameras.V4l2Camera)),
+    ("`camera`", (cameras.FilesCamera, cameras.V4l2Camera, cameras.GenicamCamera)),
     ("`calibration`", (config.Calibration,)),
     (
         "`controller`",

@@ -11,6 +11,7 @@ from drivers.controller.modbus import client as modbus
 from drivers.trigger import PulseTrigger
 from drivers.trigger.pulses import SerialBytes, SerialSignal
 from drivers.trigger.serial import SerialLineTrigger
+from service.config import cameras
 from service.config.cameras import FilesCamera
 from service.config.config import Config
 from service.config.controllers import ModbusRtu, ModbusRtuOverTcp, ModbusTcp, NoController
@@ -31,6 +32,8 @@ def _single_frames(config: Config) -> Camera:
     settings = config.camera
     if isinstance(settings, FilesCamera):
         return FileCamera(settings.path, loop=settings.loop, watch=settings.watch, move_to=settings.move_to)
+    if isinstance(settings, cameras.GenicamCamera):
+        return _genicam(settings)
     return V4l2Camera(
         V4l2Settings(
             device=str(settings.device),
@@ -44,6 +47,17 @@ def _single_frames(config: Config) -> Camera:
             latency_s=settings.latency_ms / 1000,
         )
     )
+
+
+def _genicam(settings: cameras.GenicamCamera) -> Camera:
+    # Loaded only where it is configured: others need not wait for it.
+    from drivers.camera.genicam.camera import GenicamCamera
+    from drivers.camera.genicam.settings import GenicamSettings
+
+    same = settings.model_dump(exclude={"kind", "packet_size", "timeout_s", "latency_ms", "average", "warm_up_s"})
+    packet_size = 0 if settings.packet_size == "auto" else settings.packet_size
+    latency_s = settings.latency_ms / 1000
+    return GenicamCamera(GenicamSettings(**same, packet_size=packet_size, latency_s=latency_s))
 
 
 def make_controller(config: Config) -> modbus.ModbusController | None:

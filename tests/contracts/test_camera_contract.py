@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import time
+from contextlib import ExitStack
 
 import cv2
 import numpy as np
 import pytest
 
+from contour.synthetic import render
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame
 from drivers.camera.averaging import AveragingCamera
 from drivers.camera.files.camera import FileCamera
+from drivers.camera.genicam.camera import GenicamCamera
+from drivers.camera.genicam.settings import GenicamSettings
 from drivers.camera.simulated import SimulatedCamera
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
+from tests.support.gige_camera import GigeCamera, aravis_is_loaded, need_aravis
+from tests.support.scenes.sample_scenes import sample_scenes
 
+__all__ = ["aravis_is_loaded"]
 PATIENT_S = 60.0  # a camera of an emulated machine is among them
 
 
@@ -23,26 +31,45 @@ def picture(number):
     return np.full((48, 64), number % 256, np.uint8)
 
 
-def folder_camera(tmp_path):
+def folder_camera(tmp_path, _stack):
     for number in range(1, 4):
         cv2.imwrite(str(tmp_path / f"{number}.png"), picture(number))
     return FileCamera(tmp_path, loop=True)
 
 
-def single_file_camera(tmp_path):
+def single_file_camera(tmp_path, _stack):
     cv2.imwrite(str(tmp_path / "only.png"), cv2.merge([picture(1)] * 3))
     return FileCamera(tmp_path / "only.png", loop=True)
 
 
-def vivid_camera(_tmp_path):
+def vivid_camera(_tmp_path, _stack):
     return V4l2Camera(V4l2Settings("/dev/video0", 640, 360, frame_rate=30.0, input=0, exposure_s=0.0))
+
+
+@functools.cache
+def blocks():
+    """Rendered blocks."""
+    return [render(scene).picture[:480, :640] for scene in sample_scenes()[:2]]
+
+
+def gige_camera(trigger):
+    """Aravis' fake on loopback, serving pictures of blocks through real sockets."""
+
+    def make(tmp_path, stack):
+        need_aravis()
+        stack.enter_context(GigeCamera(tmp_path, blocks(), serial="GV7"))
+        return GenicamCamera(GenicamSettings("GV7", width=640, height=480, exposure_us=2000, trigger=trigger))
+
+    return make
 
 
 CAMERAS = {
     "folder": folder_camera,
     "single file": single_file_camera,
-    "simulated": lambda _tmp_path: SimulatedCamera(picture),
-    "averaging": lambda _tmp_path: AveragingCamera(SimulatedCamera(lambda _number: picture(7)), 3),
+    "simulated": lambda *_: SimulatedCamera(picture),
+    "averaging": lambda *_: AveragingCamera(SimulatedCamera(lambda _number: picture(7)), 3),
+    "genicam": gige_camera("software"),
+    "genicam, running freely": gige_camera("free"),
 }
 if os.environ.get("COMBTRACE_CAMERA_GUEST"):
     CAMERAS["v4l2"] = vivid_camera
@@ -50,9 +77,10 @@ if os.environ.get("COMBTRACE_CAMERA_GUEST"):
 
 @pytest.fixture(params=CAMERAS.values(), ids=CAMERAS.keys())
 def camera(request, tmp_path):
-    made = request.param(tmp_path)
-    yield made
-    made.close()
+    with ExitStack() as stack:
+        made = request.param(tmp_path, stack)
+        stack.callback(made.close)
+        yield made
 
 
 def test_a_frame_is_a_grey_or_bgr_picture_of_bytes(camera):

@@ -53,6 +53,11 @@ class Frame:
     camera: str = ""
     deep: NDArray[np.uint16] | None = None
 
+    @property
+    def samples(self) -> NDArray[np.uint8] | NDArray[np.uint16]:
+        """All that the source gave: what is to be kept."""
+        return self.pixels if self.deep is None else self.deep
+
 
 class Camera(Protocol):
     """A source of frames. Blocking: the service gives it a thread of its own."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import Camera, CameraTimeout, Frame, SceneMoved
+from drivers.camera.depth import looked_at
 from drivers.camera.stillness import movement
 
 
@@ -39,7 +40,7 @@ class AveragingCamera:
         """
         give_up_at = self._now() + timeout_s
         first = self._camera.grab(exposed_after_s, timeout_s)
-        total: NDArray[np.uint16] = first.pixels.astype(np.uint16)
+        total: NDArray[np.uint32] = first.samples.astype(np.uint32)
         latest = first
         for number in range(2, self._count + 1):
             left_s = give_up_at - self._now()
@@ -50,10 +51,10 @@ class AveragingCamera:
                 )
             latest = self._camera.grab(np.nextafter(latest.exposed_at_s, np.inf), left_s)
             self._check_still(first, latest, number)
-            total += latest.pixels
-        mean = ((total + self._count // 2) // self._count).astype(np.uint8)
+            total += latest.samples
+        mean, deep = looked_at(((total + self._count // 2) // self._count).astype(first.samples.dtype))
         self._sequence += 1
-        return Frame(mean, first.exposed_at_s, first.simulated, first.source, self._sequence, first.camera)
+        return Frame(mean, first.exposed_at_s, first.simulated, first.source, self._sequence, first.camera, deep)
 
     def check(self) -> None:
         """Raise CameraUnavailable where the camera behind it has gone."""

@@ -31,6 +31,14 @@ def eight_bits(deep: NDArray[np.uint16]) -> NDArray[np.uint8]:
     return np.asarray(np.minimum(deep >> shift, 255), np.uint8)
 
 
+def looked_at(samples: NDArray[np.generic]) -> tuple[NDArray[np.uint8], NDArray[np.uint16] | None]:
+    """A frame's pixels and its deep samples, None where the samples, uint8 or uint16, are the pixels."""
+    if samples.dtype == np.uint8:
+        return np.asarray(samples, np.uint8), None
+    deep = np.asarray(samples, np.uint16)
+    return eight_bits(deep), deep
+
+
 def left_justified(samples: NDArray[np.uint16], bits: int) -> NDArray[np.uint16]:
     """Samples of `bits` bits, moved so that the sensor's full scale is that of 16."""
     return np.left_shift(samples, 16 - bits)

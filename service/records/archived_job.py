@@ -21,6 +21,7 @@ from contour.acceptance.sent_evidence import SentStretch
 from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour
 from drivers.camera import Frame
+from drivers.camera.depth import looked_at
 from drivers.controller.mailbox.page_text import pages_from_text
 from drivers.controller.mailbox.pages import Page
 from service.config.mistakes import describe
@@ -110,11 +111,11 @@ class ArchivedJob:
         except OSError as error:
             raise EvidenceError(f"{path}: cannot be read: {error.strerror}") from error
         decoded = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-        pixels = np.zeros(0, np.uint8) if decoded is None else np.asarray(decoded, dtype=np.uint8)
+        samples: NDArray[np.generic] = np.zeros(0, np.uint8) if decoded is None else decoded
         known = self.document["frame"]
-        if list(pixels.shape) != known["shape"] or _sha256(pixels) != known["sha256"]:
+        if list(samples.shape) != known["shape"] or _sha256(samples) != known["sha256"]:
             raise EvidenceError(f"{path}: is not the frame that was archived. Restore it, or replay another job")
-        return pixels
+        return looked_at(samples)[0]
 
     def measurer(self, calibration: Path | None = None, limits: dict[str, Any] | None = None) -> Measurer:
         """What measures as the job was measured; with another calibration file, or other limits. EvidenceError."""
@@ -196,12 +197,14 @@ def _plain_frame(draft: ArchivedJob) -> Frame:
     known = draft.document["frame"]
     path = draft.path.with_name(f"{draft.job_id}-{PLAIN_FRAME}")
     try:
-        pixels = np.frombuffer(path.read_bytes(), np.uint8).reshape(known["shape"])
+        # Documents of earlier versions say no type: their frames had eight bits.
+        samples = np.frombuffer(path.read_bytes(), np.dtype(known.get("type", "uint8"))).reshape(known["shape"])
     except OSError as error:
         raise EvidenceError(f"{path}: cannot be read: {error.strerror}") from error
-    if _sha256(pixels) != known["sha256"]:
+    if _sha256(samples) != known["sha256"]:
         raise EvidenceError(f"{path}: is not the frame that was kept")
-    return Frame(pixels, 0.0, known["simulated"], known["source"], known["sequence"], known["camera"])
+    pixels, deep = looked_at(samples)
+    return Frame(pixels, 0.0, known["simulated"], known["source"], known["sequence"], known["camera"], deep)
 
 
 def _measurement(draft: ArchivedJob) -> Measurement:
@@ -256,5 +259,5 @@ def recipe_with(archived: ArchivedJob, changes: dict[str, Any]) -> Recipe:
         raise EvidenceError(f"job {archived.job_id}: {mistakes}") from error
 
 
-def _sha256(pixels: NDArray[np.uint8]) -> str:
-    return hashlib.sha256(np.ascontiguousarray(pixels).tobytes()).hexdigest()
+def _sha256(samples: NDArray[np.generic]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(samples).tobytes()).hexdigest()

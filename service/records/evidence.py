@@ -147,13 +147,13 @@ def contour_fields(contour: Contour | None) -> dict[str, Any] | None:
 
 
 def plain_bytes(frame: Frame) -> bytes:
-    """The frame's pixels as they are in memory, row by row."""
-    return np.ascontiguousarray(frame.pixels).tobytes()
+    """The frame's samples as they are in memory, row by row."""
+    return np.ascontiguousarray(frame.samples).tobytes()
 
 
 def frame_bytes(frame: Frame) -> bytes:
-    """The frame as PNG, which loses nothing."""
-    return _encoded(".png", frame.pixels, [cv2.IMWRITE_PNG_COMPRESSION, PNG_LEVEL])
+    """The frame as PNG of its full depth, which loses nothing."""
+    return _encoded(".png", frame.samples, [cv2.IMWRITE_PNG_COMPRESSION, PNG_LEVEL])
 
 
 def overlay_bytes(frame: Frame, measurement: Measurement) -> bytes:
@@ -174,7 +174,7 @@ def table_digest(record: TableRecord) -> str:
     return digest.hexdigest()[:32]
 
 
-def _encoded(ending: str, pixels: NDArray[np.uint8], options: list[int]) -> bytes:
+def _encoded(ending: str, pixels: NDArray[np.uint8] | NDArray[np.uint16], options: list[int]) -> bytes:
     _, data = cv2.imencode(ending, pixels, options)
     return data.tobytes()
 
@@ -193,5 +193,6 @@ def _frame_fields(frame: Frame) -> dict[str, Any]:
         "simulated": frame.simulated,
         "sequence": frame.sequence,
         "shape": list(frame.pixels.shape),
+        "type": frame.samples.dtype.name,
         "sha256": hashlib.sha256(plain_bytes(frame)).hexdigest(),
     }

@@ -35,7 +35,7 @@ def overlay(picture: NDArray[np.uint8], measurement: Measurement) -> NDArray[np.
     )
 
 
-def write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:
+def write_picture(path: Path, pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
     """Write the picture, grey or BGR; the format follows the ending, PNG without one. Raise PictureFileError."""
     try:
         done, data = cv2.imencode(path.suffix or ".png", pixels)

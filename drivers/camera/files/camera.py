@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import CameraRefused, CameraTimeout, CameraUnavailable, Frame, FrameUnusable
-from drivers.camera.files.decode import read_picture
+from drivers.camera.depth import looked_at
+from drivers.camera.files.decode import read_samples
 from drivers.camera.files.folder import (
     SUFFIXES,
     FileVersion,
@@ -88,15 +89,16 @@ class FileCamera:
         give_up_at = self._now() + timeout_s
         wait_until(exposed_after_s, timeout_s, now=self._now, sleep=self._sleep, source=shown(self._path))
         while True:
-            pixels = self._next_of_video() if self._video is not None else self._next_file(give_up_at)
-            if pixels is not None:
+            samples = self._next_of_video() if self._video is not None else self._next_file(give_up_at)
+            if samples is not None:
                 break
         assert self._current is not None
         source = shown(self._current.path) + (f" frame {self._video.position}" if self._video is not None else "")
         if self._video is None:
             self._end_file()
         self._sequence += 1
-        return Frame(pixels, self._read_at_s, simulated=True, source=source, sequence=self._sequence)
+        pixels, deep = looked_at(samples)
+        return Frame(pixels, self._read_at_s, simulated=True, source=source, sequence=self._sequence, deep=deep)
 
     def check(self) -> None:
         """Raise CameraUnavailable where file or folder have gone."""
@@ -120,7 +122,7 @@ class FileCamera:
 
     # --- one file -----------------------------------------------------------------------------------------------
 
-    def _next_file(self, give_up_at: float) -> NDArray[np.uint8] | None:
+    def _next_file(self, give_up_at: float) -> NDArray[np.uint8] | NDArray[np.uint16] | None:
         """The next file's picture; None where it is a video, which is open then."""
         if not self._pending:
             self._pending = deque([self._waited_for(give_up_at)] if self._watch else self._listed())
@@ -129,7 +131,7 @@ class FileCamera:
         self._read_at_s = self._now()
         try:
             if not is_video(path):
-                return read_picture(path)
+                return read_samples(path)
             self._video = VideoFile(path)
         except FrameUnusable:
             self._end_file()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import FrameUnusable
+from drivers.camera.depth import looked_at
 from drivers.camera.files.folder import shown
 from drivers.camera.files.headers import Header, HeaderError, read_header
 
@@ -30,15 +31,26 @@ cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 def read_picture(path: str | Path) -> NDArray[np.uint8]:
     """The picture in a file: (H, W) grey or (H, W, 3) BGR, uint8; raise FrameUnusable, naming the file."""
-    return decode_picture(_read_bytes(Path(path)), shown(path))
+    return looked_at(read_samples(path))[0]
+
+
+def read_samples(path: str | Path) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """All that the picture in a file holds, as `decode_samples` has it; raise FrameUnusable, naming the file."""
+    return decode_samples(_read_bytes(Path(path)), shown(path))
 
 
 def decode_picture(data: bytes, source: str) -> NDArray[np.uint8]:
-    """The picture in `data`, (H, W) grey or (H, W, 3) BGR, uint8, its own memory; raise FrameUnusable, naming `source`.
+    """The picture in `data`, as `decode_samples` has it; of 16-bit samples the eight bits that it uses, uint8."""
+    return looked_at(decode_samples(data, source))[0]
+
+
+def decode_samples(data: bytes, source: str) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """The picture in `data`, (H, W) grey or (H, W, 3) BGR, uint8 or uint16, its own memory; raise FrameUnusable, naming
+    `source`.
 
     Rows and columns are the file's own: an orientation noted beside the pixels (EXIF) is left alone, as a calibration
-    holds for the sensor's rows and columns. 16-bit samples give their upper byte; of several pictures in one file the
-    first counts. A JPEG damaged in its middle cannot be told from a good one where its length still fits.
+    holds for the sensor's rows and columns. Of several pictures in one file the first counts. A JPEG damaged in its
+    middle cannot be told from a good one where its length still fits.
     """
     header = _checked_header(data, source)
     pixels = _decoded(data, source, header)
@@ -49,7 +61,12 @@ def decode_picture(data: bytes, source: str) -> NDArray[np.uint8]:
         raise _unusable(source, seen, "Make the picture anew.")
     if header.kind == "JPEG" and _ends_early(data, header, pixels):
         raise _unusable(source, "JPEG data that end before the picture is full", "Copy or record it anew.")
-    return _eight_bit(_opaque(pixels, source), source)
+    opaque = _opaque(pixels, source)
+    if opaque.dtype == np.uint8:
+        return np.asarray(opaque, np.uint8)
+    if opaque.dtype != np.uint16:
+        raise _unusable(source, f"samples of type {opaque.dtype}", "Export it as 8-bit grey or RGB.")
+    return np.asarray(opaque, np.uint16)
 
 
 def _unusable(source: str, seen: str, advice: str, expected: str = EXPECTED) -> FrameUnusable:
@@ -131,22 +148,3 @@ def _opaque(pixels: NDArray[np.generic], source: str) -> NDArray[np.generic]:
     if np.any(pixels[:, :, 3] != full):
         raise _unusable(source, "see-through pixels (alpha)", "Export it without transparency.", "an opaque picture")
     return np.ascontiguousarray(pixels[:, :, :3])
-
-
-def _eight_bit(pixels: NDArray[np.generic], source: str) -> NDArray[np.uint8]:
-    """8-bit samples; of 16-bit ones the upper byte, where they use the upper half of their range.
-
-    Sensors of 10, 12 or 14 bits are often stored unshifted in 16-bit files and fill a quarter of the range at most;
-    their upper byte would hold 4 to 64 grey levels, and nobody would see why the walls are gone.
-    """
-    if pixels.dtype == np.uint8:
-        return np.asarray(pixels, dtype=np.uint8)
-    if pixels.dtype != np.uint16:
-        advice = "Export it as 8-bit grey or RGB."
-        raise _unusable(source, f"samples of type {pixels.dtype}", advice)
-    brightest = int(np.asarray(pixels, dtype=np.uint16).max())
-    if brightest < 1 << 14:
-        seen = f"16-bit samples that reach only {brightest}"
-        advice = "Save it as 8-bit, or shift its samples to fill 16 bits."
-        raise _unusable(source, seen, advice, "samples that use the range up to 65535")
-    return np.right_shift(np.asarray(pixels, dtype=np.uint16), 8).astype(np.uint8)

@@ -8,10 +8,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from drivers.camera import CameraTimeout, CameraUnavailable, Frame
-from drivers.camera.depth import eight_bits
+from drivers.camera.depth import looked_at
 from drivers.camera.genicam.clock import CameraClock
 from drivers.camera.genicam.device import Device
 from drivers.camera.genicam.features import Written
@@ -139,8 +137,7 @@ class GenicamCamera:
         samples = self._opened.picture.samples(whole.data, self._opened.width, self._opened.height)
         self._handed_out += 1
         self.counts.good += 1
-        deep = np.asarray(samples, np.uint16) if samples.dtype == np.uint16 else None
-        pixels = np.asarray(samples, np.uint8) if deep is None else eight_bits(deep)
+        pixels, deep = looked_at(samples)
         camera = str(self._opened.identity)
         return Frame(pixels, began_s, False, self._source, self._handed_out, camera, deep)
 

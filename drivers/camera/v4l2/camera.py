@@ -8,13 +8,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from drivers.camera import CameraRefused, CameraTimeout, CameraUnavailable, Frame, FrameUnusable
+from drivers.camera.depth import looked_at
 from drivers.camera.v4l2 import kernel_interface as v4l2
 from drivers.camera.v4l2.controls import apply_controls, exposure_s
 from drivers.camera.v4l2.device import TELL_WHAT_IT_IS, Device
 from drivers.camera.v4l2.exposure import STAMP_ARRIVAL, FrameTiming
 from drivers.camera.v4l2.formats import set_format, set_frame_rate
 from drivers.camera.v4l2.identity import CameraIdentity, identify
-from drivers.camera.v4l2.pixels import PictureFormat, bytes_needed, to_pixels
+from drivers.camera.v4l2.pixels import PictureFormat, bytes_needed, to_samples
 from drivers.camera.v4l2.signal_input import select_input
 from drivers.camera.v4l2.stream import BUFFERS, Filled, Stream
 
@@ -216,12 +217,11 @@ class V4l2Camera:
             raise FrameUnusable(f"{device}: frame {filled.sequence} is {flaw}")
         if began_s < exposed_after_s:
             raise _TooEarly
-        pixels = to_pixels(stream.memory(filled.index), filled.bytes_used, opened.picture, device)
+        samples = to_samples(stream.memory(filled.index), filled.bytes_used, opened.picture, device)
+        pixels, deep = looked_at(samples)
         self.counts.good += 1
         self._handed_out += 1
-        return Frame(
-            pixels, began_s, simulated=False, source=device, sequence=self._handed_out, camera=str(opened.identity)
-        )
+        return Frame(pixels, began_s, False, device, self._handed_out, str(opened.identity), deep)
 
     def _exposed_at(self, filled: Filled, opened: Opened) -> float:
         """The earliest start of the frame's exposure; raise CameraRefused where the stamp's clock is not known."""

@@ -10,17 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera import FrameUnusable
+from drivers.camera.depth import demosaiced, left_justified
 from drivers.camera.files.decode import decode_picture
 
 
 @dataclass(frozen=True)
 class Layout:
     """How a pixel format lies in memory: bytes a pixel of a row, rows over the picture's height (a fraction), and
-    OpenCV's conversion to BGR; None = already grey or BGR. bytes_per_pixel 0 = compressed."""
+    OpenCV's conversion to BGR; None = already grey or BGR. bytes_per_pixel 0 = compressed. bits: of a sample; above 8
+    it is a number of two bytes, the lower one first. pattern: of a colour sensor, as `demosaiced` takes it."""
 
     bytes_per_pixel: int
     rows: tuple[int, int] = (1, 1)
     conversion: int | None = None
+    bits: int = 8
+    pattern: str = ""
 
 
 LAYOUTS = {
@@ -32,6 +36,19 @@ LAYOUTS = {
     "RGB3": Layout(3, conversion=cv2.COLOR_RGB2BGR),
     "MJPG": Layout(0),
     "JPEG": Layout(0),
+    **{f"Y{bits}": Layout(2, bits=bits) for bits in (10, 12, 14, 16)},
+    # Bayer, by the kernel's codes for a first row of BG, GB, GR and RG.
+    **{
+        code: Layout(1 if bits == 8 else 2, bits=bits, pattern=pattern)
+        for bits, codes in {
+            8: ("BA81", "GBRG", "GRBG", "RGGB"),
+            10: ("BG10", "GB10", "BA10", "RG10"),
+            12: ("BG12", "GB12", "BA12", "RG12"),
+            14: ("BG14", "GB14", "GR14", "RG14"),
+            16: ("BYR2", "GB16", "GR16", "RG16"),
+        }.items()
+        for code, pattern in zip(codes, ("BGGR", "GBRG", "GRBG", "RGGB"), strict=True)
+    },
 }
 
 
@@ -54,8 +71,11 @@ def bytes_needed(layout: PictureFormat) -> int:
     return _stride(layout, kind) * (rows - 1) + layout.width * kind.bytes_per_pixel
 
 
-def to_pixels(memory: mmap.mmap, bytes_used: int, layout: PictureFormat, source: str) -> NDArray[np.uint8]:
-    """Pixels of their own memory, (H, W) grey or (H, W, 3) BGR, uint8; raise FrameUnusable for a damaged JPEG.
+def to_samples(
+    memory: mmap.mmap, bytes_used: int, layout: PictureFormat, source: str
+) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Samples of their own memory, (H, W) grey or (H, W, 3) BGR, uint8, or uint16 with the sensor's full scale at that
+    of 16 bits; raise FrameUnusable for a damaged JPEG.
 
     One copy is made, the conversion itself. What follows a JPEG's end in its buffer is ignored.
     """
@@ -73,6 +93,14 @@ def to_pixels(memory: mmap.mmap, bytes_used: int, layout: PictureFormat, source:
     )
     if kind.bytes_per_pixel == 1:
         view = view[:, :, 0]
+    if kind.bits > 8:
+        words: NDArray[np.uint16] = np.ndarray(
+            (rows, layout.width), np.dtype("<u2"), buffer=memory, strides=strides[:2]
+        )
+        deep = left_justified(words, kind.bits)
+        return demosaiced(deep, kind.pattern) if kind.pattern else deep
+    if kind.pattern:
+        return demosaiced(view, kind.pattern)
     if kind.conversion is None:
         return view.copy()
     return np.asarray(cv2.cvtColor(view, kind.conversion), dtype=np.uint8)

@@ -35,7 +35,8 @@ def run(args: argparse.Namespace) -> int:
         took_ms = (time.monotonic() - asked_at_s) * 1000
         opened = getattr(camera, "opened", None)
     try:
-        write_picture(args.output, frame.pixels)
+        deep = args.output.suffix.lower() in ("", ".png", ".tif", ".tiff")
+        write_picture(args.output, frame.samples if deep else frame.pixels)
     except PictureFileError as error:
         raise UserError(str(error)) from error
     height, width = frame.pixels.shape[:2]

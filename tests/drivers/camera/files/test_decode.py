@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.camera import FrameUnusable
-from drivers.camera.files.decode import MAX_PIXELS, decode_picture, read_picture
+from drivers.camera.files.decode import MAX_PIXELS, decode_picture, decode_samples, read_picture
 from drivers.camera.files.headers import HeaderError, read_header
 
 HEIGHT, WIDTH = 97, 131
@@ -213,10 +213,15 @@ def test_16_bit_samples_give_their_upper_byte():
 
 
 @pytest.mark.parametrize("bits", [10, 12, 14])
-def test_unshifted_sensor_samples_in_16_bits_are_refused(bits):
+def test_unshifted_sensor_samples_in_16_bits_are_read_by_the_bits_they_use(bits):
     deep = GREY.astype(np.uint16) << (bits - 8)
-    with pytest.raises(FrameUnusable, match="16-bit samples that reach only"):
-        decode_picture(encoded(".png", deep), "deep")
+    np.testing.assert_array_equal(decode_picture(encoded(".png", deep), "deep"), GREY)
+
+
+@pytest.mark.parametrize("extension", [".png", ".tif"])
+def test_deep_samples_are_kept_to_their_last_bit(extension):
+    deep = np.random.default_rng(3).integers(0, 1 << 16, (40, 50)).astype(np.uint16)
+    np.testing.assert_array_equal(decode_samples(encoded(extension, deep), "deep"), deep)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.int16, np.float64])

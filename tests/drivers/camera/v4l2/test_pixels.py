@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from drivers.camera import FrameUnusable
 from drivers.camera.v4l2.exposure import FrameTiming
-from drivers.camera.v4l2.pixels import LAYOUTS, PictureFormat, bytes_needed, to_pixels
+from drivers.camera.v4l2.pixels import LAYOUTS, PictureFormat, bytes_needed, to_samples
 
 WIDTH, HEIGHT = 64, 48
 PADDING = 32
@@ -45,7 +45,7 @@ CONVERSIONS = {
 @pytest.mark.parametrize("code", ["GREY", "BGR3", *CONVERSIONS])
 def test_pixels_are_those_of_the_rows_without_what_pads_them(code, padding):
     memory, layout, rows = raw_picture(code, padding)
-    pixels = to_pixels(memory, len(memory), layout, "camera")
+    pixels = to_samples(memory, len(memory), layout, "camera")
     packed = rows if code in ("GREY", "NV12") else rows.reshape(HEIGHT, WIDTH, -1)
     expected = cv2.cvtColor(packed, CONVERSIONS[code]) if code in CONVERSIONS else packed
     np.testing.assert_array_equal(pixels, expected)
@@ -53,10 +53,29 @@ def test_pixels_are_those_of_the_rows_without_what_pads_them(code, padding):
     assert pixels.flags.writeable
 
 
+@pytest.mark.parametrize("padding", [0, PADDING])
+@pytest.mark.parametrize("code", ["Y10", "Y12", "Y14", "Y16"])
+def test_deep_samples_are_kept_to_their_last_bit(code, padding):
+    bits = int(code[1:])
+    words = NOISE.integers(0, 1 << bits, (HEIGHT, WIDTH + padding // 2)).astype("<u2")
+    layout = PictureFormat(code, WIDTH, HEIGHT, 2 * WIDTH + padding)
+    samples = to_samples(in_memory(words.tobytes()), words.nbytes, layout, "camera")
+    np.testing.assert_array_equal(samples >> (16 - bits), words[:, :WIDTH])
+
+
+@pytest.mark.parametrize(("code", "bits"), [("RGGB", 8), ("RG10", 10), ("RG12", 12), ("RG16", 16)])
+def test_a_mosaic_becomes_its_colours(code, bits):
+    cell = np.array([[200, 90], [90, 40]], np.uint16) << np.uint16(bits - 8)
+    mosaic = np.tile(cell, (HEIGHT // 2, WIDTH // 2)).astype(np.uint8 if bits == 8 else "<u2")
+    layout = PictureFormat(code, WIDTH, HEIGHT, mosaic.strides[0])
+    samples = to_samples(in_memory(mosaic.tobytes()), mosaic.nbytes, layout, "camera")
+    assert tuple(samples[20, 20] >> (0 if bits == 8 else 8)) == (40, 90, 200)
+
+
 @pytest.mark.parametrize("code", ["GREY", "BGR3", *CONVERSIONS])
 def test_pixels_stay_when_the_driver_fills_its_buffer_again(code):
     memory, layout, _ = raw_picture(code, PADDING)
-    pixels = to_pixels(memory, len(memory), layout, "camera")
+    pixels = to_samples(memory, len(memory), layout, "camera")
     before = pixels.copy()
     memory[:] = bytes(len(memory))
     np.testing.assert_array_equal(pixels, before)
@@ -78,16 +97,16 @@ def jpeg_frame(padding, size=(WIDTH, HEIGHT)):
 def test_a_jpeg_frame_is_read_whatever_pads_its_buffer(padding):
     data, memory, layout = jpeg_frame(padding)
     expected = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    np.testing.assert_array_equal(to_pixels(memory, len(memory), layout, "camera"), expected)
+    np.testing.assert_array_equal(to_samples(memory, len(memory), layout, "camera"), expected)
 
 
 def test_a_jpeg_frame_that_was_cut_or_has_another_size_is_unusable():
     data, memory, layout = jpeg_frame(0)
     with pytest.raises(FrameUnusable, match="camera: truncated JPEG"):
-        to_pixels(memory, len(data) * 2 // 3, layout, "camera")
+        to_samples(memory, len(data) * 2 // 3, layout, "camera")
     _, memory, layout = jpeg_frame(0, (WIDTH, HEIGHT // 2))
     with pytest.raises(FrameUnusable, match=r"a JPEG of 64 x 24 pixels; expected 64 x 48"):
-        to_pixels(memory, len(memory), layout, "camera")
+        to_samples(memory, len(memory), layout, "camera")
 
 
 @given(

@@ -1,4 +1,4 @@
-"""The files that make a service of the daemon: a systemd unit and udev rules, as text.
+"""The files that make a service of the daemon: a systemd unit, udev rules and kernel settings, as text.
 
 `python -m service.commissioning.install_files packaging` writes those for the usual places, for who makes packages.
 """
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from service.config.cameras import FilesCamera
+from service.config.cameras import FilesCamera, GenicamCamera
 from service.config.config import Config
 
 USER = re.compile(r"[a-z_][a-z0-9_-]{0,30}")
@@ -62,7 +62,7 @@ ProtectKernelLogs=yes
 ProtectControlGroups=yes
 ProtectHostname=yes
 ProtectProc=invisible
-RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6
+RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6{netlink}
 RestrictNamespaces=yes
 RestrictRealtime=yes
 RestrictSUIDSGID=yes
@@ -96,9 +96,20 @@ ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}=
 # A camera that sleeps between two jobs wakes with other exposure and stale frames.
 ACTION=="add", SUBSYSTEM=="usb", ENV{DEVTYPE}=="usb_device", ENV{ID_USB_INTERFACES}=="*:0e*", ATTR{power/control}="on"
 
+# USB3 Vision cameras, by the class of their interfaces.
+ACTION!="remove", SUBSYSTEM=="usb", ENV{ID_USB_INTERFACES}=="*:ef05*", GROUP="video", MODE="0660"
+
 # A name of your own for one device, by its serial number (udevadm info -a -n /dev/video0):
 #SUBSYSTEM=="video4linux", ENV{ID_SERIAL_SHORT}=="0123ABCD", ATTR{index}=="0", SYMLINK+="combtrace-camera"
 #SUBSYSTEM=="tty", ENV{ID_SERIAL_SHORT}=="AB0CDEFG", SYMLINK+="combtrace-pedal"
+"""
+
+SYSCTL = """\
+# Made by `combtrace install-service --print sysctl`; for /etc/sysctl.d/70-combtrace.conf
+
+# Frames of GigE Vision cameras come in bursts of thousands of packets; what a socket cannot hold is lost.
+net.core.rmem_max = 4194304
+net.core.netdev_max_backlog = 5000
 """
 
 
@@ -113,7 +124,10 @@ def unit(executable: Path, config_path: Path, user: str, config: Config | None) 
     written = [] if config is None else written_folders(config)
     used = [executable, config_path, *written, *(() if config is None else _read(config))]
     timeout_s = 0.0 if config is None else config.camera.timeout_s * config.camera.average
+    # Aravis asks the kernel which network cards there are, and for USB devices that come and go.
+    netlink = " AF_NETLINK" if config is not None and isinstance(config.camera, GenicamCamera) else ""
     return UNIT.format(
+        netlink=netlink,
         executable=_quoted(executable),
         config=_quoted(config_path).replace("$", "$$"),
         user=user,
@@ -158,7 +172,11 @@ def _quoted(path: Path) -> str:
 def packaged() -> dict[str, str]:
     """The files for the usual places, by name."""
     usual = unit(Path("/opt/combtrace/bin/combtrace"), Path("/etc/combtrace/config.yaml"), "combtrace", None)
-    return {"systemd/combtrace.service": usual, "udev/70-combtrace.rules": UDEV_RULES}
+    return {
+        "systemd/combtrace.service": usual,
+        "udev/70-combtrace.rules": UDEV_RULES,
+        "sysctl/70-combtrace.conf": SYSCTL,
+    }
 
 
 if __name__ == "__main__":

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from typing import Any, Protocol
 
-from drivers.camera import CameraUnavailable
+from drivers.camera import CameraError, CameraUnavailable
 from drivers.camera.genicam.binding import aravis
 from drivers.camera.genicam.clock import CameraClock
 from drivers.camera.genicam.errors import told
@@ -39,6 +40,8 @@ class Device:
             self.features = Features(self.device, source)
             if self.is_gige and not self.device.is_controller():
                 raise CameraUnavailable(self._taken())
+            with told(source, "stop a stream that a client before left running"):
+                self.camera.stop_acquisition()  # most features are locked while it runs
             self._latch = next((pair for pair in _CLOCKS if all(map(self.features.has, pair))), None)
             self._tick_s = self._seconds_a_tick()
         except BaseException:
@@ -83,8 +86,11 @@ class Device:
             self._questions.close()
         if (features := self.__dict__.get("features")) is not None:
             features.close()  # an error on its way up may hold them, and with them the camera
-        held = [entry.close() for entry in self.streams]
+        held: list[Any] = [entry.close() for entry in self.streams]
         held += [self.__dict__.pop(name, None) for name in ("device", "camera")]
+        if not gone and held[-1] is not None:
+            with contextlib.suppress(CameraError), told(self.source, "stop its stream"):
+                held[-1].stop_acquisition()
         if gone:
             threading.Thread(target=held.clear, name="genicam-let-go", daemon=True).start()
         else:

@@ -23,6 +23,20 @@ LARGEST_SOCKET = Path("/proc/sys/net/core/rmem_max")
 PACKET_WAIT_US, FRAME_WAIT_US = 20_000, 100_000
 
 
+def small_sockets() -> str | None:
+    """What to do where the system lets no socket hold a frame's packets; None where it does."""
+    try:
+        allowed = int(LARGEST_SOCKET.read_text())
+    except (OSError, ValueError):
+        return None
+    if allowed >= SOCKET_BYTES:
+        return None
+    return (
+        f"the system lets a socket hold {allowed} bytes, expected {SOCKET_BYTES}: packets will be lost. As root, run "
+        f"`sysctl -w net.core.rmem_max={SOCKET_BYTES}`; `combtrace install-service --print sysctl` keeps it"
+    )
+
+
 @dataclass(frozen=True)
 class StreamCounts:
     """Since the camera was opened: whole frames, broken ones, those of another format, packets sent again and lost."""
@@ -130,13 +144,5 @@ class Stream:
         properties.socket_buffer_size = SOCKET_BYTES
         properties.packet_timeout = PACKET_WAIT_US
         properties.frame_retention = FRAME_WAIT_US
-        try:
-            allowed = int(LARGEST_SOCKET.read_text())
-        except (OSError, ValueError):
-            return
-        if allowed < SOCKET_BYTES:
-            log.warning(
-                "%s: the system lets a socket hold %d bytes, expected %d: packets will be lost. As root, run "
-                "`sysctl -w net.core.rmem_max=%d`",
-                *(self._device.source, allowed, SOCKET_BYTES, SOCKET_BYTES),
-            )
+        if (trouble := small_sockets()) is not None:
+            log.warning("%s: %s", self._device.source, trouble)

@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 
 UNIT_PATH = Path("etc/systemd/system/combtrace.service")
 RULES_PATH = Path("etc/udev/rules.d/70-combtrace.rules")
+SYSCTL_PATH = Path("etc/sysctl.d/70-combtrace.conf")
 
-HELP = "write, or print, a systemd unit and udev rules for the daemon"
+HELP = "write, or print, a systemd unit, udev rules and kernel settings for the daemon"
 DESCRIPTION = """\
 Write the unit and the rules for this machine, and say what to do next; with
 --print show them only. Nothing is enabled or started.
@@ -27,7 +28,11 @@ Exit status: 0 done, 1 cannot be written, 2 bad configuration."""
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What, where, for whom."""
     parser.add_argument(
-        "--print", nargs="?", const="unit", choices=("unit", "udev"), help="print instead: the unit, or the udev rules"
+        "--print",
+        nargs="?",
+        const="unit",
+        choices=("unit", "udev", "sysctl"),
+        help="print instead: the unit, the udev rules, or the kernel's settings for GigE Vision cameras",
     )
     parser.add_argument(
         "--config",
@@ -44,10 +49,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print, or write."""
-    from service.commissioning.install_files import UDEV_RULES, InstallError, unit, written_folders
+    from service.commissioning.install_files import SYSCTL, UDEV_RULES, InstallError, unit, written_folders
 
-    if args.print == "udev":
-        print(UDEV_RULES, end="")
+    if args.print in ("udev", "sysctl"):
+        print(UDEV_RULES if args.print == "udev" else SYSCTL, end="")
         return EXIT_OK
     config = _config(args.config)
     try:
@@ -57,7 +62,10 @@ def run(args: argparse.Namespace) -> int:
     if args.print == "unit":
         print(text, end="")
         return EXIT_OK
-    for path, content in ((args.root / UNIT_PATH, text), (args.root / RULES_PATH, UDEV_RULES)):
+    files = [(UNIT_PATH, text), (RULES_PATH, UDEV_RULES)]
+    on_genicam = config is not None and config.camera.kind == "genicam"
+    for name, content in [*files, (SYSCTL_PATH, SYSCTL)] if on_genicam else files:
+        path = args.root / name
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(content, encoding="utf-8")
@@ -65,11 +73,15 @@ def run(args: argparse.Namespace) -> int:
             raise UserError(f"{path}: {error.strerror}. Run it with sudo, or with --print", EXIT_FAILED) from error
         print(f"written: {path}")
     folders = [] if config is None else written_folders(config)
-    print(_next_steps(_executable(), args.user, args.config.absolute(), folders))
+    steps = _next_steps(_executable(), args.user, args.config.absolute(), folders)
+    print("\n".join(("next, as root:", *(f"  {step}" for step in [*(_GENICAM if on_genicam else ()), *steps]))))
     return EXIT_OK
 
 
-def _next_steps(executable: Path, user: str, config: Path, folders: list[Path]) -> str:
+_GENICAM = ("apt install gir1.2-aravis-0.8 python3-gi", "sysctl --system")
+
+
+def _next_steps(executable: Path, user: str, config: Path, folders: list[Path]) -> list[str]:
     """What is left to do for a person with root's rights."""
     steps = [f"id {user} || useradd --system --home-dir /var/lib/combtrace --shell /usr/sbin/nologin {user}"]
     steps += [f"install -d -o {user} -g {user} -m 0750 {shlex.quote(str(folder))}" for folder in folders]
@@ -78,7 +90,7 @@ def _next_steps(executable: Path, user: str, config: Path, folders: list[Path]) 
         f"runuser -u {user} -- {shlex.quote(str(executable))} check --config {shlex.quote(str(config))}",
         "systemctl enable --now combtrace",
     ]
-    return "\n".join(("next, as root:", *(f"  {step}" for step in steps)))
+    return steps
 
 
 def _config(path: Path) -> Config | None:

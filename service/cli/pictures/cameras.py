@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
 HELP = "list the cameras of this machine"
 DESCRIPTION = """\
-List the V4L2 cameras of this machine: names that survive replugging, pixel formats
-with sizes and frame rates, controls with their ranges and present values.
-Formats that combtrace cannot read are marked with a minus.
+List the cameras of this machine. V4L2: names that survive replugging, pixel formats
+with sizes and frame rates, controls with their ranges and present values; formats
+that combtrace cannot read are marked with a minus. GenICam (GigE Vision and USB3
+Vision, where Aravis is installed): serial number, user name, address.
 
 Exit status: 0 at least one camera, 1 none that can be read."""
 
@@ -41,8 +42,28 @@ def run(args: argparse.Namespace) -> int:
         nodes = " and ".join(camera.device for camera in group)
         print(f"note: {nodes} belong to one device ({group[0].identity.card}); configure one of them, not both")
     if not found:
-        print("no camera: there is no /dev/video*. Check its cable, and `lsusb`; the kernel's word is in `dmesg`")
-    return EXIT_OK if cameras else EXIT_FAILED
+        print("no V4L2 camera: there is no /dev/video*. Check its cable, and `lsusb`; the kernel's word is in `dmesg`")
+    on_genicam = _print_genicam()
+    return EXIT_OK if cameras or on_genicam else EXIT_FAILED
+
+
+def _print_genicam() -> bool:
+    """True where there is one."""
+    from drivers.camera import CameraRefused
+    from drivers.camera.genicam.listing import list_cameras
+
+    try:
+        found = list_cameras()
+    except CameraRefused as error:
+        print(f"GenICam cameras are not looked for: {error}")
+        return False
+    for one in found:
+        where = f", {one.address}" if one.address else ""
+        print(f"genicam  {one.vendor} {one.model} ({one.protocol}{where})")
+        print(f'  serial: "{one.serial}"' + (f'\n  user_name: "{one.user_name}"' if one.user_name else ""))
+    if not found:
+        print("no GenICam camera answers on any network card or USB port")
+    return bool(found)
 
 
 def _print_camera(camera: CameraInfo, *, brief: bool) -> None:

@@ -17,7 +17,7 @@ from drivers.controller import ControllerError
 from drivers.trigger import TriggerUnavailable
 from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.commissioning.checkup.running import other_user_of_controller
-from service.config.cameras import FilesCamera, V4l2Camera
+from service.config.cameras import FilesCamera, GenicamCamera, V4l2Camera
 from service.config.config import Config
 from service.config.controllers import ModbusRtu
 from service.config.triggers import SerialTrigger
@@ -37,6 +37,8 @@ def check_devices(config: Config, running: int | None) -> Iterator[CheckResult]:
         for part in ("camera", "controller", *("serial" for _ in _serial_triggers(config))):
             yield ok(part, f"in use by the running service (process {running}); its log says how it is")
         return
+    if isinstance(config.camera, GenicamCamera):
+        yield from _network()
     yield _camera(config)
     yield _controller(config)
     for trigger in _serial_triggers(config):
@@ -76,6 +78,15 @@ def _name(look_up: object, number: int) -> str:
 
 
 # --- camera -----------------------------------------------------------------------------------------------------------
+
+
+def _network() -> Iterator[CheckResult]:
+    """What of the kernel's settings loses a GigE Vision camera's packets."""
+    from drivers.camera.genicam.stream import small_sockets
+
+    if (trouble := small_sockets()) is not None:
+        seen, _, next_step = trouble.partition(". ")
+        yield warning("network", seen, next_step)
 
 
 def _camera(config: Config) -> CheckResult:

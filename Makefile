@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page bench-start profile accuracy methods refusals rules soak soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page bench-start profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -73,6 +73,11 @@ rules: install
 # Campaigns under faults and kills, an hour or so on two cores; resumes where it was broken off (SOAK=--fresh: anew).
 soak: install
 	$(BIN)/python -m tests.soak $(SOAK)
+	$(BIN)/python -m tests.soak.gige_run
+
+# Software triggers of a GigE Vision camera on loopback that loses packets and is killed (TRIGGERS=10000), minutes.
+soak-camera: install
+	$(BIN)/python -m tests.soak.gige_run $(if $(TRIGGERS),--triggers $(TRIGGERS))
 
 # One daemon for 20,000 jobs: memory, descriptors, archive (JOBS=3000: fewer, and no report).
 soak-daemon: install

@@ -95,6 +95,12 @@ class GigeCamera:
         self._process.stdin.flush()
         assert self._process.stdout.readline() == "done\n"
 
+    def made(self):
+        """How many frames it has exposed since it was switched on."""
+        self._process.stdin.write("made\n")
+        self._process.stdin.flush()
+        return int(self._process.stdout.readline())
+
     def kill(self):
         """Pull its plug."""
         if self._process is not None:
@@ -205,6 +211,9 @@ def host(args):
             fake.write_register(TRIGGER_SOFTWARE, 1)
         elif word == "width":
             fake.write_register(WIDTH, int(value))
+        elif word.strip() == "made":
+            print(count, flush=True)
+            continue
         else:
             camera.props.gvsp_lost_ratio = float(value)
         print("done", flush=True)

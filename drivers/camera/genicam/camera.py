@@ -50,11 +50,12 @@ class Opened:
 
 @dataclass
 class TriggerCounts:
-    """Since the camera was opened. stale: frames whose stamp lies before their trigger; unasked, missed: edges of the
-    line that came without a job, or whose frame did not come."""
+    """Since the camera was opened. stale: frames whose stamp lies before their trigger; unanswered: triggers whose
+    frame never came; unasked, missed: edges of the line that came without a job, or whose frame did not come."""
 
     good: int = 0
     stale: int = 0
+    unanswered: int = 0
     unasked: int = 0
     missed: int = 0
 
@@ -214,6 +215,7 @@ class GenicamCamera:
             if isinstance(came, str):
                 trouble = came
             elif began_s >= exposed_after_s:
+                self._tell_losses(before, stream.told_counts(), trouble)
                 return came, began_s
         raise self._timed_out(before, stream.told_counts(), timeout_s, trouble)
 
@@ -261,6 +263,18 @@ class GenicamCamera:
         if 0 < missed < 1000:  # numbers of 16 bits begin anew
             self.counts.missed += missed
             log.warning("%s: %d edges of the line have brought no whole frame", self._source, missed)
+
+    def _tell_losses(self, before: StreamCounts, after: StreamCounts, trouble: str) -> None:
+        unanswered = 0 if self._trigger is None else self._trigger.unanswered
+        if not trouble and unanswered == self.counts.unanswered:
+            return
+        first = self.counts.unanswered + before.broken + before.other == 0
+        self.counts.unanswered = unanswered
+        log.warning(
+            "%s: %s; the next one was taken. Since it was opened: %d frames broken, %d never came, %d packets lost%s",
+            *(self._source, trouble or "a frame never came", after.broken + after.other, unanswered),
+            *(after.missing_packets, f". {LOST_PACKETS}" if first else ""),
+        )
 
     def _timed_out(self, before: StreamCounts, after: StreamCounts, timeout_s: float, trouble: str) -> CameraTimeout:
         broken = after.broken - before.broken + after.other - before.other

@@ -18,6 +18,7 @@ class SoftwareTrigger:
         self._latest_at_s = 0.0
         self.first_at_s: float | None = None
         self.owed = 0
+        self.unanswered = 0  # since the camera was opened
 
     def begin(self) -> None:
         """A job begins."""
@@ -27,6 +28,7 @@ class SoftwareTrigger:
         """Trigger, unless a frame is on its way."""
         if not self._due and now_s - self._latest_at_s <= self._patience_s:
             return
+        self.unanswered += not self._due
         self._due, self._latest_at_s = False, now_s
         self.first_at_s = now_s if self.first_at_s is None else self.first_at_s
         self.owed += 1

@@ -1,6 +1,7 @@
 """Bumps and dents of an outline too narrow to be told from a chip that clings to the block, or from cells lost; and
 wider bumps that stand upright on an edge, as a strip of cells does that was cut off, or a printed label; and arms of
-any length and direction that are as narrow as a cable, or as a strip and not pointed.
+any length and direction that are as narrow as a cable, or as a strip and not pointed; and low steps near a corner, as a
+strip of cells makes that lies against it.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ _SPACING, _LONGEST = 0.25, 20.0
 _ARMS = ((1.5, 6.0, 0.0), (5.0, 2.5, 0.9))
 _ARM_END = 1.7
 _PITCH_SAMPLES = 6.0
+# A step: of outlines without what is smaller than this it turns in and out by so much, or the other way around, and
+# goes on as before but for that; so low, and a corner comes so soon behind it.
+_EVEN, _TURN_DEG, _TURNED_DEG, _STEP_HIGH, _STEP_LONG = 0.3, 45.0, 35.0, (0.75, 4.5), 10.0
 # From foot to foot the narrowest is told: a wider one, farther out on the same edge, is no deeper by this.
 _DEEPER = 0.05
 
@@ -58,6 +62,7 @@ def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
     """
     found = [one for ring in contour.rings for one in [_deepest(ring, pitch_px)] if one is not None]
     found += _arms(contour, pitch_px)
+    found += [step for ring in contour.rings for step in _steps(ring, pitch_px)]
     return max(found, key=lambda one: one.depth_pitches) if found else None
 
 
@@ -86,6 +91,38 @@ def _arms(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
             if away[y, x] > long and blunter:
                 place_x, place_y = (first + step * np.array([x, y])).tolist()
                 found.append(NarrowFeature(float(away[y, x]), narrow, (place_x, place_y), True))
+    return found
+
+
+def _steps(ring: Ring, pitch_px: float) -> list[NarrowFeature]:
+    """Low steps out of an edge that end in a corner soon."""
+    even = cv2.approxPolyDP(ring.astype(np.float32)[:, None], _EVEN * pitch_px, True)[:, 0].astype(np.float64)
+    # Either way around; a contour in pixels has the block on its left as seen with y down: it turns left at corners.
+    mirrored = np.stack([-even[::-1, 0], even[::-1, 1]], axis=1)
+    return _steps_along(even, pitch_px) + [
+        replace(step, place_px=(-step.place_px[0], step.place_px[1])) for step in _steps_along(mirrored, pitch_px)
+    ]
+
+
+def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
+    edges = np.roll(corners, -1, axis=0) - corners
+    long, heading = np.hypot(*edges.T) / pitch_px, edges[:, 0] + 1j * edges[:, 1]
+    turn = -np.angle(heading / np.roll(heading, 1))
+    least, turned = np.radians([_TURN_DEG, _TURNED_DEG])
+    after = np.roll(turn, -1)
+    high = long * np.sin(np.abs(after))
+    rises = (turn < -least) & (after > least) & (np.abs(turn + after) < turned)
+    rises &= (high > _STEP_HIGH[0]) & (high < _STEP_HIGH[1])
+    found = []
+    for foot in np.flatnonzero(rises).tolist():
+        top = np.roll(np.arange(len(corners)), -foot - 1)
+        end = int(np.argmax(np.abs(turn[top[1:]]) > least)) + 1
+        # At its foot: slanting sides are as wide as they are long there.
+        sides = [foot, top[end]] if long[top[end]] < _STEP_HIGH[1] else [foot]
+        wide = long[top[:end]].sum() + (long[sides] * np.cos(turn[[top[0], top[end]]][: len(sides)])).sum()
+        if turn[top[end]] > least and wide < _STEP_LONG:
+            x, y = corners[top[0]].tolist()
+            found.append(NarrowFeature(float(high[foot]), float(wide), (x, y), True))
     return found
 
 

@@ -158,6 +158,29 @@ def test_what_is_nowhere_wider_than_a_thread_is_one() -> None:
     assert found(shapely.LineString([(0, 0), (400, 30)]).buffer(0.5 * PITCH)) is not None
 
 
+@pytest.mark.parametrize("turn_deg", [0.0, 50.0, 180.0])
+@pytest.mark.parametrize("slant", [0.0, 1.0])
+@pytest.mark.parametrize(("high", "long"), [(1.5, 5.0), (2.5, 7.0), (4.0, 4.5)])
+@pytest.mark.parametrize("left", [False, True])
+def test_a_low_step_that_ends_in_a_corner_soon_is_a_strip(
+    high: float, long: float, slant: float, left: bool, turn_deg: float
+) -> None:
+    h, w = high * PITCH, long * PITCH
+    strip = shapely.Polygon([(700, 499), (700, 500 + h), (700 - w, 500 + h), (700 - w - slant * h, 499)])
+    if left:
+        strip = shapely.affinity.scale(strip, xfact=-1, origin=(400, 300))
+    one = found(BLOCK | strip, turn_deg)
+    assert one is not None
+    assert one.outwards
+    corner = shapely.affinity.rotate(strip, turn_deg, origin=(BLOCK | strip).envelope.centroid)
+    assert shapely.Point(one.place_px).distance(corner) < 0.5 * PITCH
+
+
+@pytest.mark.parametrize(("high", "long"), [(1.5, 14.0), (5.5, 8.0)])
+def test_a_long_step_and_the_end_of_an_arm_are_the_blocks_own(high: float, long: float) -> None:
+    assert found(BLOCK | shapely.box(700 - long * PITCH, 499, 700, 500 + high * PITCH)) is None
+
+
 def test_curves_are_none() -> None:
     angle = np.linspace(0, 2 * np.pi, 400, endpoint=False)
     for lobes, strength in ((2, 0.15), (3, 0.1), (5, 0.06)):

@@ -77,15 +77,15 @@ def draw_overlay(
     uncertainty_px: float | None = None,
     shown_px: Sequence[Float64s] = (),
     hidden: Sequence[Hidden] = (),
-    part: DrawnPart | None = None,
+    parts: Sequence[DrawnPart] = (),
 ) -> Bytes:
     """The picture as BGR, shape (H + h, W, 3), with the contour and its vertices, below h rows with lines of text.
 
     Exterior green, or red where `refused`, holes blue, vertices yellow (without `marks` none). The first caption line
     is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `shown_px`,
     paths (N, 2) that show why it is refused, lie over all in yellow. Of `hidden` parts bridged ones are
-    dashed, covered ones red and wide; the rest of a refused exterior then is orange. A `part` is drawn in violet, or
-    red where it does not fit, its margin as a veil around it, its tightest place as a line with dots. Raises
+    dashed, covered ones red and wide; the rest of a refused exterior then is orange. `parts` are drawn in violet, or
+    red where one does not fit, margins as veils around them, tightest places as lines with dots. Raises
     PictureError.
     """
     check_picture(picture)
@@ -104,7 +104,7 @@ def draw_overlay(
         if marks and contour_px.point_count <= _MOST_MARKS:
             for ring in contour_px.rings:
                 _mark_vertices(canvas, ring, unit)
-    if part is not None:
+    for part in parts:
         _draw_part(canvas, part, unit)
     for path in shown_px:
         _draw_path(canvas, path, (0, 0, 0), 2 * _line_width(unit) + 2)

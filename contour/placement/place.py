@@ -59,12 +59,8 @@ def best_placement(part: Contour, block: Contour, turns: Turns) -> Placement:
     """The part, as drawn in its own axes, laid into the block's material, mm; a hole of the block may lie in one of
     the part's. Raises ParameterError where one of the two is no contour that could be cut.
     """
-    for name, shape in (("part", part), ("block", block)):
-        defect = contour_defect(shape)
-        if defect:
-            raise ParameterError(f"The {name} cannot be placed: {defect}.")
-        if not all(signed_area(ring) for ring in shape.rings):
-            raise ParameterError(f"The {name} cannot be placed: a ring has no area.")
+    check_can_be_laid("part", part)
+    check_can_be_laid("block", block)
     found, field = candidates(part, block, turns)
     first_move = _FIRST_MOVE_NODES * field.spacing_mm
     lying = _Lying.of(_simpler(part), _simpler(block), field)
@@ -82,6 +78,15 @@ def best_placement(part: Contour, block: Contour, turns: Turns) -> Placement:
         for candidate, placement in rough[:_FINISHED]
     ]
     return max(final, key=lambda placement: placement.margin)
+
+
+def check_can_be_laid(name: str, shape: Contour) -> None:
+    """Raise ParameterError where the shape is no contour that could be cut, or has a ring without area."""
+    defect = contour_defect(shape)
+    if defect:
+        raise ParameterError(f"The {name} cannot be placed: {defect}.")
+    if not all(signed_area(ring) for ring in shape.rings):
+        raise ParameterError(f"The {name} cannot be placed: a ring has no area.")
 
 
 def _simpler(shape: Contour) -> Contour:

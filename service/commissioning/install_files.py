@@ -156,7 +156,7 @@ def _read(config: Config) -> Iterable[Path]:
     if config.page is not None:
         yield from filter(None, (config.page.token_file, config.page.certificate, config.page.key))
     yield from filter(None, (recipe.gcode.template for recipe in config.recipes))
-    yield from (recipe.part.file for recipe in config.recipes if recipe.part is not None)
+    yield from (part.file for recipe in config.recipes for part in recipe.asked_parts)
 
 
 def _quoted(path: Path) -> str:

@@ -145,4 +145,6 @@ def _resolved_recipe(recipe: Recipe, folder: Path) -> Recipe:
         updates["gcode"] = recipe.gcode.model_copy(update={"template": folder / recipe.gcode.template})
     if recipe.part is not None:
         updates["part"] = recipe.part.model_copy(update={"file": folder / recipe.part.file})
+    if recipe.parts:
+        updates["parts"] = tuple(part.model_copy(update={"file": folder / part.file}) for part in recipe.parts)
     return recipe.model_copy(update=updates) if updates else recipe

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from contour.polygon.start_vertex import Start
     from contour.tracing.trace import Method
-    from service.config.recipes import PartToCut
+    from service.config.recipes import OneOfParts, PartToCut
 
 
 @dataclass(frozen=True)
@@ -37,4 +37,7 @@ class PlainRecipe:
     roi_px: tuple[float, ...] = ()
     roi_mm: tuple[float, ...] = ()
     part: PartToCut | None = None
+    parts: tuple[OneOfParts, ...] = ()
+    parts_apart_mm: float = 0.0
+    parts_tries: int = 2
     parameters: dict[str, float] = field(default_factory=dict)

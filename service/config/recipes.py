@@ -8,6 +8,7 @@ from pydantic import Field, field_validator, model_validator
 
 from contour.errors import ParameterError
 from contour.placement.pose import MOST_STEPS, Turns
+from contour.placement.several import MOST_TRIES
 from contour.polygon.start_vertex import Start
 from contour.tracing.trace import Method
 from service.config.plain_recipe import PlainRecipe
@@ -87,6 +88,13 @@ class PartToCut(Model):
         return self
 
 
+class OneOfParts(PartToCut):
+    """One of several parts that are to be cut from the block; as many as fit are laid."""
+
+    quantity: int = Field(1, ge=1, le=200, description="How often it is to be cut.")
+    priority: int = Field(1, ge=1, le=9, description="1 is laid before 2; of one priority, the larger first.")
+
+
 class Recipe(Model):
     """A block type: how it is traced and what is accepted."""
 
@@ -156,6 +164,13 @@ class Recipe(Model):
     )
     gcode: Gcode = Field(Gcode(), description="How G-code moves.")
     part: PartToCut | None = Field(None, description="The part that is to be cut from the block; none = not checked.")
+    parts: tuple[OneOfParts, ...] = Field(
+        (), max_length=50, description="Several parts instead: as many as fit are laid; none = not asked for."
+    )
+    parts_apart_mm: float = Field(0, ge=0, le=1000, description="Least distance between two of these parts, mm.")
+    parts_tries: int = Field(
+        2, ge=1, le=MOST_TRIES, description="Layouts that are tried, each towards another side; the best is taken."
+    )
     parameters: dict[str, Number] = Field(
         default_factory=dict, description="Sizes of the method; left out, they follow from the picture."
     )
@@ -167,6 +182,17 @@ class Recipe(Model):
                 f"binarize is {self.binarize!r}, but wall-tips finds its own threshold; use flat, or another method"
             )
         return self
+
+    @model_validator(mode="after")
+    def _one_part_or_several(self) -> Self:
+        if self.part is not None and self.parts:
+            raise ValueError("part and parts are both given, expected one of them")
+        return self
+
+    @property
+    def asked_parts(self) -> tuple[PartToCut, ...]:
+        """All parts that it names, in their order."""
+        return self.parts if self.part is None else (self.part,)
 
     @model_validator(mode="after")
     def _one_region_of_interest(self) -> Self:
@@ -206,6 +232,7 @@ class Recipe(Model):
             "start": isinstance(self.start, tuple),
             "max_bridged_mm": self.max_bridged_mm,
             "part": self.part is not None,
+            "parts": bool(self.parts),
         }
         return next((key for key, value in meant.items() if value), None)
 

@@ -40,6 +40,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`recipes`", (recipes.Recipe,)),
     ("A recipe's `gcode`", (recipes.Gcode,)),
     ("A recipe's `part`", (recipes.PartToCut,)),
+    ("Each of a recipe's `parts`", (recipes.OneOfParts,)),
     ("`table`", (config.Table,)),
     ("`service`", (config.Service,)),
     ("`journal`", (config.JournalSettings,)),

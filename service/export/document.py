@@ -19,19 +19,19 @@ class ExportError(Exception):
 class ExportDocument:
     """A contour to be exported, machine frame, mm; `thickness_mm` is the height of its plane above the table.
 
-    title: one line that names the picture or job. uncertainty_mm: 95 % bound on its position, None = not known. part:
-    what is to be cut from the block, where it lies in it; None = nothing is laid into it.
+    title: one line that names the picture or job. uncertainty_mm: 95 % bound on its position, None = not known. parts:
+    what is to be cut from the block, where it lies in it.
     """
 
     contour: Contour
     title: str
     thickness_mm: float
     uncertainty_mm: float | None = None
-    part: Contour | None = None
+    parts: tuple[Contour, ...] = ()
 
-    def oriented_part(self) -> Contour | None:
-        """The part's rings, as `oriented` has the block's."""
-        return None if self.part is None else oriented_contour(self.part, counter_clockwise=True)
+    def oriented_parts(self) -> list[Contour]:
+        """The parts' rings, as `oriented` has the block's."""
+        return [oriented_contour(part, counter_clockwise=True) for part in self.parts]
 
     def oriented(self) -> Contour:
         """The rings as everywhere else: exterior counter-clockwise, holes clockwise, first vertex not repeated."""

@@ -22,10 +22,11 @@ def to_dxf(document: ExportDocument) -> bytes:
     drawing.header["$MEASUREMENT"] = 1
     drawing.header.custom_vars.append("combtrace", document.note)
     space = drawing.modelspace()
-    contour, part = document.oriented(), document.oriented_part()
+    contour, parts = document.oriented(), document.oriented_parts()
     layers = [(EXTERIOR, (contour.exterior,)), (HOLES, contour.holes)]
-    if part is not None:
-        layers += [(PART, (part.exterior,)), (PART_HOLES, part.holes)]
+    if parts:
+        holes = tuple(hole for part in parts for hole in part.holes)
+        layers += [(PART, tuple(part.exterior for part in parts)), (PART_HOLES, holes)]
     for layer, rings in layers:
         drawing.layers.add(layer, color=COLOURS[layer])
         for ring in rings:

@@ -59,17 +59,13 @@ def to_gcode(document: ExportDocument, settings: GcodeSettings | None = None) ->
     safe_z_mm = document.thickness_mm + SAFE_ABOVE_MM if settings.safe_z_mm is None else settings.safe_z_mm
     cut_z_mm = safe_z_mm if settings.cut_z_mm is None else settings.cut_z_mm
     _check_heights(document, settings, safe_z_mm, cut_z_mm)
-    part = document.oriented_part()
-    contour = document.oriented() if part is None else part
-    clockwise = settings.direction == "climb"
-    rings = [oriented(ring, counter_clockwise=clockwise) for ring in contour.holes]
-    rings.append(oriented(contour.exterior, counter_clockwise=not clockwise))
+    parts = document.oriented_parts()
     lines: list[str] = []
-    for number, ring in enumerate(rings, 1):
-        name = "exterior" if number == len(rings) else f"hole {number}"
-        name = name if part is None else f"part's {name}"
-        start, lead = _begin(ring, contour, settings.lead_in_mm, name)
-        lines += [f"({name}, {len(ring)} vertices)", *_along(start, lead, settings, safe_z_mm, cut_z_mm)]
+    for count, contour in enumerate(parts or [document.oriented()], 1):
+        whose = "" if not parts else "part's " if len(parts) == 1 else f"part {count}'s "
+        for name, ring in _rings(contour, settings):
+            start, lead = _begin(ring, contour, settings.lead_in_mm, whose + name)
+            lines += [f"({whose}{name}, {len(ring)} vertices)", *_along(start, lead, settings, safe_z_mm, cut_z_mm)]
     words = {
         "note": document.note,
         "moves": "dry run: no height of cut is set" if settings.cut_z_mm is None else f"cuts at Z {cut_z_mm:g}",
@@ -80,6 +76,14 @@ def to_gcode(document: ExportDocument, settings: GcodeSettings | None = None) ->
         "rings": "\n".join(lines),
     }
     return filled(settings.template, words).encode("ascii")
+
+
+def _rings(contour: Contour, settings: GcodeSettings) -> list[tuple[str, Ring]]:
+    """The rings in the order in which they are cut, holes first, each with its name."""
+    clockwise = settings.direction == "climb"
+    holes = [oriented(ring, counter_clockwise=clockwise) for ring in contour.holes]
+    named = [(f"hole {number}", ring) for number, ring in enumerate(holes, 1)]
+    return [*named, ("exterior", oriented(contour.exterior, counter_clockwise=not clockwise))]
 
 
 def filled(template: str, words: dict[str, str]) -> str:

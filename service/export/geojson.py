@@ -12,14 +12,14 @@ from service.export.document import ExportDocument
 def to_geojson(document: ExportDocument) -> bytes:
     """A Feature with one Polygon: rings closed by their first vertex, exterior counter-clockwise, holes clockwise.
 
-    With a part a FeatureCollection of two, the block's and the part's, as their property `role` says.
+    With parts a FeatureCollection, of the block's and each part's, as their property `role` says.
     """
-    block, part = document.oriented(), document.oriented_part()
+    block, parts = document.oriented(), document.oriented_parts()
     feature = _feature(document, block, {"uncertainty_mm": document.uncertainty_mm})
-    if part is not None:
+    if parts:
         feature["properties"]["role"] = "block"
-        both = [feature, _feature(document, part, {"role": "part"})]
-        feature = {"type": "FeatureCollection", "features": both}
+        all_of_them = [feature, *(_feature(document, part, {"role": "part"}) for part in parts)]
+        feature = {"type": "FeatureCollection", "features": all_of_them}
     return (json.dumps(feature, ensure_ascii=False) + "\n").encode()
 
 

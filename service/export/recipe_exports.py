@@ -49,11 +49,11 @@ def _tried(form: str, document: ExportDocument, recipe: Recipe) -> str | None:
 
 
 def document_of(measurement: Measurement, title: str) -> ExportDocument | None:
-    """The contour, and the part in it, to be exported; None of one that was refused, or is in pixels alone."""
-    contour, thickness_mm, part = measurement.millimetres, measurement.thickness_mm, measurement.part
+    """The contour, and the parts in it, to be exported; None of one that was refused, or is in pixels alone."""
+    contour, thickness_mm = measurement.millimetres, measurement.thickness_mm
     if measurement.findings or contour is None or thickness_mm is None:
         return None
-    placed = None if part is None else part.placed
+    placed = tuple(fit.placed for fit in measurement.laid)
     return ExportDocument(contour, title, thickness_mm, measurement.uncertainty_mm, placed)
 
 

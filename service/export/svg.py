@@ -19,9 +19,10 @@ def to_svg(document: ExportDocument) -> bytes:
     width, height = box.max_x + MARGIN_MM - left, box.max_y + MARGIN_MM - bottom
     paths = [f'    <path id="{EXTERIOR}" d="{_path(contour.exterior)}"/>']
     paths += [f'    <path id="{HOLES}-{number}" d="{_path(hole)}"/>' for number, hole in enumerate(contour.holes, 1)]
-    part = document.oriented_part()
-    if part is not None:
-        named = [(PART, part.exterior), *((f"{PART_HOLES}-{k}", hole) for k, hole in enumerate(part.holes, 1))]
+    parts = document.oriented_parts()
+    for number, part in enumerate(parts, 1):
+        of = f"-{number}" if len(parts) > 1 else ""
+        named = [(PART + of, part.exterior), *((f"{PART_HOLES}{of}-{k}", hole) for k, hole in enumerate(part.holes, 1))]
         paths += [f'    <path id="{name}" stroke="magenta" d="{_path(ring)}"/>' for name, ring in named]
     return "\n".join(
         [

@@ -68,14 +68,14 @@ def contour_pages(measurement: Measurement, envelope: Envelope) -> tuple[Page, .
         )
     if envelope.part_capacity is None:
         return pages
-    parts = [_placed(number, fit) for number, fit in measurement.laid]
+    parts = [_placed(fit) for fit in measurement.laid]
     return with_parts(pages, parts, envelope.part_capacity, envelope.word_order)
 
 
-def _placed(number: int, fit: PartFit) -> PlacedPart:
+def _placed(fit: PartFit) -> PlacedPart:
     pose = fit.placement.pose
     return PlacedPart(
-        number=number,
+        number=fit.number,
         x_um=round(pose.x * 1000),
         y_um=round(pose.y * 1000),
         angle_udeg=round(pose.angle_deg * MICRODEGREES),

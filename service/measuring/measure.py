@@ -134,6 +134,9 @@ class Measurer:
         if recipe.part is not None:
             result = self.parts.tried(result, recipe.part, self._calibration)
             watch.lap("part")
+        if recipe.parts:
+            result = self.parts.laid(result, recipe, self._calibration)
+            watch.lap("part")
         doubt = step_doubt(recipe, result.pitch_px)
         if doubt and recipe.number not in self._doubted:
             self._doubted.add(recipe.number)

@@ -29,7 +29,7 @@ class Measurement:
     has a figure for each stage that ran, and "total". shown_px: paths in the picture that show what speaks
     against it, (N, 2) each. edge: cut, cells or mixed, as the picture shows it. evidence: what the contour rests on,
     stretches along its rings; None where nobody says. part: the recipe's part in it; None where the recipe has none,
-    or the contour was refused before it was tried.
+    or the contour was refused before it was tried. parts: those of a recipe with several that lie in it.
     """
 
     method: str
@@ -45,6 +45,7 @@ class Measurement:
     uncertainty: ErrorBudget | None = None
     evidence: tuple[SentStretch, ...] | None = None
     part: PartFit | None = None
+    parts: tuple[PartFit, ...] = ()
     thickness_mm: float | None = None
     aligned: bool = False
     quality: Quality | None = None
@@ -75,9 +76,9 @@ class Measurement:
         return width, height
 
     @property
-    def laid(self) -> tuple[tuple[int, PartFit], ...]:
-        """The parts that lie in it, each with its number in the recipe."""
-        return () if self.part is None else ((1, self.part),)
+    def laid(self) -> tuple[PartFit, ...]:
+        """The part, or the parts, that lie in it."""
+        return self.parts if self.part is None else (self.part,)
 
     @property
     def evidence_fields(self) -> list[dict[str, Any]] | None:
@@ -104,6 +105,7 @@ class Measurement:
             "uncertainty_mm": _rounded(self.uncertainty_mm),
             "thickness_mm": self.thickness_mm,
             **({} if self.part is None else {"part": self.part.summary()}),
+            **({"parts": [part.summary() for part in self.parts]} if self.parts else {}),
             "quality": None if self.quality is None else {k: _rounded(v) for k, v in asdict(self.quality).items()},
             "timings_ms": {name: _rounded(value) for name, value in self.timings_ms.items()},
         }

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from contour.calibration.calibration import Calibration
+from contour.geometry.rings import Contour
 from service.measuring.measurement import Measurement
 from service.reasons import Reason
 
 if TYPE_CHECKING:
-    from service.config.recipes import PartToCut
+    from service.config.recipes import AnyRecipe, PartToCut
     from service.parts.part import Part
 
 
@@ -35,12 +37,43 @@ class PartTrial:
         One that was refused before, or is without millimetres, stays as it is.
         """
         from service.parts.fit import fit_part, in_picture
+
+        begun = self._begun(measured, (asked,), calibration)
+        if isinstance(begun, Measurement):
+            return begun
+        (part,), block, bound_mm, known = begun
+        fit = fit_part(part, block, bound_mm, asked)
+        measured = replace(measured, part=in_picture(fit, known, measured.thickness_mm or 0.0))
+        return measured if fit.finding is None else _refused(measured, fit.finding)
+
+    def laid(self, measured: Measurement, recipe: AnyRecipe, calibration: Calibration | None) -> Measurement:
+        """The same of a recipe with several parts: as many as fit lie in it; refused where none does."""
+        from service.parts.fit import in_picture, lay_parts
+
+        begun = self._begun(measured, recipe.parts, calibration)
+        if isinstance(begun, Measurement):
+            return begun
+        parts, block, bound_mm, known = begun
+        wanted = list(zip(parts, recipe.parts, strict=True))
+        found = lay_parts(wanted, block, bound_mm, recipe.parts_apart_mm, recipe.parts_tries)
+        if not found:
+            names = ", ".join(dict.fromkeys(part.path.name for part in parts))
+            return _refused(
+                measured, f"None of the parts fits: {names}. Lay a larger block, or allow less margin or more turns."
+            )
+        thickness_mm = measured.thickness_mm or 0.0
+        return replace(measured, parts=tuple(in_picture(fit, known, thickness_mm) for fit in found))
+
+    def _begun(
+        self, measured: Measurement, asked: Sequence[PartToCut], calibration: Calibration | None
+    ) -> Measurement | tuple[list[Part], Contour, float, Calibration]:
+        """The parts, the block with its bound, and the calibration; else the measurement as it ends without them."""
         from service.parts.part import PartFileError
 
         if measured.findings or measured.millimetres is None or calibration is None:
             return measured
         try:
-            part = self.part_of(asked)
+            parts = [self.part_of(one) for one in asked]
         except PartFileError as error:
             return _refused(measured, f"The part cannot be read: {error}")
         if measured.uncertainty_mm is None:
@@ -49,9 +82,7 @@ class PartTrial:
                 "Whether the part fits cannot be said, since it is not known how sure the contour is. Use wall-tips, "
                 "and a calibration that knows the scale at the block's height.",
             )
-        fit = fit_part(part, measured.millimetres, measured.uncertainty_mm, asked)
-        measured = replace(measured, part=in_picture(fit, calibration, measured.thickness_mm or 0.0))
-        return measured if fit.finding is None else _refused(measured, fit.finding)
+        return parts, measured.millimetres, measured.uncertainty_mm, calibration
 
 
 def _refused(measured: Measurement, text: str) -> Measurement:

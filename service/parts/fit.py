@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +15,11 @@ from contour.geometry.rings import Contour, densified, perimeter
 from contour.image.overlay import DrawnPart
 from contour.placement.place import Placement, best_placement
 from contour.placement.pose import Pose
+from contour.placement.several import Wanted, lay_several
 from service.parts.part import CHORD_MM, Part
 
 if TYPE_CHECKING:
-    from service.config.recipes import PartToCut
+    from service.config.recipes import OneOfParts, PartToCut
 
 
 _STEP_MM = 5.0
@@ -29,7 +31,8 @@ class PartFit:
     """A part where its least margin to the measured block is largest, millimetres of the machine frame.
 
     placed: its outline there. asked_mm: the margin that the recipe asks for. bound_mm: the 95 % bound on the block's
-    contour. drawn: the same in the picture; None where it is not in view.
+    contour. number: its place among the recipe's parts, from 1. drawn: the same in the picture; None where it is not
+    in view.
     """
 
     part: Part
@@ -38,6 +41,7 @@ class PartFit:
     asked_mm: float
     bound_mm: float
     drawn: DrawnPart | None = None
+    number: int = 1
 
     @property
     def needed_mm(self) -> float:
@@ -110,6 +114,7 @@ class PartFit:
             "tightest_mm": self.placement.tightest,
             "asked_mm": self.asked_mm,
             "bound_mm": self.bound_mm,
+            "number": self.number,
             "millimetres": _rings_kept(self.placed),
             "drawn": None
             if drawn is None
@@ -123,7 +128,12 @@ class PartFit:
         as_drawn = Contour(pose.undone(placed.exterior), tuple(pose.undone(hole) for hole in placed.holes))
         placement = Placement(pose, kept["margin"], _pair(kept["tightest_mm"]))
         fit = cls(
-            Part(Path(kept["path"]), as_drawn, kept["unit"]), placement, placed, kept["asked_mm"], kept["bound_mm"]
+            Part(Path(kept["path"]), as_drawn, kept["unit"]),
+            placement,
+            placed,
+            kept["asked_mm"],
+            kept["bound_mm"],
+            number=kept.get("number", 1),
         )
         drawn = kept["drawn"]
         if drawn is None:
@@ -156,6 +166,23 @@ def fit_part(part: Part, block_mm: Contour, bound_mm: float, asked: PartToCut) -
     """The part in the block, machine frame; `bound_mm` is the 95 % bound on where the block's edge lies."""
     placement = best_placement(part.contour, block_mm, asked.turns)
     return PartFit(part, placement, placement.pose.placed(part.contour), asked.margin_mm, bound_mm)
+
+
+def lay_parts(
+    wanted: Sequence[tuple[Part, OneOfParts]], block_mm: Contour, bound_mm: float, apart_mm: float, tries: int
+) -> tuple[PartFit, ...]:
+    """As many of the parts as can be laid into the block, machine frame, each keeping its margin."""
+    asked = [
+        Wanted(part.contour, one.quantity, one.margin_mm + bound_mm + CHORD_MM, one.priority, one.turns)
+        for part, one in wanted
+    ]
+    found = []
+    # Two parts beside one another each lose their chords.
+    for laid in lay_several(asked, block_mm, apart_mm + 2 * CHORD_MM, tries):
+        part, one = wanted[laid.index]
+        placed = laid.placement.pose.placed(part.contour)
+        found.append(PartFit(part, laid.placement, placed, one.margin_mm, bound_mm, number=laid.index + 1))
+    return tuple(found)
 
 
 def in_picture(fit: PartFit, calibration: Calibration, thickness_mm: float) -> PartFit:

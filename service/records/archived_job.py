@@ -98,6 +98,11 @@ class ArchivedJob:
         found = self.document["measurement"].get("part")
         return None if found is None else PartFit.of_kept(found)
 
+    @property
+    def parts(self) -> tuple[PartFit, ...]:
+        """The parts of a recipe with several that were laid."""
+        return tuple(PartFit.of_kept(found) for found in self.document["measurement"].get("parts", ()))
+
     @cached_property
     def recipe_settings(self) -> dict[str, Any]:
         """The recipe's whole settings."""
@@ -223,6 +228,7 @@ def _measurement(draft: ArchivedJob) -> Measurement:
         uncertainty=None if uncertainty is None else ErrorBudget(**uncertainty),
         evidence=draft.evidence,
         part=draft.part,
+        parts=draft.parts,
         thickness_mm=known["thickness_mm"],
         aligned=known["aligned"],
         quality=None if quality is None else Quality(**quality),

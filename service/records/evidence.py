@@ -133,6 +133,7 @@ def measurement_fields(measurement: Measurement) -> dict[str, Any]:
         "evidence": measurement.evidence_fields,
         **({} if measurement.part is None else {"part": measurement.part.kept()}),
         "shown_px": [np.round(path, 2).tolist() for path in measurement.shown_px],
+        **({"parts": [part.kept() for part in measurement.parts]} if measurement.parts else {}),
         "reasons": [{"code": int(reason), "text": text} for reason, text in measurement.findings],
         "pixels": contour_fields(measurement.pixels),
         "millimetres": contour_fields(measurement.millimetres),

@@ -31,7 +31,7 @@ def overlay(picture: NDArray[np.uint8], measurement: Measurement) -> NDArray[np.
         uncertainty_px=measurement.uncertainty_px,
         shown_px=measurement.shown_px,
         hidden=measurement.hidden,
-        part=None if measurement.part is None else measurement.part.drawn,
+        parts=[fit.drawn for fit in measurement.laid if fit.drawn is not None],
     )
 
 
@@ -66,5 +66,5 @@ def caption(measurement: Measurement) -> list[str]:
         found += f", within {measurement.uncertainty_px:.1f} px"
     part = measurement.part
     if part is None:
-        return [verdict, found]
+        return [verdict, found, *([f"{len(measurement.parts)} parts"] if measurement.parts else [])]
     return [verdict, found, f"{part.part.path.name}: margin {part.margin_mm:.2f} mm, needed {part.needed_mm:.2f} mm"]

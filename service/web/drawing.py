@@ -53,6 +53,7 @@ def drawing(archived: ArchivedJob) -> Drawing:
         shown=[_pairs(path) for path in archived.shown_px] if measured else [],
         band_px=_band_px(measured["uncertainty_mm"] if measured else None, pixels, millimetres),
         part=_part(archived.part) if measured else None,
+        parts=[part for fit in archived.parts if (part := _part(fit)) is not None] if measured else [],
         size_mm=None if millimetres is None else _size(millimetres),
         sentinels=list(backdrop.sentinels),
         grid=backdrop.grid,

@@ -231,6 +231,7 @@ class Drawing(Answer):
     shown: list[Points] = Field(description="Paths that show why it was refused.")
     band_px: float | None = Field(description="What the contour may be off by.")
     part: LaidPart | None
+    parts: list[LaidPart] = Field(description="Those of a recipe with several.")
     size_mm: tuple[float, float] | None
     sentinels: list[SentinelMark]
     grid: Grid | None

@@ -74,12 +74,11 @@ def find_table(config: Config) -> TableRecord | None:
 def read_parts(measurer: Measurer, config: Config) -> None:
     """Have the measurer read the parts of all recipes; raise WiringError where one cannot be used."""
     for recipe in config.recipes:
-        if recipe.part is None:
-            continue
-        try:
-            measurer.parts.part_of(recipe.part)
-        except PartFileError as error:
-            raise WiringError(f"recipe {recipe.number}: part: {error}") from error
+        for asked in recipe.asked_parts:
+            try:
+                measurer.parts.part_of(asked)
+            except PartFileError as error:
+                raise WiringError(f"recipe {recipe.number}: part: {error}") from error
 
 
 def work_area(config: Config) -> NDArray[np.float64] | None:

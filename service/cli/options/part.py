@@ -50,6 +50,8 @@ def with_part(recipe: AnyRecipe, args: argparse.Namespace) -> AnyRecipe:
     from service.config.recipes import PartToCut
 
     given = {key: getattr(args, option) for option, key in _KEYS.items() if getattr(args, option) is not None}
+    if recipe.parts and not given:
+        return recipe
     own: dict[str, Any] = {} if recipe.part is None else recipe.part.model_dump()
     if "file" in given:  # its unit and layer are its own, too
         own = {key: value for key, value in own.items() if key not in ("units", "layer")}
@@ -61,7 +63,7 @@ def with_part(recipe: AnyRecipe, args: argparse.Namespace) -> AnyRecipe:
         raise UserError("part: " + "; ".join(describe(error, PartToCut))) from error
     if isinstance(recipe, PlainRecipe):
         return dataclasses.replace(recipe, part=part)
-    return recipe.model_copy(update={"part": part})
+    return recipe.model_copy(update={"part": part, "parts": ()})
 
 
 def _rotation(text: str) -> str | int:

@@ -26,7 +26,8 @@ HELP = "say whether a part fits into the block in a picture"
 DESCRIPTION = """\
 Trace the block as `combtrace trace` does, and lay the part into it where its least
 margin to edge and holes is largest. It fits where that is the margin asked for and the
-contour's own 95 % bound together. The pose moves the part as drawn, its file's origin
+contour's own 95 % bound together. Of a recipe with several `parts` as many as fit are
+laid. The pose moves the part as drawn, its file's origin
 and axes, into the machine frame: first the turn, counter-clockwise, then the shift.
 
 Exit status: 0 it fits, 3 it does not or the block was refused, 2 unusable input or
@@ -54,14 +55,14 @@ def run(args: argparse.Namespace) -> int:
     if not tracing.measurer.calibrated:
         raise UserError("a part is in millimetres: name the calibration by --calibration or --config")
     tracing = dataclasses.replace(tracing, recipe=with_part(tracing.recipe, args))
-    file = _checked_part(tracing)
+    files = _checked_parts(tracing)
     args.images, args.several = [args.image], False
     exports = Exports()
     if not isinstance(tracing.recipe, PlainRecipe):
         exports = Exports.of(args, tracing.recipe, calibrated=True)
     outputs = [("--json", Path(args.json))] if args.json not in (None, "-") else []
     outputs += [("--overlay", args.overlay)] if args.overlay is not None else []
-    check_outputs([args.image, file], [*outputs, *exports.outputs])
+    check_outputs([args.image, *files], [*outputs, *exports.outputs])
     with text_output(args.json) as write:
         record, line, status = _fitted(args, tracing, exports)
         stream = sys.stderr if args.json == "-" or status == EXIT_UNUSABLE else sys.stdout
@@ -70,17 +71,18 @@ def run(args: argparse.Namespace) -> int:
     return status
 
 
-def _checked_part(tracing: Tracing) -> Path:
-    """The part's file, read before any picture is; raise UserError."""
+def _checked_parts(tracing: Tracing) -> list[Path]:
+    """The parts' files, read before any picture is; raise UserError."""
     from service.parts.part import PartFileError
 
-    part = tracing.recipe.part
-    assert part is not None
+    recipe = tracing.recipe
+    asked = recipe.parts if recipe.part is None else (recipe.part,)
     try:
-        tracing.measurer.parts.part_of(part)
+        for part in asked:
+            tracing.measurer.parts.part_of(part)
     except PartFileError as error:
         raise UserError(str(error)) from error
-    return part.file
+    return [part.file for part in asked]
 
 
 def _fitted(args: argparse.Namespace, tracing: Tracing, exports: Exports) -> tuple[dict[str, Any], str, int]:
@@ -98,7 +100,7 @@ def _fitted(args: argparse.Namespace, tracing: Tracing, exports: Exports) -> tup
         _write_overlay(args.overlay, picture, measurement)
     written = exports.write(args.image, measurement)
     note += f"  [{', '.join(written)}]" if written else ""
-    fits = measurement.part is not None and measurement.part.fits
+    fits = bool(measurement.laid) and not measurement.findings
     told = measurement.part.sentence if fits and measurement.part else sentence(measurement, args.language)
     line = f"{shown(args.image)}: {'fits: ' if fits else ''}{told}{note}"
     return _record(args.image, measurement), line, EXIT_OK if fits else EXIT_REFUSED
@@ -110,6 +112,7 @@ def _record(image: Path, measurement: Measurement | None, status: str = "ok", de
 
     part = None if measurement is None else measurement.part
     told = {**_NOTHING, "part_mm": None, "short_by_mm": None} if part is None else part.fields()
+    told["fits"] = measurement is not None and bool(measurement.laid) and not measurement.findings
     if measurement is None:
         return {"image": shown(image), "status": status, "reasons": [], **told, "details": [detail]}
     return {
@@ -117,10 +120,16 @@ def _record(image: Path, measurement: Measurement | None, status: str = "ok", de
         "status": "refused" if measurement.findings else "ok",
         "reasons": [reason.label for reason in measurement.reasons],
         **told,
+        **({"parts": _parts(measurement)} if measurement.parts else {}),
         "uncertainty_mm": measurement.uncertainty_mm,
         "timings_ms": {name: round(value, 3) for name, value in measurement.timings_ms.items()},
         "details": list(measurement.texts),
     }
+
+
+def _parts(measurement: Measurement) -> list[dict[str, Any]]:
+    """Each of several parts, in the order in which they were laid, with its number in the recipe and its drawing."""
+    return [{"part": fit.number, "file": fit.part.path.name, **fit.fields()} for fit in measurement.parts]
 
 
 def _write_overlay(path: Path, picture: Any, measurement: Measurement) -> None:

@@ -34,6 +34,8 @@ def sentence(measurement: Measurement, language: str) -> str:
         text += f", within {measurement.uncertainty_px:.2f} px"
     if measurement.part is not None:
         text += f", {measurement.part.sentence}"
+    if measurement.parts:
+        text += f", {len(measurement.parts)} parts laid"
     return f"{text}, {measurement.timings_ms['total']:.0f} ms"
 
 
@@ -62,6 +64,7 @@ def record_of(image: Path, measurement: Measurement) -> dict[str, Any]:
         "area_mm2": measurement.area_mm2,
         "uncertainty_mm": measurement.uncertainty_mm,
         **({} if measurement.part is None else {"part": measurement.part.fields()}),
+        **({"parts": [part.fields() for part in measurement.parts]} if measurement.parts else {}),
         "timings_ms": {name: round(value, 3) for name, value in measurement.timings_ms.items()},
         "details": list(measurement.texts),
     }

@@ -118,16 +118,15 @@ def _sizes(config: Config) -> Iterator[CheckResult]:
 
 def _parts(config: Config) -> Iterator[CheckResult]:
     for recipe in config.recipes:
-        if recipe.part is None:
-            continue
-        try:
-            part = PartTrial().part_of(recipe.part)
-        except PartFileError as error:
-            yield fault("parts", f"recipe {recipe.number}: {error}")
-            continue
-        box, holes = bounding_box(part.contour.exterior), len(part.contour.holes)
-        size = f"{box.width:.1f} x {box.height:.1f} mm, {holes} hole{'s' * (holes != 1)}, drawn in {part.unit}"
-        yield ok("parts", f"recipe {recipe.number}: {part.path.name}, {size}")
+        for asked in recipe.asked_parts:
+            try:
+                part = PartTrial().part_of(asked)
+            except PartFileError as error:
+                yield fault("parts", f"recipe {recipe.number}: {error}")
+                continue
+            box, holes = bounding_box(part.contour.exterior), len(part.contour.holes)
+            size = f"{box.width:.1f} x {box.height:.1f} mm, {holes} hole{'s' * (holes != 1)}, drawn in {part.unit}"
+            yield ok("parts", f"recipe {recipe.number}: {part.path.name}, {size}")
 
 
 def _exports(config: Config) -> Iterator[CheckResult]:

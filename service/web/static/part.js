@@ -6,6 +6,7 @@ import { amount, onLanguage, words } from "./words.js";
 const LEAST_MM = 10; // the slider goes that far at least
 
 let part = null;
+let clips = 0; // each part has a clip path of its own
 let set = null; // the part that the slider is set for, as text
 
 /** Show what the part of a job needs; null where it has none. The slider stays while a job is shown anew. */
@@ -35,10 +36,11 @@ export function drawn(part, path, width, height) {
   const rings = [part.exterior, ...part.holes].map(path).join("");
   const [[x, y], [u, v]] = part.tightest;
   // The margin lies around the material, never in it.
+  const clip = `part-outside-${++clips}`;
   const outside = draw("path", { d: `M-1 -1H${width}V${height}H-1Z${rings}`, "clip-rule": "evenodd" });
   return draw("g", { class: part.fits ? "part" : "part short" },
-    draw("clipPath", { id: "part-outside" }, outside),
-    draw("path", { class: "part-margin", d: rings, "stroke-width": veil(part), "clip-path": "url(#part-outside)" }),
+    draw("clipPath", { id: clip }, outside),
+    draw("path", { class: "part-margin", d: rings, "stroke-width": veil(part), "clip-path": `url(#${clip})` }),
     draw("path", { class: "part-under", d: rings }),
     draw("path", { class: "part-outline", d: rings }),
     draw("path", { class: "part-tightest", d: `M${x} ${y}L${u} ${v}` }));

@@ -137,7 +137,7 @@ def test_of_hidden_parts_covered_ones_are_red_and_bridged_ones_dashed() -> None:
 def test_a_part_is_drawn_with_its_margin_and_its_tightest_place(fits: bool, colour: tuple[int, int, int]) -> None:
     outline = Contour(SQUARE * [20, 10] + [400.0, 200.0], (SQUARE[::-1] * 4 + [480.0, 230.0],))
     part = DrawnPart(outline, 12.0, ((400.0, 250.0), (380.0, 250.0)), fits)
-    drawn = draw_overlay(np.full((600, 800), 60, np.uint8), OUTLINE, part=part)
+    drawn = draw_overlay(np.full((600, 800), 60, np.uint8), OUTLINE, parts=(part,))
     assert near(drawn, 500, 200, colour)
     assert near(drawn, 500, 230, colour)
     assert near(drawn, 400, 250, VERTEX, reach=1)

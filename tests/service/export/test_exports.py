@@ -36,7 +36,7 @@ PART = Contour(
     np.array([[30.0, 10.0], [50.0, 10.0], [50.0, 40.0], [30.0, 40.0]]),
     (np.array([[35.0, 20.0], [35.0, 30.0], [45.0, 30.0]]),),
 )
-LAID = replace(DOCUMENT, part=PART)
+LAID = replace(DOCUMENT, parts=(PART,))
 
 
 def rings_of(polygon):

@@ -51,7 +51,7 @@ def cut_rings(program: bytes) -> list[np.ndarray]:
 
 def test_with_a_part_the_tool_goes_around_the_part_alone():
     part = Contour(SQUARE * 0.3 + 5.0, (HOLE * 0.2 + 8.0,))
-    program = to_gcode(replace(DOCUMENT, part=part), replace(CUT, lead_in_mm=1.0))
+    program = to_gcode(replace(DOCUMENT, parts=(part,)), replace(CUT, lead_in_mm=1.0))
     hole, exterior = (shapely.LineString(ring) for ring in cut_rings(program))
     laid = shapely.Polygon(part.exterior, list(part.holes))
     for ring, true in ((hole, laid.interiors[0]), (exterior, laid.exterior)):

@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
+from pydantic import ValidationError
 
 from contour.acceptance.error_budget import ErrorBudget
 from contour.geometry.rings import Contour
 from contour.synthetic import rectangle
-from service.config.recipes import PartToCut
+from service.config.recipes import OneOfParts, PartToCut, Recipe
 from service.measuring.calibration_file import load_record
 from service.measuring.measurement import Measurement
 from service.measuring.part_trial import PartTrial
@@ -105,3 +107,46 @@ def test_the_journal_keeps_where_it_lies(asked: PartToCut) -> None:
     kept = PartTrial().tried(seen(), asked, CALIBRATION).summary()["part"]
     assert kept["fits"] is True
     assert (kept["file"], kept["angle_deg"], kept["margin_mm"]) == ("part.json", 0.0, 10.0)
+
+
+# --- several ----------------------------------------------------------------------------------------------------------
+
+
+def several(asked: PartToCut, **more: Any) -> Recipe:
+    small = OneOfParts(**{**asked.model_dump(), "margin_mm": 2.0, "quantity": 3, **more})
+    return Recipe(number=1, name="several", parts=(small,), parts_apart_mm=4.0)
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> PartToCut:
+    path = tmp_path / "small.json"
+    ring = [[0, 0], [80, 0], [80, 50], [0, 50], [0, 0]]
+    path.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    return PartToCut(file=path, units="mm", rotation="fixed")
+
+
+def test_as_many_parts_as_fit_are_laid_each_with_its_margin_and_apart(small: PartToCut) -> None:
+    measured = PartTrial().laid(seen(), several(small, quantity=9), CALIBRATION)
+    assert measured.findings == ()
+    assert len(measured.parts) == 4
+    room = shapely.Polygon(BLOCK.exterior)
+    shapes = [shapely.Polygon(fit.placed.exterior) for fit in measured.parts]
+    for fit, shape in zip(measured.parts, shapes, strict=True):
+        assert fit.fits
+        assert fit.margin_mm == pytest.approx(shape.distance(room.boundary), abs=1e-9)
+        assert fit.margin_mm >= 2.5
+        assert fit.number == 1
+    assert min(one.distance(two) for k, one in enumerate(shapes) for two in shapes[:k]) >= 4.0
+    assert [PartFit.of_kept(json.loads(json.dumps(fit.kept()))).number for fit in measured.parts] == [1] * 4
+    assert len(measured.summary()["parts"]) == 4
+
+
+def test_a_block_in_which_none_of_several_fits_is_refused_by_their_names(small: PartToCut) -> None:
+    measured = PartTrial().laid(seen(), several(small, margin_mm=60.0), CALIBRATION)
+    assert measured.reasons == (Reason.PART_DOES_NOT_FIT,)
+    assert "None of the parts fits: small.json" in measured.texts[0]
+
+
+def test_a_recipe_has_one_part_or_several(small: PartToCut) -> None:
+    with pytest.raises(ValidationError, match="part and parts are both given"):
+        Recipe.model_validate({**several(small).model_dump(), "part": small})

@@ -169,9 +169,9 @@ class FaultedCell:
         assert seen.measurement.millimetres is not None
         self.exposed[seen.job.job_id] = seen.frame.exposed_at_s
         rings = [ring.tolist() for ring in seen.measurement.millimetres.rings]
-        for number, fit in seen.measurement.laid if self.terms.part_capacity else ():
+        for fit in seen.measurement.laid if self.terms.part_capacity else ():
             pose = fit.placement.pose
-            rings += [[(number, pose.x), (pose.y, pose.angle_deg)], *(ring.tolist() for ring in fit.placed.rings)]
+            rings += [[(fit.number, pose.x), (pose.y, pose.angle_deg)], *(ring.tolist() for ring in fit.placed.rings)]
         self.measured[seen.job.job_id] = micrometres(rings)
 
     def picture(self, _number: int) -> np.ndarray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import gc
+import logging
 import os
 import sys
 import tempfile
@@ -148,6 +149,7 @@ def main() -> int:
     parser.add_argument("--triggers", type=int, default=10_000)
     parser.add_argument("--kill-every", type=int, default=500)
     args = parser.parse_args()
+    logging.getLogger("combtrace.camera").setLevel(logging.ERROR)  # some seven hundred broken frames
     began_s = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="combtrace-gige-") as folder:
         toll = run(Path(folder), args.triggers, args.kill_every)

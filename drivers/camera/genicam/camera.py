@@ -271,7 +271,7 @@ class GenicamCamera:
         first = self.counts.unanswered + before.broken + before.other == 0
         self.counts.unanswered = unanswered
         log.warning(
-            "%s: %s; the next one was taken. Since it was opened: %d frames broken, %d never came, %d packets lost%s",
+            "%s: %s; the next one was taken. Since its opening: %d frames broken, %d never came, %d packets missing%s",
             *(self._source, trouble or "a frame never came", after.broken + after.other, unanswered),
             *(after.missing_packets, f". {LOST_PACKETS}" if first else ""),
         )

@@ -39,7 +39,10 @@ def small_sockets() -> str | None:
 
 @dataclass(frozen=True)
 class StreamCounts:
-    """Since the camera was opened: whole frames, broken ones, those of another format, packets sent again and lost."""
+    """Since the camera was opened: whole frames, broken ones, those of another format, packets sent again and missing.
+
+    Of a broken frame Aravis counts all packets from the first gap on.
+    """
 
     whole: int = 0
     broken: int = 0

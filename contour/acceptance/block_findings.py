@@ -38,7 +38,7 @@ def no_comb(traced: CheckedTrace | None) -> Finding | None:
     if traced is None or traced.trace.comb is None:
         return None
     blur_px = 0.0 if traced.quality is None else traced.quality.blur_px
-    why = unlike_comb(traced.trace.comb, blur_px, cut=traced.trace.edge != "cells")
+    why = unlike_comb(traced.trace.comb, blur_px, cut=traced.trace.edge not in ("cells", "mixed"))
     return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
 
 
@@ -175,7 +175,7 @@ def vague(traced: Trace | None) -> Finding | None:
         return None
     cells = traced.uncertainty_px / traced.pitch_px
     # The edge of material is seen without its cells: there a share of the block tells as well what is gross.
-    gross = _SURE_WITHIN_SHARE * area(traced.contour) ** 0.5 if traced.edge == "cells" else 0.0
+    gross = _SURE_WITHIN_SHARE * area(traced.contour) ** 0.5 if traced.edge in ("cells", "mixed") else 0.0
     if traced.uncertainty_px <= max(_SURE_WITHIN_PITCHES * traced.pitch_px, gross):
         return None
     return Finding(

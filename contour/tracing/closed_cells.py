@@ -7,7 +7,7 @@ through wall ends describes it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -18,7 +18,9 @@ from contour.geometry.rings import Contour, Ring
 from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_sampling import sample_at
 from contour.image.side_by_side import side_by_side
+from contour.tracing.leaking_cells import leaking_cells
 from contour.tracing.table_surface import OUTLIER, table_surface
+from contour.walls.cell_scale import wall_width
 
 _GRID_PX = 4
 # Chips and dust are small against a block; a block smaller than this share of the picture is a chip to this method.
@@ -26,19 +28,32 @@ _LEAST_SHARE = 0.004
 # How far behind the boundary, and before it, its own half level is looked for.
 _REACH_PX = 3.0
 _OUT_PX = 2.0
-# Gaps of a faint wall, in pitches, that do not open a cell, and of a broken one. The mouth of a bay between whole cells
-# is hardly wider: where it is narrower, the bay counts as a cell.
-_GAP_PITCHES, _BROKEN_PITCHES = 0.3, 0.62
+# Gaps of a faint wall, in pitches, that do not open a cell.
+_GAP_PITCHES = 0.3
 _NEARBY_PITCHES = 0.8
 # What the table passes into within two pixels by less than this share of the level is its shadow: edges are sharper.
 _SOFT = 0.2
-# Cells, in squares of the pitch: the least that a faint wall closes, and the most that a broken one opens.
-_LEAST_CELL, _LARGEST_CELL = 0.5, 1.5
+# The least cell that a faint wall closes, in squares of the pitch.
+_LEAST_CELL = 0.5
 # An opening as large as this is a hole, however narrow; broken walls join fewer cells.
 _HOLE = 5.0
 _SIMPLE_PX = 0.25
+# How near to a cut the outline runs along it: what is drawn is off by as much as pixels are, and walls end round.
+_ON_CUT_PX = 2.0
+_NO_CUTS = np.empty((0, 2, 2))
 # Of the width of the edge: half a level off moves the outline by so much.
 _LEAST_BOUND_PX, _BOUND_OF_WIDTH = 0.3, 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """How far each pixel is from the table, (H, W), the level from which it is material, and what is, 1 or 0, cells
+    filled; uint8 all.
+    """
+
+    difference: Bytes
+    level: Bytes
+    region: Bytes
 
 
 @dataclass(frozen=True)
@@ -51,6 +66,7 @@ class MaterialEdge:
     contour: Contour
     bound_px: float
     border: tuple[Ring, ...]
+    apart: Apart = field(compare=False, repr=False)
 
 
 def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge:
@@ -65,14 +81,34 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
     level = _levels(difference, noise, pitch_px)
     apart = _without_soft_shadow(difference, level)
     faint = (walls > 0) & (difference > np.maximum(level // 2, OUTLIER * noise))
-    surely, perhaps = side_by_side(lambda: _region(apart, pitch_px), lambda: _region(apart | faint, pitch_px))
+    wall_px = wall_width(walls)
+    surely, perhaps = side_by_side(
+        lambda: _region(apart, pitch_px, wall_px), lambda: _region(apart | faint, pitch_px, wall_px)
+    )
     region = _with_faint_cells(surely, perhaps, pitch_px)
+    return _outlined(Apart(difference, level, region))
+
+
+def closed_along(material: MaterialEdge, cuts: Float64s, pitch_px: float) -> MaterialEdge:
+    """The outline around material with the cells filled that straight cuts opened: it follows the cuts there.
+
+    `cuts`: where each begins and ends, (N, 2, 2), pixels.
+    """
+    region = material.apart.region.copy()
+    for cut in cuts:
+        start, end = (tuple(np.rint(place).astype(int).tolist()) for place in cut)
+        cv2.line(region, start, end, 1)
+    return _outlined(replace(material.apart, region=_filled(region, pitch_px)), cuts)
+
+
+def _outlined(apart: Apart, cuts: Float64s = _NO_CUTS) -> MaterialEdge:
+    region, difference, level = apart.region, apart.difference, apart.level
     border, _ = cv2.findContours(region, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     # Threads a pixel wide would cross themselves once they are moved.
     body = cv2.morphologyEx(region, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
     chains, hierarchy = cv2.findContours(body, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     found = [
-        (*_sub_pixel(difference, level, chain[:, 0, :].astype(np.float64)), bool(node[3] >= 0))
+        (*_sub_pixel(difference, level, chain[:, 0, :].astype(np.float64), cuts), bool(node[3] >= 0))
         for chain, node in zip(chains, hierarchy[0], strict=True)
         if len(chain) >= 8
     ]
@@ -81,7 +117,8 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
     widths = np.concatenate([widths, *(wide for _, wide in holes)])
     contour = Contour(_turned(exterior, -1.0), tuple(ring for ring, _ in holes))
     bound_px = _LEAST_BOUND_PX + _BOUND_OF_WIDTH * float(np.quantile(widths, 0.95))
-    return MaterialEdge(contour, bound_px, tuple(ring[:, 0].astype(np.float64) for ring in border if len(ring) >= 8))
+    outermost = tuple(ring[:, 0].astype(np.float64) for ring in border if len(ring) >= 8)
+    return MaterialEdge(contour, bound_px, outermost, apart)
 
 
 def _with_faint_cells(surely: Bytes, perhaps: Bytes, pitch_px: float) -> Bytes:
@@ -149,7 +186,7 @@ def _without_soft_shadow(difference: Bytes, level: Bytes) -> Bools:
     return np.asarray(apart & ~of_table[labels])
 
 
-def _region(apart: Bools, pitch_px: float) -> Bytes:
+def _region(apart: Bools, pitch_px: float, wall_px: float) -> Bytes:
     """The largest piece with its cells filled; inner openings in which a disc of 1.1 pitches' radius fits stay open."""
     material = _closed(apart.astype(np.uint8), _GAP_PITCHES * pitch_px)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(material, connectivity=8)
@@ -163,7 +200,14 @@ def _region(apart: Bools, pitch_px: float) -> Bytes:
     # Of the piece alone: specks of a table lie as close as walls, and enclose as much.
     margin = round(pitch_px)
     around = cv2.copyMakeBorder(piece, margin, margin, margin, margin, cv2.BORDER_CONSTANT, value=0)
-    piece |= _leaking_cells(around, pitch_px)[margin:-margin, margin:-margin]
+    piece |= leaking_cells(around, pitch_px, wall_px)[margin:-margin, margin:-margin]
+    return _filled(piece, pitch_px)
+
+
+def _filled(piece: Bytes, pitch_px: float) -> Bytes:
+    """A piece with its cells filled, but for openings in which a disc of 1.1 pitches' radius fits, or as large as
+    five cells.
+    """
     padded = cv2.copyMakeBorder(piece, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
     _, inner, stats, _ = cv2.connectedComponentsWithStats(1 - padded, connectivity=4)
     room = cv2.distanceTransform(1 - padded, cv2.DIST_L2, 5)
@@ -181,36 +225,10 @@ def _closed(material: Bytes, gap: float) -> Bytes:
     return np.asarray(cv2.morphologyEx(wide, cv2.MORPH_CLOSE, disc)[size:-size, size:-size], np.uint8)
 
 
-def _leaking_cells(material: Bytes, pitch_px: float) -> Bytes:
-    """Cells that only a broken or faint wall opens to the table, up to the line across the gap.
-
-    Where walls are grown by half a gap, such cells lie apart from the table; what is nearer to a cell's rest than to
-    the table's is the cell.
-    """
-    # Around the material lies the table: farther off there is no cell, and none nearer to it.
-    left, top, wide, high = cv2.boundingRect(material)
-    margin = round(pitch_px)
-    about = (slice(max(top - margin, 0), top + high + margin), slice(max(left - margin, 0), left + wide + margin))
-    free = 1 - material[about]
-    leaking = np.zeros_like(material)
-    away = cv2.distanceTransform(free, cv2.DIST_L2, 5)
-    seeds = (away > 0.5 * _BROKEN_PITCHES * pitch_px).astype(np.uint8)
-    # As the labels below hang together: a cell that touches the table's seeds by a corner would make all of it a cell.
-    labels, area = pieces_and_areas(seeds, 8)
-    cell = area < _LARGEST_CELL * pitch_px * pitch_px
-    cell[0] = False
-    if not cell.any():
-        return leaking
-    _, nearest = cv2.distanceTransformWithLabels(1 - seeds, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
-    of_cell = np.zeros(int(nearest.max()) + 1, np.uint8)
-    of_cell[nearest[cell[labels]]] = 1
-    leaking[about] = of_cell[nearest] & free
-    return leaking
-
-
-def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s) -> tuple[Ring, Float64s]:
-    """The chain moved to half of the material's own difference behind it, simplified to a quarter of a pixel; and how
-    wide the edge is at each point of the chain, pixels: what material differs by over the steepest fall.
+def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s, cuts: Float64s) -> tuple[Ring, Float64s]:
+    """The chain moved to half of the material's own difference behind it, along `cuts` onto them, simplified to a
+    quarter of a pixel; and how wide the edge is at each point of the chain, pixels: what material differs by over the
+    steepest fall.
     """
     smooth = _cyclic_mean(chain, 2)
     tangent = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
@@ -228,12 +246,30 @@ def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s) -> tuple[Ring,
     high, low = values[rows, index], values[rows, index + 1]
     part = (high - level[:, 0]) / np.maximum(high - low, 1e-6)
     shift = np.where(falls.any(axis=1), along[index] + 0.25 * part, 0.5)
-    moved = smooth + shift[:, None] * normal
-    steepest = (values[:, :-4] - values[:, 4:]).max(axis=1)
-    behind = chain.astype(np.intp)
+    # Over an opened cell there is no edge to be seen.
+    feet, on_cut = _on_cuts(smooth, cuts)
+    moved, seen = np.where(on_cut[:, None], feet, smooth + shift[:, None] * normal), ~on_cut
+    steepest = (values[seen, :-4] - values[seen, 4:]).max(axis=1)
+    behind = chain[seen].astype(np.intp)
     widths = 2.0 * levels[behind[:, 1], behind[:, 0]] / np.maximum(steepest, 1.0)
+    # One run along a cut is straight from its first point to its last.
+    moved = moved[seen | np.roll(seen, 1) | np.roll(seen, -1)]
     simple = cv2.approxPolyDP(moved.astype(np.float32)[:, None, :], _SIMPLE_PX, True)[:, 0, :]
     return np.asarray(simple, np.float64), widths
+
+
+def _on_cuts(points: Float64s, cuts: Float64s) -> tuple[Float64s, Bools]:
+    """The points, those near a cut moved straight onto it, and which these are."""
+    near = np.zeros(len(points), np.bool_)
+    for start, end in cuts:
+        length = float(np.hypot(*(end - start)))
+        along = (end - start) / length
+        place = (points - start) @ along
+        foot = start + place[:, None] * along
+        nearby = (np.hypot(*(points - foot).T) < _ON_CUT_PX) & (place > 0) & (place < length)
+        points = np.where(nearby[:, None], foot, points)
+        near |= nearby
+    return points, near
 
 
 def _cyclic_mean(points: Float64s, half: int) -> Float64s:

@@ -6,14 +6,14 @@ import cv2
 import numpy as np
 
 from contour.errors import EdgeContradicted
-from contour.geometry.arrays import Float64s
+from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import nearest
 from contour.tracing.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
 from contour.walls.wall_ends import ring_tips
-from contour.walls.wall_evidence import BlockEvidence, WitnessKind
+from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 
 # Along a cut edge a wall ends every pitch or so, on an edge that follows a row of cells none for a while.
 _FAR_PITCHES = 4.0
@@ -39,23 +39,28 @@ def edge_kind(material: MaterialEdge, seen: BlockEvidence) -> Edge:
     """What a border with few ends is, by those that the edge of material shows as well: cut, where they lie on several
     sides of the block, mixed, where they lie on one, cells, where there are none.
     """
-    tips = np.concatenate([ring_tips(ring, seen.pitch_px, seen.wall_px) for ring in material.border])
-    sure = [
-        ring.position[(ring.kind <= WitnessKind.BLUNT) & (nearest(ring.points, tips) < _SAME_PITCHES * seen.pitch_px)]
-        for ring in seen.rings
-    ]
+    sure = [ring.position[sure_ends(material, ring, seen)] for ring in seen.rings]
     if sum(len(ends) for ends in sure) < _FEWEST_ENDS:
         return "cells"
     gaps = _gaps(seen, sure[0])
     return "mixed" if gaps.max() > _LONGEST_WITHOUT_ENDS * gaps.sum() else "cut"
 
 
-def check_promise(promise: str, kind: Edge) -> None:
-    """Raise EdgeContradicted where a border is not of the kind that was promised, and where it is mixed."""
-    if kind == "mixed":
+def sure_ends(material: MaterialEdge, ring: RingEvidence, seen: BlockEvidence) -> Bools:
+    """Which witnesses of a ring are ends of walls at the edge of material, too, shape (N,)."""
+    tips = np.concatenate([ring_tips(one, seen.pitch_px, seen.wall_px) for one in material.border])
+    return (ring.kind <= WitnessKind.BLUNT) & (nearest(ring.points, tips) < _SAME_PITCHES * seen.pitch_px)
+
+
+def check_promise(promise: str, kind: Edge, *, traced: bool) -> None:
+    """Raise EdgeContradicted where a border is not of the kind that was promised, and where it is of both kinds and was
+    not `traced`.
+    """
+    if kind == "mixed" and not (traced and promise == "auto"):
         raise EdgeContradicted(
             "the border closes its cells along most of its length, but walls end along a part of it: it was cut there. "
-            "A border of both kinds is not traced: cut the block all around, or give edge: cells if nothing was cut",
+            "Such a border is traced by edge: auto, where it was cut along straight lines from corner to corner: cut "
+            "the block straight or all around, or give edge: cells if nothing was cut",
             kind,
         )
     if promise == "cut" and kind == "cells":

@@ -16,6 +16,7 @@ from contour.geometry.rings import Contour
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import MaterialEdge, material_edge
+from contour.tracing.cut_lines import with_cuts
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, few_ends
 from contour.tracing.evidence_check import check_against_evidence
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
@@ -58,9 +59,9 @@ def wall_tips(
         closed, kind = _if_closed(picture, light, settings, on_stage, seen)
         # Where something hides the border no walls end either.
         if kind != "mixed" or not doubtful(seen.rings[0], look).any():
-            check_promise(settings.edge, kind)
-        if closed is not None:
-            return closed
+            check_promise(settings.edge, kind, traced=closed is not None)
+            if closed is not None:
+                return closed
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
     try:
@@ -170,8 +171,8 @@ def _trace(seen: BlockEvidence, contour: Contour, light: Bytes, *, uncertainty_p
 def _if_closed(
     picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage, seen: BlockEvidence
 ) -> tuple[Trace | None, Edge]:
-    """The boundary of a block with closed border cells, None where some were cut or nothing tells it from the table;
-    and which kind of border it is.
+    """The boundary of a block with closed border cells, some of them opened by straight cuts; None where it was cut
+    otherwise or nothing tells it from the table. And which kind of border it is.
     """
     cells, walls = _cells_and_walls(light, settings)
     try:
@@ -179,9 +180,10 @@ def _if_closed(
     except NoBlockFound:
         return None, "cut"
     kind = edge_kind(material, seen)
-    if kind != "cells":
+    found = {"cells": material, "mixed": with_cuts(material, seen) if kind == "mixed" else None, "cut": None}[kind]
+    if found is None:
         return None, kind
-    return replace(_around(material, light, cells, walls, on_stage), comb=cells.comb), kind
+    return replace(_around(found, light, cells, walls, on_stage), comb=cells.comb, edge=kind), kind
 
 
 def _closed_cells(picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage) -> Trace:

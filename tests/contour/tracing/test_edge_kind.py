@@ -58,8 +58,28 @@ def test_a_promise_that_the_picture_contradicts_is_refused(promise: Literal["cut
     assert refused.value.edge == {"closed": "cells", "cut": "cut"}[border]
 
 
-@pytest.mark.parametrize("cells", ["hexagonal", "square"])
-def test_closed_cells_that_were_cut_along_a_line_are_not_traced_as_one_or_the_other(cells: Cells) -> None:
+@pytest.mark.parametrize("cells", ["hexagonal", "square", "over-expanded", "flex"])
+def test_closed_cells_that_were_cut_along_a_line_are_traced_stretch_by_stretch(cells: Cells) -> None:
+    one = drawn(cells, "mixed")
+    found = traced(one)
+    assert found.edge == "mixed"
+    near = agreement(found.contour, one.outline)
+    assert near.mean_px < 0.7
+    assert near.hausdorff_px < 0.3 * one.pitch_px
+    assert found.uncertainty_px is not None
+    assert near.holds(found.uncertainty_px)
+
+
+def test_a_border_of_both_kinds_does_not_hold_the_promise_that_it_was_cut() -> None:
+    with pytest.raises(EdgeContradicted, match="was cut there"):
+        traced(drawn("hexagonal", "mixed"), "cut")
+
+
+def test_closed_cells_that_were_cut_along_a_curve_are_refused() -> None:
+    one = drawn("hexagonal", "closed")
+    y, x = np.mgrid[: one.picture.shape[0], : one.picture.shape[1]]
+    middle, corner = one.outline.exterior.mean(axis=0), one.outline.exterior.max(axis=0)
+    away = np.hypot(x - corner[0], y - middle[1]) < 0.7 * (corner - middle)[0]
     with pytest.raises(EdgeContradicted, match="was cut there") as refused:
-        traced(drawn(cells, "mixed"))
+        wall_tips(np.where(away, one.picture[0, 0], one.picture), TraceSettings())
     assert refused.value.edge == "mixed"

@@ -1,0 +1,112 @@
+"""Straight cuts through a border that closes its cells elsewhere: where ends of walls lie in a row, from the first
+thing that touches their line to the last.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.geometry.arrays import Bools, Float64s
+from contour.geometry.rings import densified
+from contour.geometry.segments import BoxTree, distances_to_tree
+from contour.tracing.closed_cells import MaterialEdge, closed_along
+from contour.tracing.edge_kind import sure_ends
+from contour.walls.wall_evidence import BlockEvidence
+
+# Ends of walls and corners of cells lie within this of the line they were cut along, and nothing stands out of it.
+_NEAR_PX, _NEAR_PITCHES = 1.2, 0.04
+# Pixels of a wall's end, which blur rounds, lie inside of it.
+_OUT_PX, _ROUND_PX = 1.0, 1.0
+# Over an opened cell nothing touches the line for as long: over-expanded ones are 1.45 pitches wide.
+_OPEN_PITCHES = 2.0
+# A line through two ends is always found; through three only along a cut.
+_FEWEST_ENDS, _FEWEST_MORE = 2, 3
+_LEAST_APART_PITCHES = 0.5
+_FITS = 3
+# Ends that are left lie at the corners.
+_LEFT_PX = 3.0
+
+
+def with_cuts(material: MaterialEdge, seen: BlockEvidence) -> MaterialEdge | None:
+    """The outline around material along straight cuts where these opened its cells; None where ends of walls lie on no
+    such cut, or beyond its last corner.
+    """
+    ring = seen.rings[0]
+    sure = sure_ends(material, ring, seen)
+    cuts = _cuts(material, ring.points[sure], ring.normal[sure], seen.pitch_px)
+    if not len(cuts):
+        return None
+    closed = closed_along(material, cuts, seen.pitch_px)
+    left = ring.points[sure_ends(closed, ring, seen)]
+    off = distances_to_tree(left, BoxTree.of_segments(cuts[:, 0], cuts[:, 1])) if len(left) else np.empty(0)
+    return None if (off > _LEFT_PX).any() else closed
+
+
+def _cuts(material: MaterialEdge, ends: Float64s, normals: Float64s, pitch_px: float) -> Float64s:
+    """Straight cuts that `ends` of walls, (N, 2), pixels, lie on, from corner to corner of the material, (K, 2, 2),
+    most ends first.
+
+    normals: unit vectors outwards at each end, (N, 2). A line that material stands out of is no cut.
+    """
+    border = np.concatenate([densified(ring, 0.5) for ring in material.border])
+    near = _NEAR_PX + _NEAR_PITCHES * pitch_px
+    cuts: list[Float64s] = []
+    while len(ends) >= (_FEWEST_MORE if cuts else _FEWEST_ENDS):
+        line = _line(ends, normals, near, _LEAST_APART_PITCHES * pitch_px)
+        if line is None or line.on_it.sum() < (_FEWEST_MORE if cuts else _FEWEST_ENDS):
+            break
+        cut = _from_corner_to_corner(border, ends, line, near, _OPEN_PITCHES * pitch_px)
+        if cut is None:
+            break
+        cuts.append(cut)
+        ends, normals = ends[~line.on_it], normals[~line.on_it]
+    return np.array(cuts).reshape(-1, 2, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A point of a line, the unit vectors along it and out of the material, (2,) each, and which ends lie on it."""
+
+    middle: Float64s
+    along: Float64s
+    out: Float64s
+    on_it: Bools
+
+
+def _line(ends: Float64s, normals: Float64s, near: float, apart: float) -> _Line | None:
+    """The line that most ends lie on, of all through two that are `apart` pixels apart."""
+    one, other = np.triu_indices(len(ends), 1)
+    step = ends[other] - ends[one]
+    far = np.hypot(step[:, 0], step[:, 1]) > apart
+    if not far.any():
+        return None
+    one, step = one[far], step[far] / np.hypot(step[far, 0], step[far, 1])[:, None]
+    across = np.stack([-step[:, 1], step[:, 0]], axis=1)
+    off = ends @ across.T - (ends[one] * across).sum(axis=1)
+    on_it = np.abs(off[:, np.argmax((np.abs(off) < near).sum(axis=0))]) < near
+    for _ in range(_FITS):
+        middle = ends[on_it].mean(axis=0)
+        along = np.linalg.svd(ends[on_it] - middle)[2][0]
+        out = np.array([-along[1], along[0]])
+        again = np.abs((ends - middle) @ out) < near
+        if np.count_nonzero(again) < _FEWEST_ENDS:
+            break
+        on_it = again
+    outwards = 1.0 if out @ normals[on_it].sum(axis=0) > 0 else -1.0
+    return _Line(middle, along, outwards * out, on_it)
+
+
+def _from_corner_to_corner(border: Float64s, ends: Float64s, line: _Line, near: float, gap: float) -> Float64s | None:
+    """Where the border, (M, 2), touches the line first and last without `gap` pixels between, (2, 2); None where its
+    ends are not among that, or material stands out of the line there.
+    """
+    place, off = (border - line.middle) @ line.along, (border - line.middle) @ line.out
+    touching = np.sort(place[(off < near) & (off > -near - _ROUND_PX)])
+    own = (ends[line.on_it] - line.middle) @ line.along
+    runs = np.split(touching, np.flatnonzero(np.diff(touching) > gap) + 1)
+    run = next((run for run in runs if len(run) and run[0] < own.min() + gap and run[-1] > own.max() - gap), None)
+    if run is None or (off[(place > run[0]) & (place < run[-1])] > near + _OUT_PX).any():
+        return None
+    return np.array([line.middle + run[0] * line.along, line.middle + run[-1] * line.along])

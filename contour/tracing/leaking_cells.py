@@ -1,0 +1,73 @@
+"""Border cells that a broken wall opens to the table, told from cells cut open and from bays between cells."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from contour.geometry.arrays import Bytes
+from contour.geometry.rings import signed_area
+from contour.walls.wall_ends import ring_tips
+
+# Gaps of a broken wall, in pitches. The mouth of a bay between whole cells is hardly wider.
+_BROKEN_PITCHES = 0.62
+# The most that a broken wall opens, in squares of the pitch.
+_LARGEST_CELL = 1.5
+# So many of them side by side were cut open.
+_FEWEST_CUT, _ROW_PITCHES = 3, 3.0
+# How near to its mouth a broken wall ends.
+_AT_MOUTH_PITCHES = 0.25
+
+
+def leaking_cells(material: Bytes, pitch_px: float, wall_px: float) -> Bytes:
+    """Cells that only a broken or faint wall opens to the table, up to the line across the gap.
+
+    Where walls are grown by half a gap, such cells lie apart from the table; what is nearer to a cell's rest than to
+    the table's is the cell. Three side by side were cut open, and where no wall ends at the gap it is the mouth
+    of a bay between whole cells.
+    """
+    # Around the material lies the table: farther off there is no cell, and none nearer to it.
+    left, top, wide, high = cv2.boundingRect(material)
+    margin = round(pitch_px)
+    about = (slice(max(top - margin, 0), top + high + margin), slice(max(left - margin, 0), left + wide + margin))
+    leaking = np.zeros_like(material)
+    leaking[about] = _leaking(material[about], pitch_px, wall_px)
+    return leaking
+
+
+def _leaking(material: Bytes, pitch_px: float, wall_px: float) -> Bytes:
+    """The same, where table lies all around the material."""
+    none = np.zeros_like(material)
+    away = cv2.distanceTransform(1 - material, cv2.DIST_L2, 5)
+    seeds = (away > 0.5 * _BROKEN_PITCHES * pitch_px).astype(np.uint8)
+    # As the labels below hang together: a cell that touches the table's seeds by a corner would make all of it a cell.
+    _, labels, stats, middles = cv2.connectedComponentsWithStats(seeds, connectivity=8)
+    _, inner = cv2.connectedComponents(1 - material, connectivity=4)
+    leaking = np.zeros(len(stats), np.bool_)
+    leaking[labels[(inner == inner[0, 0]) & (seeds > 0)]] = True
+    leaking &= stats[:, cv2.CC_STAT_AREA] < _LARGEST_CELL * pitch_px * pitch_px
+    leaking[0] = False
+    found = np.flatnonzero(leaking)
+    apart = np.hypot(*(middles[found, None] - middles[found]).T)
+    found = found[(apart < _ROW_PITCHES * pitch_px).sum(axis=1) < _FEWEST_CUT]
+    if not len(found):
+        return none
+    _, nearest = cv2.distanceTransformWithLabels(1 - seeds, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
+    nearest = np.where(material > 0, 0, nearest)
+    for number in found:
+        cell = (nearest == nearest[labels == number][0]).astype(np.uint8)
+        if _wall_ends_at(material, cell, pitch_px, wall_px):
+            none |= cell
+    return none
+
+
+def _wall_ends_at(material: Bytes, cell: Bytes, pitch_px: float, wall_px: float) -> bool:
+    """Whether a wall ends at the mouth of an open cell."""
+    mouth = np.asarray(cv2.dilate(cell, np.ones((3, 3), np.uint8)), np.uint8) & (1 - cell) & (1 - material)
+    away = cv2.distanceTransform(1 - mouth, cv2.DIST_L2, 5)
+    rings, _ = cv2.findContours(material, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    largest = max(rings, key=len)[:, 0].astype(np.float64)
+    ends = np.rint(ring_tips(largest if signed_area(largest) < 0 else largest[::-1].copy(), pitch_px, wall_px)).astype(
+        int
+    )
+    return bool((away[ends[:, 1], ends[:, 0]] < _AT_MOUTH_PITCHES * pitch_px).any())

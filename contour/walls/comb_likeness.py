@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices, Int32s, median
+from contour.geometry.arrays import Bools, Float64s, Indices, Int32s, median
 
 # Walls of fine cells look wide; from this pitch on they look as wide as they are.
 _FINE_PITCH_PX = 15.0
@@ -33,8 +33,8 @@ _SAMPLED = 64
 # Six neighbours of a honeycomb's cell are 1 pitch away, of an over-expanded one 0.8 to 1.2, the next ones 1.5.
 _NEIGHBOUR_PITCHES = (0.75, 1.35)
 _NEIGHBOURS = 4
-# Of a triangle's, three lie 0.82 pitches away, and the next six 1.41.
-_NEXT_TRIANGLES = (1.1, 1.6)
+# Distances that are one differ by less than this factor, of a triangle's three neighbours, and of the next six.
+_TRIANGLES, _EVEN = 9, 1.35
 
 
 @dataclass(frozen=True)
@@ -112,8 +112,19 @@ def lattice_order(places: Float64s, pitch_px: float) -> float:
         return np.asarray(((square > low**2) & (square < high**2)).sum(axis=1), np.intp)
 
     around = between(*_NEIGHBOUR_PITCHES) >= _NEIGHBOURS
-    triangles = (between(0.0, _NEXT_TRIANGLES[0]) == 3) & (between(*_NEXT_TRIANGLES) >= _NEIGHBOURS)
-    return float(max(np.mean(around), np.mean(triangles)))
+    return float(max(np.mean(around), np.mean(_among_triangles(square))))
+
+
+def _among_triangles(square: Float64s) -> Bools:
+    """Which cells have three neighbours at one distance and the next six at √3 of it, whatever their pitch looks like:
+    squared distances to all cells, themselves too, (N, M).
+    """
+    if square.shape[1] < 1 + _TRIANGLES:
+        return np.zeros(len(square), np.bool_)
+    ordered = np.sqrt(np.sort(np.partition(square, _TRIANGLES, axis=1)[:, 1 : 1 + _TRIANGLES], axis=1))
+    near, far = ordered[:, :3], ordered[:, 3:]
+    even = (near[:, -1] < _EVEN * near[:, 0]) & (far[:, -1] < _EVEN * far[:, 0])
+    return np.asarray(even & (far[:, 0] > _EVEN * near[:, -1]))
 
 
 def solidity(labels: Int32s, numbers: Indices, stats: Int32s) -> float:

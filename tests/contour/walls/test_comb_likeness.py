@@ -124,6 +124,14 @@ def test_a_honeycombs_inner_cells_have_neighbours_all_around() -> None:
     assert lattice_order(places, 20.0) > np.mean(inner)
 
 
+def test_triangles_have_neighbours_all_around_whatever_their_pitch_looks_like() -> None:
+    # Triangles with their points up, and between them such with their points down, a third of the height higher.
+    up = np.array([(30.0 * (column + row / 2), 26.0 * row) for row in range(12) for column in range(12)])
+    places = np.concatenate((up, np.add(up, [15.0, 8.66])))
+    for pitch in (13.0, 21.0, 30.0):
+        assert lattice_order(places, pitch) > 0.6
+
+
 def test_things_strewn_at_random_have_no_order() -> None:
     places = np.random.default_rng(3).uniform(0.0, 240.0, (100, 2))
     assert lattice_order(places, 15.0) < 0.15  # patches that fill a third of their place

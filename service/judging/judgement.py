@@ -20,7 +20,8 @@ from service.reasons import Reason
 class Judgement:
     """What became of one picture; its status by the words of `combtrace trace --json`.
 
-    agreement: None where there is no outline to compare. bound_px: the 95 % bound that was stated.
+    agreement: None where there is no outline to compare. bound_px: the 95 % bound that was stated. edge, true_edge: how
+    the border runs, as it was told and as it is; None where a method, or the truth, does not say.
     """
 
     image: Path
@@ -29,6 +30,13 @@ class Judgement:
     details: tuple[str, ...] = ()
     agreement: Agreement | None = None
     bound_px: float | None = None
+    edge: str | None = None
+    true_edge: str | None = None
+
+    @property
+    def edge_told(self) -> bool | None:
+        """Whether the border was told as what it is; None where either is not there."""
+        return None if self.edge is None or self.true_edge is None else self.edge == self.true_edge
 
     @property
     def bound_held(self) -> bool | None:
@@ -55,6 +63,9 @@ class Judgement:
             "hausdorff_px": None if figures is None else figures.hausdorff_px,
             "bound_px": self.bound_px,
             "bound_held": self.bound_held,
+            "edge": self.edge,
+            "true_edge": self.true_edge,
+            "edge_told": self.edge_told,
             "details": list(self.details),
         }
 
@@ -68,6 +79,8 @@ def judged(image: Path, measurement: Measurement, outline: Contour | None, truth
         measurement.texts,
         None if outline is None else agreement(outline, truth.outline),
         measurement.uncertainty_px,
+        measurement.edge,
+        truth.edge,
     )
 
 
@@ -92,6 +105,8 @@ def summary(judgements: Sequence[Judgement]) -> dict[str, Any]:
         "mean_px": _mean([one.mean_px for one in figures]),
         "bounds_stated": sum(one.bound_held is not None for one in accepted),
         "bounds_held": sum(one.bound_held is True for one in accepted),
+        "edges_known": sum(one.edge_told is not None for one in accepted),
+        "edges_told": sum(one.edge_told is True for one in accepted),
     }
 
 

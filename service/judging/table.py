@@ -8,7 +8,7 @@ from drivers.camera.files.folder import shown
 from service.judging.judgement import Judgement, summary
 
 VERDICTS = {"ok": "accepted", "refused": "refused", "error": "not judged"}
-COLUMNS = ("picture", "verdict", "IoU", "mean px", "95 % px", "Hausdorff", "bound px", "held", "reasons")
+COLUMNS = ("picture", "verdict", "IoU", "mean px", "95 % px", "Hausdorff", "bound px", "edge", "held", "reasons")
 _HELD = {True: "yes", False: "NO", None: ""}
 
 
@@ -25,16 +25,22 @@ def cells(judgement: Judgement) -> tuple[str, ...]:
         VERDICTS[judgement.status],
         *told,
         "" if judgement.bound_px is None else f"{judgement.bound_px:.2f}",
+        _edge(judgement),
         _HELD[judgement.bound_held],
         ", ".join(reasons if judgement.status != "error" else judgement.details),
     )
 
 
+def _edge(judgement: Judgement) -> str:
+    edge = judgement.edge or ""
+    return edge if judgement.edge_told is not False else f"{edge}, NOT {judgement.true_edge}"
+
+
 def line(words: Sequence[str], name_width: int) -> str:
     """COLUMNS or cells in columns, whose names are no longer than that."""
-    name, verdict, *figures, held, reasons = words
+    name, verdict, *figures, edge, held, reasons = words
     numbers = "".join(f"{word:>11}" for word in figures)
-    return f"{name:<{name_width}}  {verdict:<10}{numbers}  {held:<4}  {reasons}".rstrip()
+    return f"{name:<{name_width}}  {verdict:<10}{numbers}  {edge:<15}  {held:<4}  {reasons}".rstrip()
 
 
 def sentence(judgements: Sequence[Judgement]) -> str:
@@ -44,4 +50,6 @@ def sentence(judgements: Sequence[Judgement]) -> str:
     if told["iou_mean"] is not None:
         text += f" (IoU {told['iou_mean']:.3f} mean, {told['iou_worst']:.3f} worst"
         text += f"; {told['bounds_held']} of {told['bounds_stated']} bounds held)" if told["bounds_stated"] else ")"
+    if told["edges_known"]:
+        text += f", edge told rightly in {told['edges_told']} of {told['edges_known']}"
     return f"{text}, {told['refused']} refused, {told['errors']} not judged"

@@ -43,7 +43,7 @@ def blocks(tmp_path_factory: pytest.TempPathFactory) -> Judged:
         cv2.imwrite(str(folder / f"{name}.png"), rendered.picture)
         write_truth(folder / f"{name}.json", rendered.truth_px, edge="cut")
     shutil.copy(folder / "holed.png", folder / "left-out.png")
-    write_truth(folder / "left-out.json", Contour(block("holed").truth_px.exterior))
+    write_truth(folder / "left-out.json", Contour(block("holed").truth_px.exterior), edge="cells")
     cv2.imwrite(str(folder / "nothing.png"), np.full((200, 300), 90, np.uint8))
     write_truth(folder / "nothing.json", Contour(np.array([[9.0, 9.0], [9.0, 90.0], [90.0, 90.0]])))
     return judged(folder, status=3)
@@ -77,6 +77,15 @@ def test_each_picture_has_the_contracts_figures_and_a_refused_one_its_reason(blo
     assert summary["iou_worst"] == records["left-out.png"]["iou"]
     assert re.search(r"^rectangle.png +accepted +0\.9\d\d .* yes$", told, re.MULTILINE)
     assert re.search(r"^nothing.png +refused +110 no_block_found$", told, re.MULTILINE)
+
+
+def test_how_the_border_runs_is_compared_with_the_truth(blocks: Judged) -> None:
+    records, summary, told = blocks
+    assert [records[name]["edge_told"] for name in ("holed.png", "left-out.png", "nothing.png")] == [True, False, None]
+    assert (records["left-out.png"]["edge"], records["left-out.png"]["true_edge"]) == ("cut", "cells")
+    assert (summary["edges_told"], summary["edges_known"]) == (2, 3)
+    assert re.search(r"^left-out.png .* cut, NOT cells ", told, re.MULTILINE)
+    assert "edge told rightly in 2 of 3" in told
 
 
 def test_holes_count(blocks: Judged) -> None:

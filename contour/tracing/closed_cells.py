@@ -41,19 +41,22 @@ _SIMPLE_PX = 0.25
 # How near to a cut the outline runs along it: what is drawn is off by as much as pixels are, and walls end round.
 _ON_CUT_PX = 2.0
 _NO_CUTS = np.empty((0, 2, 2))
-# Of the width of the edge: half a level off moves the outline by so much.
-_LEAST_BOUND_PX, _BOUND_OF_WIDTH = 0.3, 0.4
+# Of the width of the edge: half a level off moves the outline by so much. And of a wall's: the outermost one leans, shows
+# its side, or stands on a foot, and in photographs nobody can say which of that is the edge. Webs of a sheet do not.
+_LEAST_BOUND_PX, _BOUND_OF_WIDTH, _BOUND_OF_WALL = 0.3, 0.4, 0.5
+_WIDEST_WALL_PITCHES = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class Apart:
     """How far each pixel is from the table, (H, W), the level from which it is material, and what is, 1 or 0, cells
-    filled; uint8 all.
+    filled; uint8 all. And how wide walls are, pixels, not webs.
     """
 
     difference: Bytes
     level: Bytes
     region: Bytes
+    wall_px: float
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,7 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
         lambda: _region(apart, pitch_px, wall_px), lambda: _region(apart | faint, pitch_px, wall_px)
     )
     region = _with_faint_cells(surely, perhaps, pitch_px)
-    return _outlined(Apart(difference, level, region))
+    return _outlined(Apart(difference, level, region, min(wall_px, _WIDEST_WALL_PITCHES * pitch_px)))
 
 
 def closed_along(material: MaterialEdge, cuts: Float64s, pitch_px: float) -> MaterialEdge:
@@ -116,7 +119,8 @@ def _outlined(apart: Apart, cuts: Float64s = _NO_CUTS) -> MaterialEdge:
     holes = [(_turned(ring, 1.0), wide) for ring, wide, hole in found if hole]
     widths = np.concatenate([widths, *(wide for _, wide in holes)])
     contour = Contour(_turned(exterior, -1.0), tuple(ring for ring, _ in holes))
-    bound_px = _LEAST_BOUND_PX + _BOUND_OF_WIDTH * float(np.quantile(widths, 0.95))
+    soft_px = _LEAST_BOUND_PX + _BOUND_OF_WIDTH * float(np.quantile(widths, 0.95))
+    bound_px = float(np.hypot(soft_px, _BOUND_OF_WALL * apart.wall_px))
     outermost = tuple(ring[:, 0].astype(np.float64) for ring in border if len(ring) >= 8)
     return MaterialEdge(contour, bound_px, outermost, apart)
 

@@ -23,6 +23,8 @@ _SURE_WITHIN_SHARE = 0.01
 _EQUAL_SHARE = 0.8
 # How large a circle shows a place.
 _SHOWN_PITCHES = 2.0
+# Narrower than so many cells a piece is a strip that was cut off, however long: no block is.
+_STRIP_PITCHES = 4.5
 
 
 def no_walls(traced: CheckedTrace | None, limits: QualityLimits) -> Finding | None:
@@ -94,7 +96,9 @@ def touches_region(outlines: list[Ring], region: Region | None, border_px: float
 def _other_blocks(traced: Trace, limits: Limits) -> list[Piece]:
     """The pieces beside the traced block for which it is refused, largest first."""
     share = max(limits.block_share, _EQUAL_SHARE) if limits.pieces == "largest" else limits.block_share
-    return [piece for piece in traced.others if piece.area_px2 >= share * area(traced.contour)]
+    wide_px = _STRIP_PITCHES * (traced.pitch_px or 0.0)
+    least_px2 = share * area(traced.contour)
+    return [piece for piece in traced.others if piece.area_px2 >= least_px2 and piece.width_px > wide_px]
 
 
 def several_blocks(traced: Trace | None, limits: Limits) -> Finding | None:

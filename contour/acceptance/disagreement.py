@@ -56,11 +56,14 @@ class Disagreement:
         return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
 
 
-def disagreement(picture: Bytes, contour: Contour, pitch_px: float, flat: Bytes | None = None) -> Disagreement:
+def disagreement(
+    picture: Bytes, contour: Contour, pitch_px: float, flat: Bytes | None = None, loose: Bytes | None = None
+) -> Disagreement:
     """The widest disagreement between the contour, in pixels, and the busy part of `picture`, grey or BGR, uint8.
 
     `flat`, (h, w) on a grid over the picture, not 0 where something flat that is not the table fills cells or lies over
     them: no account of the edge there, inside the contour or out of it; what hides the edge is another finding.
+    `loose`, on such a grid, not 0 on pieces of comb that are told from the block: busy, but none of it.
 
     Width is that of the largest disc that fits into the difference; a spike or a notch has little, but its tip lies far
     from the busy region's border. Busy parts that the contour does not reach do not count: several blocks are another
@@ -75,6 +78,9 @@ def disagreement(picture: Bytes, contour: Contour, pitch_px: float, flat: Bytes 
         there = cv2.resize(flat, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
         filled = cv2.dilate(there, _disc(_BLUR_PITCHES * small_pitch_px * 2)) > 0
         busy = np.asarray(np.where(filled, ours, busy), np.uint8)
+    if loose is not None:
+        beside = cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
+        busy = _but(busy, _but(np.asarray(beside * np.uint8(255), np.uint8), ours))
     around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * small_pitch_px)), np.uint8)
     level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)

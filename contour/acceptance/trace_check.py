@@ -59,6 +59,7 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
         return CheckedTrace(traced, quality)
     pitch_px = traced.pitch_px
     flat = None if traced.look is None else traced.look.lit.astype(np.uint8)
+    loose = None if traced.look is None or traced.look.loose is None else traced.look.loose.astype(np.uint8)
     apart, edge = side_by_side(
         lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat),
         lambda: _checked_edge(picture, traced, pitch_px),

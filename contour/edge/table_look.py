@@ -15,7 +15,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int32s, median, quantile, quantiles
+from contour.edge.table_light import table_light
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
 from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
@@ -32,15 +33,9 @@ _OF_WALLS = 0.7
 _SPECK_PITCHES = 1.0
 # Cells have no room for a disc of this radius; and a border with gaps smaller than its diameter still holds.
 _CELL_ROOM, _GAP = 0.62, 0.2
-_LEVEL_PITCHES, _SHARE_KNOWN = 10.0, 0.02
-# Of the table's light: below that nothing is a shadow.
-_DEEPEST_SHADE = 0.2
 # Within this of a thing a shadow is that thing's own, and no more to be trusted.
 _CAST_PITCHES = 2.5
-# Apart from the table around by so many grey levels, and so many of its spreads.
-_APART, _APART_SPREADS = 4.0, 1.0
 _RIM = 1.5
-_ROUNDS, _FEW_SAMPLES = 4, 5.0
 _THIN = 1.5
 _NOWHERE_PX = 1e6
 _BESIDE_PITCHES = 0.6
@@ -72,6 +67,8 @@ class TableLook:
     """Distance of each sample from what is foreign, pixels."""
     light: Bytes
     """The picture itself, the mean of its channels."""
+    loose: Bools | None = None
+    """Pieces of comb beside the block, told from it, and what lies within half a cell of their walls."""
     plain: bool = True
     """Whether what lies beside the block is judged: not where the table mirrors it, or has borders of its own."""
 
@@ -142,7 +139,8 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     samples = pitch_px / step
     block = _drawn(seen.rings, small.shape, step)
     slope = _slope(small)
-    border = _borders(small, slope, (block, _drawn(seen.rings[:1], small.shape, step)), samples)
+    whole = _drawn(seen.rings[:1], small.shape, step)
+    border = _borders(small, slope, (block, whole), samples)
     room = np.asarray(cv2.distanceTransform(1 - border, cv2.DIST_L2, 3), np.float32)
     inside = cv2.erode(block, np.ones((3, 3), np.uint8)) > 0
     reach = np.where(inside, _CELL_ROOM * samples - _RIM, _GAP * samples)
@@ -150,20 +148,21 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     parts = np.asarray(numbered, np.int32)
     area = np.bincount(parts[block == 0], minlength=int(parts.max()) + 1)
     area[:1] = 0
-    table_part, off, level, spread = _told_from_table(small, parts, area, samples)
+    light = table_light(small, parts, area, samples)
+    table_part = light.parts
     table = _grown(table_part, reach)
     # Small flat parts outside lie between walls that stick out, and between specks.
     flat = _grown(_wide((parts > 0) & ~table_part, room, _CELL_ROOM * samples - _RIM), reach)
     busy = _busy(slope, block, samples)
     quiet = (busy < _QUIET) & ~table
-    foreign = _opened((flat | quiet) & ~table_part, _CELL_ROOM * samples)
+    loose = None if seen.loose is None else _loose(seen.loose, (whole == 0) & light.alike, samples)
+    told = table_part if loose is None else table_part | loose
+    foreign = _opened((flat | quiet) & ~told, _CELL_ROOM * samples)
     foreign = _long(foreign, _LONG_PITCHES * samples)
-    beside_block = _long(_opened((block == 0) & ~table, _BAND * samples + 0.5), _LONG_PITCHES * samples)
-    lighter = np.any(off > _APART + _APART_SPREADS * spread, axis=2)
-    shade = np.all((off < 0) & (off > (_DEEPEST_SHADE - 1.0) * level), axis=2)
+    beside_block = _long(_opened((block == 0) & ~(table | told), _BAND * samples + 0.5), _LONG_PITCHES * samples)
     every = foreign | beside_block
-    light = small if small.ndim == 2 else small.mean(axis=2).astype(np.uint8)
-    maps = np.asarray(lighter), np.asarray(shade), _away(every, step), light
+    mean = small if small.ndim == 2 else small.mean(axis=2).astype(np.uint8)
+    maps = light.lighter, light.shade, _away(every, step), mean, loose
     look = TableLook(table, every, every, step, pitch_px, *maps)
     if plain:
         return look
@@ -173,6 +172,19 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
         within = (foreign & inside) | _mostly(beside_block, busy < _SMOOTH)
         look = replace(look, foreign=within, away=_away(within, step), plain=False)
     return look
+
+
+def _loose(walls: Bytes, alike: Bools, samples: float) -> Bools | None:
+    """Pieces of comb beside the block, their cells filled: these hide none of it. None without any.
+
+    `alike`: where light beside the block is the table's. That shows through cells: what has walls painted on it, or
+    grain that looks like some, is another thing.
+    """
+    small = cv2.resize(walls, alike.shape[::-1], interpolation=cv2.INTER_AREA)
+    size = 2 * round(0.5 * samples) + 1
+    filled = cv2.dilate(small, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)))
+    loose = _mostly(filled > 0, alike)
+    return loose if loose.any() else None
 
 
 def _mostly(part: Bools, kind: Bools) -> Bools:
@@ -252,61 +264,6 @@ def _long(part: Bools, least: float) -> Bools:
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > least
     long[0] = False
     return np.asarray(long[pieces], np.bool_)
-
-
-def _told_from_table(
-    small: Bytes, parts: Int32s, area: Indices, samples: float
-) -> tuple[Bools, Float32s, Float32s, Float64s]:
-    """Which samples lie on numbered flat parts that are the table, how far the picture is off its light, that light,
-    and its spread; `area`: of each part, outside the block.
-    """
-    main = int(np.argmax(area)) if area.any() else 0
-    table_parts = np.zeros(len(area), np.bool_)
-    table_parts[main] = main > 0
-    numbers = parts.ravel().astype(np.intp)
-    sizes = np.maximum(np.bincount(numbers, minlength=len(area)), 1)
-    # Plates of a table lie side by side under one lamp: those told from the first tell what the next ones look like.
-    for _ in range(_ROUNDS):
-        level, spread = _table_level(small, table_parts[parts], samples)
-        off = np.asarray(cv2.blur(small, (3, 3)).reshape(level.shape) - level, np.float32)
-        known, table_parts = table_parts, _table_parts(off, spread, (numbers, sizes), main)
-        if (known == table_parts).all() or area[table_parts & ~known].sum() < _FEW_SAMPLES * samples**2:
-            break
-    return table_parts[parts], off, level, spread
-
-
-def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, Float64s]:
-    """The light of the table around each sample, (h, w, channels), and its spread in each channel."""
-    channels = small.reshape(*main.shape, -1).astype(np.float32)
-    size = 2 * round(0.5 * _LEVEL_PITCHES * samples) + 1
-    share = cv2.blur(main.astype(np.float32), (size, size))
-    level = np.empty_like(channels)
-    spread = np.zeros(channels.shape[2])
-    for k in range(channels.shape[2]):
-        plane, some = channels[:, :, k], (slice(None, None, 3), slice(None, None, 3))
-        here = plane[some][main[some]]
-        lowest, highest = quantiles(here, (0.02, 0.98)).tolist() if len(here) else (0.0, 0.0)
-        local = np.asarray(cv2.blur(plane * main, (size, size)), np.float32) / np.maximum(share, 1e-3)
-        if len(here):
-            spread[k] = 1.4826 * median(np.abs(here - local[some][main[some]]))
-        # Far from any of it, in a hole, the table may be as light as it is anywhere, and a little more so.
-        anywhere = np.clip(plane, lowest - spread[k], highest + spread[k])
-        level[:, :, k] = np.where(share > _SHARE_KNOWN, local, anywhere)
-    return level, spread
-
-
-def _table_parts(off: Float32s, spread: Float64s, parts: tuple[Indices, Indices], main: int) -> Bools:
-    """Which flat parts are as light as the table around them; `off`: the picture less that light, `parts`: the number
-    of each sample's part, and the samples of each.
-    """
-    numbers, sizes = parts
-    table = np.ones(len(sizes), np.bool_)
-    for k in range(off.shape[2]):
-        mean = np.bincount(numbers, weights=off[:, :, k].ravel(), minlength=len(sizes)) / sizes
-        table &= np.abs(mean) < _APART + _APART_SPREADS * spread[k]
-    table[0] = False
-    table[main] = main > 0
-    return table
 
 
 def _wide(flat: Bools, room: Float32s, radius: float) -> Bools:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -34,17 +34,20 @@ _HEXAGON = 2 / np.sqrt(3)
 class Piece:
     """A piece of comb: its area, cells filled, px², its box (left, top, right, bottom), and its outline to look at.
 
-    The outline, shape (N, 2), is as coarse as the samples that the piece was found in; empty = not known.
+    The outline, shape (N, 2), is as coarse as the samples that the piece was found in; empty = not known. width_px: of
+    its widest place; infinite where it is not known, or goes on outside of the picture.
     """
 
     area_px2: float
     box_px: tuple[int, int, int, int]
     outline_px: Ring = field(default_factory=lambda: np.empty((0, 2)), compare=False)
+    width_px: float = field(default=np.inf, compare=False)
 
     def moved(self, x: int, y: int) -> Piece:
         """The piece in a picture whose first pixel lies (x, y) before this one's."""
         left, top, right, bottom = self.box_px
-        return Piece(self.area_px2, (left + x, top + y, right + x, bottom + y), self.outline_px + np.array([x, y]))
+        box = left + x, top + y, right + x, bottom + y
+        return replace(self, box_px=box, outline_px=self.outline_px + np.array([x, y]))
 
 
 def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) -> tuple[Piece, ...]:
@@ -70,7 +73,8 @@ def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) 
             whole = step * scale
             box = (x * whole, y * whole, (x + w) * whole, (y + h) * whole)
             ring = pixels_of(_outline(filled) + np.array([x, y]), whole)
-            found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring))
+            width = np.inf if _at_border((x, y, x + w, y + h), walls.shape) else _width(filled) * whole
+            found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring, width))
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
 
 
@@ -119,6 +123,18 @@ def reaches_frame(mask: Bytes, block: CoarseBlock) -> bool:
         (mask[:, -_FRAME_PX:].max(axis=1), walls[:, -1]),
     )
     return any(bool((line[samples.repeat(step)[: len(line)] > 0] > 0).any()) for line, samples in sides)
+
+
+def _at_border(box: tuple[int, int, int, int], shape: tuple[int, ...]) -> bool:
+    """Whether a box (left, top, right, bottom) reaches the last samples but one, of so many rows and columns."""
+    left, top, right, bottom = box
+    return min(left, top) <= 1 or right >= shape[1] - 1 or bottom >= shape[0] - 1
+
+
+def _width(filled: Bools) -> float:
+    """Diameter of the largest disc inside, samples."""
+    framed = cv2.copyMakeBorder(filled.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT)
+    return 2.0 * float(cv2.distanceTransform(framed, cv2.DIST_L2, 5).max())
 
 
 def _outline(filled: Bools) -> Ring:

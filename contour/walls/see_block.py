@@ -93,11 +93,13 @@ def see_block(
     on_mask()
     every = seen.mask
     seen = replace(seen, mask=without_loose_pieces(every, cells.pitch_px / scale))
+    loose = None if seen.mask is every else np.asarray(cv2.subtract(every, seen.mask), np.uint8)
     coarse = coarse_block(seen.mask, small, cells.pitch_px / scale)
     others = pieces_beside(every, coarse.rings[0].vertices, cells.pitch_px / scale, scale)
     evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
-    return replace(evidence, others=others, reaches_frame=reaches_frame(seen.mask, coarse), comb=cells.comb)
+    at_frame = reaches_frame(seen.mask, coarse)
+    return replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose)
 
 
 def _scale(light: Bytes, cells: CellScale) -> int:

@@ -10,7 +10,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bools, Float64s, Indices
+from contour.geometry.arrays import Bools, Bytes, Float64s, Indices
 from contour.geometry.rings import Ring
 from contour.walls.comb_likeness import Comb
 from contour.walls.pieces import Piece
@@ -99,7 +99,8 @@ class BlockEvidence:
 
     leaves_picture: whether the block runs out of the picture, so that its rings follow the picture's border there.
     others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
-    pixels. comb: what its cells look like. clipped: share of its witnesses beside which light is at full scale.
+    pixels. comb: what its cells look like. clipped: share of its witnesses beside which light is at full scale. loose:
+    walls of small pieces that were told from it, however near they lie, uint8, 255 there, on a grid over the picture.
     """
 
     rings: tuple[RingEvidence, ...]
@@ -114,3 +115,4 @@ class BlockEvidence:
     others: tuple[Piece, ...] = ()
     reaches_frame: bool = False
     comb: Comb | None = None
+    loose: Bytes | None = None

@@ -244,6 +244,15 @@ def test_an_offcut_is_no_block() -> None:
     assert judge(GOOD, FRAME, LIMITS, traced=traced(others=(Piece(410.0, (400, 50, 460, 120)),))) != ()
 
 
+@pytest.mark.parametrize(("cells", "refused"), [(4.0, False), (5.0, True)])
+def test_a_strip_narrower_than_any_block_is_none_however_long(cells: float, refused: bool) -> None:
+    one = replace(traced(others=(Piece(3000.0, (400, 50, 460, 120), width_px=20.0 * cells),)))
+    one = replace(one, trace=replace(one.trace, pitch_px=20.0))
+    assert (
+        Refusal.SEVERAL_BLOCKS in [finding.refusal for finding in judge(GOOD, FRAME, LIMITS, traced=one)]
+    ) == refused
+
+
 @pytest.mark.parametrize(("outwards", "words"), [(True, "stands out of"), (False, "goes into")])
 def test_a_bump_or_dent_as_narrow_as_a_chip_is_told_with_its_size_and_place(outwards: bool, words: str) -> None:
     narrow = NarrowFeature(1.25, 3.5, (40.0, 60.0), outwards)

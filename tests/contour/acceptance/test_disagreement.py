@@ -202,6 +202,17 @@ def test_what_is_flat_and_known_is_no_table_inside_the_contour() -> None:
     assert disagreement(picture, scene.truth_px, scene.pitch_px, np.zeros_like(flat)).pitches > LIMIT
 
 
+def test_comb_beside_the_contour_that_is_told_from_it_is_no_block() -> None:
+    scene = block("rectangle")
+    whole = polygon(scene.truth_px)
+    x0, y0, _, y1 = whole.bounds
+    half = contour(whole & shapely.box(x0, y0, whole.centroid.x, y1))
+    loose = np.zeros((120, 160), np.uint8)
+    loose[:, int(whole.centroid.x / 4) :] = 1
+    assert disagreement(scene.picture, half, scene.pitch_px).pitches > LIMIT
+    assert disagreement(scene.picture, half, scene.pitch_px, loose=loose).pitches < 1.2
+
+
 def test_what_is_flat_elsewhere_hides_no_disagreement() -> None:
     scene = block("rectangle")
     whole = polygon(scene.truth_px)

@@ -10,7 +10,17 @@ import pytest
 from contour.geometry.ring_lengths import RingLengths
 from tests.support.scenes.edge_scenes import COVERED, LONG, PITCH, at, edge_scene
 
-CLEAR = ("", "soft shadow", "hard shadow", "mirror", "tape far away", "tape in the middle", "hole", "wood")
+CLEAR = (
+    "",
+    "soft shadow",
+    "hard shadow",
+    "mirror",
+    "tape far away",
+    "tape in the middle",
+    "hole",
+    "wood",
+    "strip beside",
+)
 """Scenes with nothing at the edge that hides it."""
 
 
@@ -125,7 +135,7 @@ def test_a_chip_that_clings_to_the_edge_is_found_as_a_narrow_bump() -> None:
     assert np.hypot(*(np.array(narrow.place_px) - scene.pixel(at(10.0, 25.0)))) < 1.5 * PITCH
 
 
-@pytest.mark.parametrize("name", ["", "bright tape", "compound", "hard shadow"])
+@pytest.mark.parametrize("name", ["", "bright tape", "compound", "hard shadow", "strip beside"])
 def test_nothing_else_makes_one_nor_a_disagreement(name: str) -> None:
     checked = edge_scene(name).checked()
     assert checked.narrow is None

@@ -71,6 +71,15 @@ def test_pieces_come_largest_first_and_in_pixels_of_the_picture() -> None:
     assert large.box_px[1] > 400
 
 
+def test_a_pieces_width_is_that_of_its_widest_place_where_all_of_it_is_in_view() -> None:
+    mask = empty()
+    comb(mask, 300, 60, 10, 3)
+    comb(mask, 300, 433, 8, 4)
+    whole, cut = sorted(pieces_beside(mask, RING, PITCH), key=lambda piece: piece.box_px[1])
+    assert whole.width_px == pytest.approx(2.7 * PITCH, abs=0.6 * PITCH)
+    assert np.isinf(cut.width_px)
+
+
 @pytest.mark.parametrize("cells", [(2, 2), (3, 2), (6, 1)])
 def test_an_offcut_of_a_few_cells_is_none(cells: tuple[int, int]) -> None:
     mask = empty()

@@ -104,6 +104,7 @@ THINGS: dict[str, tuple[Thing, ...]] = {
     "mirror": (Mirror(0.2, 15.0),),
     "tape far away": (Cover(rectangle((40.0, 30.0), 30.0, 20.0, 30.0), 0.9),),
     "tape in the middle": (Cover(rectangle(MIDDLE, 30.0, 30.0), 0.9),),
+    "strip beside": (Strip(patch(10.0, 18.0, 60.0, 30.0), replace(CELLS, offset_mm=(3.0, 4.0))),),
     "clinging chip": (Strip(patch(10.0, 10.0, 24.0, 30.0), replace(CELLS, offset_mm=(3.0, 4.0))),),
 }
 

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from contour.acceptance.block_level import exclusive_levels
-from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, median, quantile
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median, quantile
 from contour.geometry.rings import Contour, Ring
 from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
@@ -32,6 +32,10 @@ _OPENING_PITCHES = 2.2
 _SCRATCH_PITCHES = 1.8
 # How far the busy region reaches beyond the block's edge: half of the window it is averaged over.
 _BLUR_PITCHES = 0.5
+# So far inside walls may be faint: there they differ from the table by so much, of what it usually shows and of most.
+# In the middle of holes it is 1.1 times the usual, of faded walls 1.5 (row noise) to 11; and 0.08 of what it is in comb
+# there, 0.17 or more here.
+_FAR_INSIDE_PITCHES, _FAINT, _FAINT_OVER, _FAINTEST = 3.0, 1.6, 0.95, 0.12
 _FRACTION_BITS = 4
 _POINTS_A_PITCH = 3.0
 
@@ -72,7 +76,8 @@ def disagreement(
     shrink = max(1, int(pitch_px / _PITCH_PX))
     small = whole_averaged(picture, shrink)
     small_pitch_px = pitch_px / shrink
-    busy = _without_small_gaps(_busy(small, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
+    activity = _activity(small, small_pitch_px)
+    busy = _without_small_gaps(_busy(activity, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
     ours = _drawn(contour, busy.shape[:2], shrink)
     if flat is not None and flat.any():
         there = cv2.resize(flat, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
@@ -90,6 +95,7 @@ def disagreement(
     only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * small_pitch_px)) for mask in exclusive)
     theirs = _touched(_opened(_but(busy, only_table), _disc(_SCRATCH_PITCHES * small_pitch_px)), ours)
     busy = np.asarray(cv2.bitwise_or(busy, only_block), np.uint8)
+    busy[_faint_walls(activity, ours, around, small_pitch_px)] = 255
     # The picture's border is no block, and block ends there.
     outside = np.asarray(cv2.distanceTransform(_inverted(busy), cv2.DIST_L2, 3), np.float32)
     inside = _distances(theirs)
@@ -106,13 +112,30 @@ def disagreement(
     return Disagreement(apart / small_pitch_px, (x, y), claims, on_the_whole / small_pitch_px)
 
 
-def _busy(small: Bytes, small_pitch_px: float) -> Bytes:
-    """Where the picture differs from its mean over a pitch as it does in comb, 0 or 255."""
+def _activity(small: Bytes, small_pitch_px: float) -> Float32s:
+    """By how much the picture differs from its mean over a pitch, averaged over another, in the channel where most."""
     window = _odd(small_pitch_px)
     off = cv2.absdiff(small, cv2.blur(small, (window, window)))
     if off.ndim == 3:
         off = off.max(axis=2)
-    average = cv2.boxFilter(off, cv2.CV_32F, (window, window))
+    return np.asarray(cv2.boxFilter(off, cv2.CV_32F, (window, window)), np.float32)
+
+
+def _faint_walls(activity: Float32s, ours: Bytes, around: Bytes, small_pitch_px: float) -> Bools:
+    """Where, far inside the contour, the picture is busier than the table is: walls fade there, and a hole shows the
+    table.
+    """
+    table = activity[::2, ::2][around[::2, ::2] == 0]
+    if not len(table):
+        return np.zeros(ours.shape, np.bool_)
+    far_inside = _distances(ours) > _FAR_INSIDE_PITCHES * small_pitch_px
+    usual = _FAINTEST * median(activity[::2, ::2][ours[::2, ::2] > 0])
+    level = max(usual, _FAINT * median(table), quantile(table, _FAINT_OVER))
+    return np.asarray((activity > level) & far_inside, np.bool_)
+
+
+def _busy(average: Float32s, small_pitch_px: float) -> Bytes:
+    """Where the picture differs from its mean over a pitch as it does in comb, 0 or 255."""
     nearby = _odd(_NEARBY_PITCHES * small_pitch_px)
     squares = cv2.boxFilter(average * average, cv2.CV_32F, (nearby, nearby))
     # The mean that weighs busy places by how busy they are: beside the block it is the block's.

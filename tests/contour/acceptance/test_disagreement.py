@@ -189,6 +189,17 @@ def test_colour_counts_where_lightness_is_the_same() -> None:
     assert disagreement(picture, half, scene.pitch_px).pitches > LIMIT
 
 
+def test_walls_that_fade_far_inside_are_no_table() -> None:
+    scene = block("rectangle")
+    (x, y), table = scene.truth_px.exterior.mean(axis=0), float(np.median(scene.picture[:20]))
+    rows, columns = np.mgrid[: scene.picture.shape[0], : scene.picture.shape[1]]
+    near = np.exp(-0.5 * (np.hypot(columns - x, rows - y) / (1.6 * scene.pitch_px)) ** 2)
+
+    left = 1.0 - 0.8 * near
+    faded = np.asarray(table + (scene.picture - table) * left, np.uint8)
+    assert disagreement(faded, scene.truth_px, scene.pitch_px).pitches < 1.3
+
+
 def test_what_is_flat_and_known_is_no_table_inside_the_contour() -> None:
     """Compound: without cells it looks like table, with its place given it is no disagreement."""
     scene = block("rectangle")

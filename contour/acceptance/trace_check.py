@@ -61,7 +61,7 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
     flat = None if traced.look is None else traced.look.lit.astype(np.uint8)
     loose = None if traced.look is None or traced.look.loose is None else traced.look.loose.astype(np.uint8)
     apart, edge = side_by_side(
-        lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat),
+        lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat, loose),
         lambda: _checked_edge(picture, traced, pitch_px),
     )
     return CheckedTrace(traced, quality, apart, *edge)

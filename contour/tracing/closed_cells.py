@@ -41,8 +41,9 @@ _SIMPLE_PX = 0.25
 # How near to a cut the outline runs along it: what is drawn is off by as much as pixels are, and walls end round.
 _ON_CUT_PX = 2.0
 _NO_CUTS = np.empty((0, 2, 2))
-# Of the width of the edge: half a level off moves the outline by so much. And of a wall's: the outermost one leans, shows
-# its side, or stands on a foot, and in photographs nobody can say which of that is the edge. Webs of a sheet do not.
+# Of the width of the edge: half a level off moves the outline by so much. And of a wall's: the outermost one leans,
+# shows its side, or stands on a foot, and in photographs nobody can say which of that is the edge. Webs of a sheet do
+# not.
 _LEAST_BOUND_PX, _BOUND_OF_WIDTH, _BOUND_OF_WALL = 0.3, 0.4, 0.5
 _WIDEST_WALL_PITCHES = 0.2
 

@@ -26,6 +26,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ),
         ("combtrace fit block.png --part part.svg --config config.yaml --overlay laid.png", "Draw it, to look at."),
     ),
+    "remnants": (
+        ("combtrace remnants", "What is left of blocks that were cut."),
+        ("combtrace remnants --fits part.dxf --margin-mm 3", "Into which of it a part fits, the smallest first."),
+        ("combtrace remnants --used 7", "Number 7 was taken from the shelf."),
+    ),
     "judge": (
         ("combtrace judge pictures/ --page judged.html", "How well your own blocks are traced."),
         ("combtrace judge pictures/ --config config.yaml --recipe 2 --json -", "With a recipe, for a script."),

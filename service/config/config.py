@@ -75,6 +75,15 @@ class ArchiveSettings(Model):
     )
 
 
+class RemnantsSettings(Model):
+    """The list of what is left of blocks whose parts were accepted; needs the archive and combtrace[export]."""
+
+    path: FilePath = Field(Path("var/remnants.sqlite"), description="The list's file (SQLite).")
+    kerf_mm: float = Field(2, ge=0, le=1000, description="What cutting takes away around each part, mm.")
+    min_area_mm2: float = Field(2500, ge=1, le=4e9, description="Smallest piece that is kept, mm².")
+    min_width_mm: float = Field(10, ge=0, le=1000, description="What is narrower is cut off the pieces, mm.")
+
+
 class Metrics(Model):
     """Figures for Prometheus over HTTP; needs the extra combtrace[metrics]."""
 
@@ -132,6 +141,7 @@ class Config(Model):
     service: Service = Field(default_factory=Service, description="The service itself.")
     journal: JournalSettings = Field(default_factory=JournalSettings, description="The durable list of jobs.")
     archive: ArchiveSettings = Field(default_factory=ArchiveSettings, description="Where evidence is kept.")
+    remnants: RemnantsSettings | None = Field(None, description="What is left of blocks; none = it is not kept.")
     metrics: Metrics | None = Field(None, description="Figures for Prometheus; none = not served.")
     page: Page | None = Field(None, description="The operator's page; none = not served.")
     log: Log = Field(default_factory=Log, description="The log.")
@@ -147,6 +157,12 @@ class Config(Model):
         for name in ("number", "name"):
             for k, value in _repeated([getattr(recipe, name) for recipe in self.recipes]):
                 raise MistakeAt(("recipes", k, name), f"{value} is there more than once. Give each recipe its own")
+        return self
+
+    @model_validator(mode="after")
+    def _remnants_have_an_archive(self) -> Self:
+        if self.remnants is not None and not self.archive.max_bytes:
+            raise ValueError("remnants are kept from the archive's evidence, but archive.max_bytes is 0. Set it")
         return self
 
     @model_validator(mode="after")

@@ -23,6 +23,7 @@ PATH_KEYS = (
     ("service", "state_dir"),
     ("journal", "path"),
     ("archive", "path"),
+    ("remnants", "path"),
     ("page", "token_file"),
     ("page", "certificate"),
     ("page", "key"),

@@ -45,6 +45,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`service`", (config.Service,)),
     ("`journal`", (config.JournalSettings,)),
     ("`archive`", (config.ArchiveSettings,)),
+    ("`remnants`", (config.RemnantsSettings,)),
     ("`metrics`", (config.Metrics,)),
     ("`page`", (config.Page,)),
     ("`log`", (config.Log,)),

@@ -94,6 +94,7 @@ class ArchiveWriter:
         self._opened = self._closing = False
         self.trouble: str | None = None
         self.on_stored: Callable[[Evidence], None] = lambda _evidence: None  # told in the writer's thread
+        self.keep_remnants: Callable[[Evidence], None] = lambda _evidence: None  # likewise
 
     @property
     def figures(self) -> ArchiveFigures:
@@ -272,6 +273,7 @@ class ArchiveWriter:
             archive.store(job.job_id, job.outcome, files, document_bytes(written))
         self._stored += 1
         self.on_stored(evidence)
+        self.keep_remnants(evidence)
         if errors:
             raise ArchiveError(f"job {job.job_id}: not exported: {'; '.join(errors)}")
 

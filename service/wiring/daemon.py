@@ -42,6 +42,7 @@ from service.wiring.bounds import cycle_settings
 from service.wiring.devices import controller_names, make_camera, make_controller
 from service.wiring.errors import WiringError
 from service.wiring.plan import make_plan, plan_of, sound_plan
+from service.wiring.remnants import remnants_keeper
 from service.wiring.servers import add_metrics, add_page
 from service.wiring.triggers import add_triggers
 
@@ -162,6 +163,8 @@ def _make_archive(config: Config, journal: Journal, opened: ExitStack) -> Archiv
     last = journal.last_taken()
     archive = ArchiveWriter(Archive(settings.path, limits), journal.find, in_flight, last.job_id if last else 0)
     opened.callback(archive.close)
+    if config.remnants is not None:
+        archive.keep_remnants = remnants_keeper(config.remnants)
     return archive
 
 

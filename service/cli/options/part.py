@@ -25,9 +25,11 @@ _KEYS = {
 """Options, and the keys of a recipe's `part` that they change."""
 
 
-def add_part_arguments(parser: argparse.ArgumentParser) -> None:
-    """The part's file and how it may lie."""
-    parser.add_argument("--part", type=Path, metavar="FILE", help="drawing: .dxf, .svg, .geojson; default the recipe's")
+def add_part_arguments(parser: argparse.ArgumentParser, *, name_the_part: bool = True) -> None:
+    """The part's file, but where it is named otherwise, and how it may lie."""
+    if name_the_part:
+        of_recipe = "drawing: .dxf, .svg, .geojson; default the recipe's"
+        parser.add_argument("--part", type=Path, metavar="FILE", help=of_recipe)
     parser.add_argument("--part-units", choices=("um", "mm", "cm", "m", "in"), help="where the drawing says none")
     parser.add_argument("--part-layer", metavar="NAME", help="only this layer of the drawing")
     parser.add_argument(

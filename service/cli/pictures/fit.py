@@ -43,6 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_tracing_arguments(parser)
     parser.add_argument("--json", metavar="FILE", help="one JSON object; - is standard output")
     parser.add_argument("--overlay", type=output_path, metavar="FILE", help="picture with block, part and margin")
+    parser.add_argument("--remnants", type=Path, metavar="FILE", help="note in this list what is left of the block")
+    parser.add_argument("--kerf-mm", type=float, default=2.0, metavar="MM", help="what cutting takes away; default 2")
     add_export_arguments(parser)
     parser.add_argument(
         "--language", choices=("en", "ru"), default="en", help="ru: each reason also in Russian, with what to do"
@@ -98,6 +100,8 @@ def _fitted(args: argparse.Namespace, tracing: Tracing, exports: Exports) -> tup
     note = "" if args.overlay is None else f"  [{args.overlay}]"
     if args.overlay is not None:
         _write_overlay(args.overlay, picture, measurement)
+    if args.remnants is not None and measurement.laid and not measurement.findings:
+        note += f"  [remnants {_kept(args, picture, measurement)}]"
     written = exports.write(args.image, measurement)
     note += f"  [{', '.join(written)}]" if written else ""
     fits = bool(measurement.laid) and not measurement.findings
@@ -125,6 +129,24 @@ def _record(image: Path, measurement: Measurement | None, status: str = "ok", de
         "timings_ms": {name: round(value, 3) for name, value in measurement.timings_ms.items()},
         "details": list(measurement.texts),
     }
+
+
+def _kept(args: argparse.Namespace, picture: Any, measurement: Measurement) -> str:
+    """The numbers of what is left of the block, noted in the list."""
+    from drivers.camera import Frame
+    from service.parts.part import PartFileError
+    from service.parts.remnant import Worth
+    from service.records.evidence import overlay_bytes
+    from service.records.remnants import Remnants, RemnantsError
+
+    if not 0 <= args.kerf_mm <= 1000:
+        raise UserError(f"--kerf-mm {args.kerf_mm:g}: expected 0 to 1000")
+    drawn = overlay_bytes(Frame(picture, 0.0, True, str(args.image), 0, ""), measurement)
+    try:
+        numbers = Remnants(args.remnants).keep(str(args.image.resolve()), measurement, Worth(args.kerf_mm), drawn)
+    except (RemnantsError, PartFileError) as error:
+        raise UserError(str(error)) from error
+    return ", ".join(map(str, numbers)) or "none"
 
 
 def _parts(measurement: Measurement) -> list[dict[str, Any]]:

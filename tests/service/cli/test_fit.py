@@ -15,6 +15,7 @@ import shapely
 from service.cli.main import main
 from service.parts.part import Asked
 from service.parts.part_file import load_part
+from service.records.remnants import Remnants
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"
 PICTURE = str(SAMPLES / "4-with-holes.jpg")
@@ -190,3 +191,19 @@ def test_a_unit_that_the_drawing_does_not_say(tmp_path: Path, capsys: pytest.Cap
     assert fit("--part", unsaid, "--part-units", "cm", "--json", "-") == 0
     exterior = np.array(told(capsys)["part_mm"]["exterior"])
     assert np.hypot(*(exterior[1] - exterior[0])) == pytest.approx(120.0)
+
+
+def test_what_is_left_of_the_block_is_noted_and_holds_the_next_part(
+    part: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    remnants = tmp_path / "remnants.sqlite"
+    assert fit("--part", part, "--margin-mm", 2, "--remnants", remnants, "--kerf-mm", 3, "--json", "-") == 0
+    told_of_it = capsys.readouterr()
+    first = json.loads(told_of_it.out)
+    assert "[remnants 1" in told_of_it.err
+    assert main(["remnants", "--file", str(remnants), "--fits", str(drawn(tmp_path, 60.0, 30.0)), "--json"]) == 0
+    second = json.loads(capsys.readouterr().out.splitlines()[0])["fit"]
+    one, two = (shapely.Polygon(of["part_mm"]["exterior"], of["part_mm"]["holes"]) for of in (first, second))
+    assert one.distance(two) >= 3.0 - 0.02
+    remnant = cv2.imdecode(np.frombuffer(Remnants(remnants).picture(1), np.uint8), cv2.IMREAD_COLOR)
+    assert remnant.shape[2] == 3

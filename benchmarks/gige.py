@@ -8,6 +8,7 @@ trigger, in one process.
 from __future__ import annotations
 
 import argparse
+import logging
 import statistics
 import tempfile
 import time
@@ -28,6 +29,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--triggers", type=int, default=100)
     args = parser.parse_args()
+    logging.getLogger("combtrace.camera").setLevel(logging.ERROR)
     print("| picture | packets, bytes | trigger to frame, ms | beyond exposure | Aravis alone | ours more |")
     print("|---|---|---|---|---|---|")
     for size in SIZES:

@@ -108,7 +108,7 @@ SYSCTL = """\
 # Made by `combtrace install-service --print sysctl`; for /etc/sysctl.d/70-combtrace.conf
 
 # Frames of GigE Vision cameras come in bursts of thousands of packets; what a socket cannot hold is lost.
-net.core.rmem_max = 4194304
+net.core.rmem_max = 33554432
 net.core.netdev_max_backlog = 5000
 """
 

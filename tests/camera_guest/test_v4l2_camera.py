@@ -15,6 +15,7 @@ import pytest
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from drivers.camera import CameraTimeout, CameraUnavailable
+from drivers.camera.depth import eight_bits
 from drivers.camera.v4l2.camera import V4l2Camera, V4l2Settings
 from drivers.camera.v4l2.listing import list_cameras
 from tests.support.camera.vivid import (
@@ -32,7 +33,7 @@ from tests.support.camera.vivid import (
 )
 
 SAMPLES = Path(__file__).parents[2] / "service" / "samples"
-COLOUR_SQUARES, BLACK, WHITE = 4, 5, 6
+COLOUR_SQUARES, BLACK, WHITE, RED, BLUE, CHECKERS = 4, 5, 6, 7, 9, 14
 
 
 @pytest.fixture(autouse=True)
@@ -70,6 +71,29 @@ def test_a_frame_after_three_seconds_of_idling_shows_what_was_there_after_the_tr
     assert after_s >= 0
     assert frame.pixels.min() > 200
     assert camera.counts.early > 0
+
+
+@pytest.mark.parametrize("code", ["Y10", "Y12", "Y16"])
+def test_deep_grey_is_the_grey_of_eight_bits_and_more(code):
+    set_control("test_pattern", CHECKERS)
+    with opened(webcam(pixel_format="GREY")) as camera:
+        grey = grabbed_now(camera)[0].pixels
+    with opened(webcam(pixel_format=code)) as camera:
+        frame = grabbed_now(camera)[0]
+    assert frame.deep.dtype == np.uint16
+    assert np.abs((frame.deep >> 8).astype(int) - grey).max() <= 1
+    np.testing.assert_array_equal(frame.pixels, eight_bits(frame.deep))
+
+
+@pytest.mark.parametrize("code", ["RGGB", "BA81", "GB10", "BA12", "RG16"])
+def test_a_mosaic_has_the_colours_of_the_scene(code):
+    for pattern, channel in ((RED, 2), (BLUE, 0)):
+        set_control("test_pattern", pattern)
+        with opened(webcam(pixel_format=code)) as camera:
+            pixels = grabbed_now(camera)[0].pixels
+        others = [pixels[4:-4, 4:-4, other] for other in {0, 1, 2} - {channel}]
+        assert pixels[4:-4, 4:-4, channel].min() > 200
+        assert max(other.max() for other in others) < 40
 
 
 @pytest.mark.parametrize("source", [0, 1], ids=["end of frame", "start of exposure"])

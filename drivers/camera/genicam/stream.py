@@ -17,23 +17,23 @@ log = logging.getLogger("combtrace.camera")
 
 # A frame that is read, one that is filled, and two against a reader that is late.
 BUFFERS = 4
-SOCKET_BYTES = 4 << 20
+SOCKET_BYTES = 4 << 20  # at least; a frame's packets take up to twice its size in the kernel
 LARGEST_SOCKET = Path("/proc/sys/net/core/rmem_max")
 # A camera sends its next packet within microseconds; what has not come by then was lost.
 PACKET_WAIT_US, FRAME_WAIT_US = 20_000, 100_000
 
 
-def small_sockets() -> str | None:
-    """What to do where the system lets no socket hold a frame's packets; None where it does."""
+def small_sockets(needed: int = SOCKET_BYTES) -> str | None:
+    """What to do where the system lets no socket hold so many bytes; None where it does."""
     try:
         allowed = int(LARGEST_SOCKET.read_text())
     except (OSError, ValueError):
         return None
-    if allowed >= SOCKET_BYTES:
+    if allowed >= needed:
         return None
     return (
-        f"the system lets a socket hold {allowed} bytes, expected {SOCKET_BYTES}: packets will be lost. As root, run "
-        f"`sysctl -w net.core.rmem_max={SOCKET_BYTES}`; `combtrace install-service --print sysctl` keeps it"
+        f"the system lets a socket hold {allowed} bytes, expected {needed}: packets may be lost. As root, run "
+        f"`sysctl -w net.core.rmem_max={needed}`; `combtrace install-service --print sysctl` keeps more"
     )
 
 
@@ -73,10 +73,10 @@ class Stream:
         if self._stream is None:
             raise CameraRefused(f"{source}: makes no stream. Check that no firewall stops UDP.")
         device.streams.append(self)
-        if device.is_gige:
-            self._patience()
         with told(source, "tell how large its frames are"):
             payload = int(device.camera.get_payload())
+        if device.is_gige:
+            self._patience(max(SOCKET_BYTES, 2 * payload))
         if payload < picture.size(width, height):
             seen = f"{source}: frames of {payload} bytes for {width} x {height} px {picture.name}"
             raise CameraRefused(f"{seen}; expected {picture.size(width, height)}. Correct camera.pixel_format.")
@@ -140,12 +140,12 @@ class Stream:
         self.counts = replace(self.counts, whole=self.counts.whole + 1)
         return Whole(data, int(buffer.get_frame_id()), buffer.get_timestamp() * 1e-9)
 
-    def _patience(self) -> None:
+    def _patience(self, socket_bytes: int) -> None:
         """The socket's buffer and the times after which packets are asked for again, or given up."""
         properties = self._stream.props
         properties.socket_buffer = aravis().GvStreamSocketBuffer.FIXED
-        properties.socket_buffer_size = SOCKET_BYTES
+        properties.socket_buffer_size = socket_bytes
         properties.packet_timeout = PACKET_WAIT_US
         properties.frame_retention = FRAME_WAIT_US
-        if (trouble := small_sockets()) is not None:
+        if (trouble := small_sockets(socket_bytes)) is not None:
             log.warning("%s: %s", self._device.source, trouble)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from service.commissioning.install_files import InstallError, packaged, unit, written_folders
-from service.config.config_file import load_config
+from service.config.config_file import ConfigError, load_config
 
 ROOT = Path(__file__).parents[3]
 PACKAGED = packaged()
@@ -114,3 +114,20 @@ def test_what_no_unit_can_name_is_refused() -> None:
 def test_the_folders_to_be_made_are_those_that_are_opened(tmp_path: Path) -> None:
     of_config(tmp_path, "")
     assert written_folders(load_config(tmp_path / "config.yaml")) == [tmp_path / "var", tmp_path / "var" / "archive"]
+
+
+def test_only_with_a_genicam_camera_the_unit_may_ask_for_network_cards(tmp_path: Path) -> None:
+    families = dict(settings(of_config(tmp_path, "")))["RestrictAddressFamilies"]
+    assert "AF_NETLINK" not in families
+    path = tmp_path / "genicam.yaml"
+    path.write_text('camera: {kind: genicam, serial: "GV7"}\ncontroller: {kind: none}\ntriggers: []\n')
+    text = unit(Path("/opt/combtrace/bin/combtrace"), path, "combtrace", load_config(path))
+    assert dict(settings(text))["RestrictAddressFamilies"] == f"{families} AF_NETLINK"
+
+
+@pytest.mark.parametrize("names", ["", ', serial: "1", user_name: "over table 2"'])
+def test_a_genicam_camera_has_one_name(tmp_path: Path, names: str) -> None:
+    path = tmp_path / "config.yaml"
+    path.write_text(f"camera: {{kind: genicam{names}}}\ncontroller: {{kind: none}}\ntriggers: []\n")
+    with pytest.raises(ConfigError, match="expected one: `combtrace cameras` lists them"):
+        load_config(path)

@@ -42,8 +42,7 @@ _SIMPLE_PX = 0.25
 _ON_CUT_PX = 2.0
 _NO_CUTS = np.empty((0, 2, 2))
 # Of the width of the edge: half a level off moves the outline by so much. And of a wall's: the outermost one leans,
-# shows its side, or stands on a foot, and in photographs nobody can say which of that is the edge. Webs of a sheet do
-# not.
+# shows its side, or stands on a foot: in photographs nobody can say which of that is the edge. Webs of a sheet do not.
 _LEAST_BOUND_PX, _BOUND_OF_WIDTH, _BOUND_OF_WALL = 0.3, 0.4, 0.5
 _WIDEST_WALL_PITCHES = 0.2
 

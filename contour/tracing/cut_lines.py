@@ -35,7 +35,9 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence) -> MaterialEdge | Non
     """
     ring = seen.rings[0]
     sure = sure_ends(material, ring, seen)
-    cuts = _cuts(material, ring.points[sure], ring.normal[sure], seen.pitch_px)
+    cuts = straight_cuts(
+        material, ring.points[sure], ring.normal[sure], seen.pitch_px, open_px=_OPEN_PITCHES * seen.pitch_px
+    )
     if not len(cuts):
         return None
     closed = closed_along(material, cuts, seen.pitch_px)
@@ -44,11 +46,14 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence) -> MaterialEdge | Non
     return None if (off > _LEFT_PX).any() else closed
 
 
-def _cuts(material: MaterialEdge, ends: Float64s, normals: Float64s, pitch_px: float) -> Float64s:
+def straight_cuts(
+    material: MaterialEdge, ends: Float64s, normals: Float64s, pitch_px: float, *, open_px: float
+) -> Float64s:
     """Straight cuts that `ends` of walls, (N, 2), pixels, lie on, from corner to corner of the material, (K, 2, 2),
     most ends first.
 
-    normals: unit vectors outwards at each end, (N, 2). A line that material stands out of is no cut.
+    normals: unit vectors outwards at each end, (N, 2). A line that material stands out of is no cut, and a cut ends
+    where nothing touches it for `open_px` pixels.
     """
     border = np.concatenate([densified(ring, 0.5) for ring in material.border])
     near = _NEAR_PX + _NEAR_PITCHES * pitch_px
@@ -57,7 +62,7 @@ def _cuts(material: MaterialEdge, ends: Float64s, normals: Float64s, pitch_px: f
         line = _line(ends, normals, near, _LEAST_APART_PITCHES * pitch_px)
         if line is None or line.on_it.sum() < (_FEWEST_MORE if cuts else _FEWEST_ENDS):
             break
-        cut = _from_corner_to_corner(border, ends, line, near, _OPEN_PITCHES * pitch_px)
+        cut = _from_corner_to_corner(border, ends, line, near, open_px)
         if cut is None:
             break
         cuts.append(cut)

@@ -19,6 +19,7 @@ from contour.tracing.closed_cells import MaterialEdge, material_edge
 from contour.tracing.cut_lines import with_cuts
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, few_ends
 from contour.tracing.evidence_check import check_against_evidence
+from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
@@ -55,6 +56,9 @@ def wall_tips(
     if settings.edge == "cells":
         return _closed_cells(picture, light, settings, on_stage)
     seen, look = looked_at(picture, light, settings, on_stage)
+    plate = _plate(picture, light, settings, on_stage, seen)
+    if plate is not None:
+        return plate
     if few_ends(seen):
         closed, kind = _if_closed(picture, light, settings, on_stage, seen)
         # Where something hides the border no walls end either.
@@ -184,6 +188,23 @@ def _if_closed(
     if found is None:
         return None, kind
     return replace(_around(found, light, cells, walls, on_stage), comb=cells.comb, edge=kind), kind
+
+
+def _plate(
+    picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage, seen: BlockEvidence
+) -> Trace | None:
+    """The outline of a perforated sheet; None where it is none, or cut in more than one line."""
+    if settings.edge != "auto" or not like_plate(seen.comb):
+        return None
+    cells, walls = _cells_and_walls(light, settings)
+    try:
+        found = plate_edge(material_edge(picture, cells.pitch_px, walls), cells.pitch_px)
+    except NoBlockFound:
+        return None
+    if found is None:
+        return None
+    comb = replace(cells.comb, plate=True)
+    return replace(_around(found[0], light, cells, walls, on_stage), comb=comb, edge=found[1])
 
 
 def _closed_cells(picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage) -> Trace:

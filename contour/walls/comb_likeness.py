@@ -43,7 +43,7 @@ class Comb:
     that was looked at, how good a comb they make (0 to 1), and the share that is regular and fills its place (0 to 1).
 
     order: share of the cells with neighbours all around, a pitch away. solid: share of its convex hull that a cell
-    fills, the median.
+    fills, the median. plate: whether holes were seen that show the table.
     """
 
     pitch_px: float
@@ -54,6 +54,7 @@ class Comb:
     regular: float
     order: float = 1.0
     solid: float = 1.0
+    plate: bool = False
 
 
 def surely_comb(comb: Comb) -> bool:
@@ -72,7 +73,7 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
     share = min(sharp_px, comb.wall_px - _WIDER_PX) / comb.pitch_px
     # Foam has wide bright walls, and cells of all sizes between them; so has a sheet with letters, which closes them.
     even = not (cut and comb.bright) or comb.regular > _REGULAR
-    if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and even:
+    if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and even and not comb.plate:
         return (
             f"what lies between patches {comb.pitch_px:.0f} px apart is {100 * share:.0f} % as wide as that, cell "
             f"walls are {100 * _WIDEST_WALL:g} % at most: a board, a print, or a perforated plate. Check that a block "

@@ -1,0 +1,63 @@
+"""A perforated sheet is traced without a promise: its holes show the table; printed patches do not."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from contour.geometry.agreement import agreement
+from contour.geometry.arrays import Bytes
+from contour.geometry.rings import Contour
+from service.config.plain_recipe import PlainRecipe
+from service.measuring.measure import Measurer
+from service.reasons import Reason
+from tests.support.scenes.lattices import lattice
+
+TABLE, SHEET = 60, 200
+PITCH, RADIUS = 30, 8
+
+
+def dotted(dot: int, *, square: bool = False) -> Bytes:
+    """A light sheet of 480 × 360 px with patches of a grey level in rows, on a dark table."""
+    picture = np.full((520, 640), TABLE, np.uint8)
+    cv2.rectangle(picture, (80, 80), (560, 440), SHEET, -1)
+    for row in range(13):
+        for column in range(15 if row % 2 == 0 else 14):
+            x, y = 110 + PITCH * column + (row % 2) * PITCH // 2, 104 + round(26 * row)
+            if square:
+                cv2.rectangle(picture, (x - RADIUS, y - RADIUS), (x + RADIUS, y + RADIUS), dot, -1)
+            else:
+                cv2.circle(picture, (x, y), RADIUS, dot, -1, cv2.LINE_AA)
+    noise = np.random.default_rng(5).normal(0.0, 1.5, picture.shape)
+    return np.clip(cv2.GaussianBlur(picture, (0, 0), 0.8) + noise, 0, 255).astype(np.uint8)
+
+
+def test_a_sheet_whose_round_holes_show_the_table_is_traced() -> None:
+    found = Measurer(None).measure(dotted(TABLE - 10), PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), "cells")
+    assert found.pixels is not None
+    truth = Contour(np.array([[79.5, 79.5], [79.5, 440.5], [560.5, 440.5], [560.5, 79.5]]))
+    assert agreement(found.pixels, truth).p95_px < 1.0
+
+
+@pytest.mark.parametrize(("dot", "square"), [(130, False), (TABLE, True)], ids=["ink", "squares"])
+def test_patches_that_do_not_show_the_table_or_are_square_are_a_print(dot: int, square: bool) -> None:
+    found = Measurer(None).measure(dotted(dot, square=square), PlainRecipe(), 0.0)
+    assert Reason.NO_BLOCK_FOUND in found.reasons
+
+
+def test_a_sheet_that_was_cut_through_its_holes_along_a_line_is_traced_along_that() -> None:
+    one = lattice(977004, "round", "mixed")
+    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), "mixed")
+    assert found.pixels is not None
+    assert found.uncertainty_px is not None
+    near = agreement(found.pixels, one.outline)
+    assert near.hausdorff_px < 0.3 * one.pitch_px
+    assert near.holds(found.uncertainty_px)
+
+
+@pytest.mark.parametrize("seed", [977003, 977005])
+def test_a_cut_sheet_whose_cut_is_not_found_is_refused(seed: int) -> None:
+    assert Measurer(None).measure(lattice(seed, "round", "mixed").picture, PlainRecipe(), 0.0).findings

@@ -68,12 +68,17 @@ def streaks(rng: np.random.Generator, shape: tuple[int, ...], angle: float, widt
 
 def visible(scene: Scene, seen: Contour) -> tuple[Bools, ...]:
     """For each vertex of the rings as seen (pixels) whether nothing lies over it: one array a ring."""
-    areas = [
+    areas = cover_areas(scene)
+    return tuple(_clear_of(ring, areas) for ring in seen.rings)
+
+
+def cover_areas(scene: Scene) -> list[Contour]:
+    """Where covers lie, as seen, pixels."""
+    return [
         scene.camera.project_contour(thing.area, scene.thickness_mm, 8.0 * px_mm(scene))
         for thing in scene.things
         if isinstance(thing, Cover)
     ]
-    return tuple(_clear_of(ring, areas) for ring in seen.rings)
 
 
 def _clear_of(ring: Ring, areas: list[Contour]) -> Bools:

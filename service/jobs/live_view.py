@@ -105,11 +105,19 @@ class LiveView:
                 except FrameUnusable as error:
                     yield self._unusable(error)
                 else:
-                    ahead.append((frame, self._measuring.submit(_seen, frame.pixels, frame.camera)))
+                    ahead.append((frame, self._measured(frame)))
                 grabbed = None
             while ahead and ahead[0][1].done():
                 frame, seen = ahead.popleft()
                 yield Look(frame, *seen.result())
+
+    def _measured(self, frame: Frame) -> Future[Any]:
+        # A terminal sends Ctrl-C to all processes, and it is for the one that shows: a new one keeps what is blocked.
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return self._measuring.submit(_seen, frame.pixels, frame.camera)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
     def _unusable(self, error: FrameUnusable) -> Look:
         reason = Reason.SCENE_MOVED if isinstance(error, SceneMoved) else Reason.NO_FRAME
@@ -128,7 +136,6 @@ _sights: list[Sight] = []  # of a measuring process: the one that it began with
 
 
 def _begin(sight: Sight) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that shows
     cv2.setNumThreads(1)
     _sights.append(sight)
 

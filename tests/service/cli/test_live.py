@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -85,9 +86,10 @@ def test_what_cannot_be_shown_is_told(words, said, capsys, tmp_path, monkeypatch
 
 def test_ctrl_c_ends_it_and_tells_how_many_there_were():
     command = [sys.executable, "-m", "service.cli.main", "live", "--simulated"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as live:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as live:
         first = live.stdout.readline()
-        live.send_signal(signal.SIGINT)
+        os.killpg(live.pid, signal.SIGINT)  # as a terminal does: to all of its processes
         rest, errors = live.communicate()
     assert "wall-tips, 4 vertices" in first
     assert rest.splitlines()[-1].split(" in ")[1].rstrip().split()[1].startswith("frames")

@@ -29,6 +29,8 @@ _TAILS_OF_NOISE = 3.5
 _SECOND_OF_NOISE = 0.2533 * 6.0
 # Steepest rise of a blurred step, and of a blurred line, over their height: 0.40 and 0.61 of 1/sigma.
 _STEEPEST = 0.5
+# Blur that motion or defocus adds to, variance to variance.
+_LENS_BLUR_PX = 1.4
 
 # Of a picture in which nothing was traced.
 _LOOKED_AT_PX = 300_000
@@ -59,13 +61,14 @@ class Quality:
 
 @dataclass(frozen=True)
 class QualityLimits:
-    """Beyond these a contour is not trusted. Blur may reach the larger of a share of the pitch and a number of pixels:
-    cells of a few pixels cannot look sharper than the pixels are.
+    """Beyond these a contour is not trusted. Blur may reach a share of the pitch on top of that of a fair lens, or a
+    number of pixels where that is more: cells of a few pixels cannot look sharper than the pixels are. Walls at full
+    scale still show where they end: the bound on the outline tells what it costs.
     """
 
     max_blur_pitches: float = 0.12
     max_blur_px: float = 1.9
-    max_clipped_share: float = 0.25
+    max_clipped_share: float = 0.7
     min_level: float = 16.0
     min_contrast: float = 8.0
     min_contrast_to_noise: float = 4.0
@@ -113,7 +116,7 @@ def quality_faults(quality: Quality, limits: QualityLimits) -> tuple[str, ...]:
             f"walls stand out of their cells by {quality.contrast:.1f} grey levels, at least {limits.min_contrast:g} "
             "are needed. Check the light, the exposure and the lens"
         )
-    most = max(limits.max_blur_pitches * quality.pitch_px, limits.max_blur_px)
+    most = max(float(np.hypot(limits.max_blur_pitches * quality.pitch_px, _LENS_BLUR_PX)), limits.max_blur_px)
     if quality.blur_px > most:
         faults.append(
             f"walls are blurred by {quality.blur_px:.1f} px where cells are {quality.pitch_px:.0f} px apart, at most "

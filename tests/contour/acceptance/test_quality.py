@@ -40,8 +40,8 @@ def test_blocks_that_can_be_traced_are_good_enough(name: str, kind: str) -> None
     [
         ({"level": 12.0}, ("12 of 255", "at least 16", "light")),
         ({"contrast": 7.0}, ("7.0 grey levels", "at least 8")),
-        ({"clipped_share": 0.4}, ("40 %", "at most 25 %", "shorter exposure")),
-        ({"blur_px": 3.5}, ("3.5 px", "at most 2.9 px", "focus")),
+        ({"clipped_share": 0.8}, ("80 %", "at most 70 %", "shorter exposure")),
+        ({"blur_px": 3.5}, ("3.5 px", "at most 3.2 px", "focus")),
         ({"blur_px": 2.0, "pitch_px": 8.0}, ("2.0 px", "at most 1.9 px")),
     ],
 )

@@ -60,7 +60,7 @@ accuracy: install
 	$(BIN)/python -m benchmarks.accuracy --random 300 --first 998000 --write
 	$(BIN)/python -m benchmarks.accuracy.shop_floor --workers 2 --write
 	$(BIN)/python -m benchmarks.accuracy.shop_floor --workers 2 --taught --write
-	$(BIN)/python -m benchmarks.accuracy.covered_edges --workers 2 --write
+	$(BIN)/python -m benchmarks.covers.covered_edges --workers 2 --write
 	$(BIN)/python -m benchmarks.accuracy.edge_kinds --workers 2 --write
 
 # Every figure and table of docs/reports/methods.md; a test redraws them.

@@ -1,4 +1,4 @@
-"""Where covers are told to lie, and bridges held against the truth: `python -m benchmarks.accuracy.covered_edges`.
+"""Where covers are told to lie, and bridges held against the truth: `python -m benchmarks.covers.covered_edges`.
 
 Pictures of `shop_floor_scenes` with a tape, a clamp, a hand or a cable over the edge, measured as the service measures
 them: once by a recipe that bridges nothing, and once by one that bridges whatever can be.
@@ -38,7 +38,7 @@ _SAID = """\
 ### Where covers lie, and bridges
 
 Those of seeds {first} to {last} of {kinds} in which they hide some of the edge \
-(`python -m benchmarks.accuracy.covered_edges --write`). Place right: the middle of the longest stretch told as \
+(`python -m benchmarks.covers.covered_edges --write`). Place right: the middle of the longest stretch told as \
 hidden, which the words name, lies on a cover or within {place:g} cell of one. Told: how much of the truly hidden edge \
 is told as hidden, the median. Bridged: accepted by a recipe that bridges whatever can be; of these, how many have \
 95 % of the hidden edge within the stated bound, and how many are off by more than half a cell somewhere, hidden or \
@@ -143,7 +143,7 @@ def _row(name: str, some: Sequence[CoveredEdge]) -> list[str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when every cover is refused and no bridged outline is wrong, else 1."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy.covered_edges", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.covers.covered_edges", description=__doc__)
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="pictures of each kind")
     parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="the first seed")
     parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.accuracy import covered_edges
-from benchmarks.accuracy.covered_edges import CoveredEdge, covered_edge, main, report
+from benchmarks.covers import covered_edges
+from benchmarks.covers.covered_edges import CoveredEdge, covered_edge, main, report
 
 
 def test_a_clamp_is_refused_by_its_place_and_bridged_within_the_bound() -> None:

@@ -1,0 +1,1 @@
+"""Covered edges: whether they are refused where they lie, and whether bridges are right."""

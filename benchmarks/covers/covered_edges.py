@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 
 import cv2
 import numpy as np
@@ -152,7 +153,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.seeds)
     jobs = [(kind, seed) for kind in COVERS for seed in seeds]
-    with ProcessPoolExecutor(options.workers, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
+    # Not forked: where OpenCV's threads have run before, a forked process waits for them for ever.
+    fresh = get_context("forkserver")
+    with ProcessPoolExecutor(options.workers, fresh, cv2.setNumThreads, (1,)) as pool:
         found = [one for one in pool.map(covered_edge, *zip(*jobs, strict=True)) if one is not None]
     for one in found if options.list else ():
         print(one)

@@ -224,7 +224,7 @@ async def test_a_defect_after_sending_withdraws_the_job_first(tmp_path: Path) ->
     async with rig(tmp_path, controller=ScriptedController([Answer.WITHDRAWN])) as built:
         read_page = built.controller.read_page
 
-        async def broken(payload_length: int) -> object:
+        async def broken(*_lengths: int) -> object:
             built.controller.read_page = read_page  # type: ignore[method-assign]
             raise ZeroDivisionError("a defect")
 
@@ -311,7 +311,7 @@ async def test_a_defect_without_handshake_ends_the_job_at_once(tmp_path: Path) -
     settings = replace(SETTINGS, transfer=replace(QUICK, handshake=False))
     async with rig(tmp_path, settings) as built:
 
-        async def broken(_payload_length: int) -> object:
+        async def broken(*_lengths: int) -> object:
             raise ZeroDivisionError("a defect")
 
         built.controller.read_page = broken  # type: ignore[method-assign,assignment]
@@ -418,7 +418,7 @@ async def test_a_withdrawal_after_a_defect_that_dragged_on_leaves_no_fault_behin
     async with rig(tmp_path, settings, controller=ScriptedController([None])) as built:
         read_page = built.controller.read_page
 
-        async def broken(payload_length: int) -> object:
+        async def broken(*_lengths: int) -> object:
             built.controller.read_page = read_page  # type: ignore[method-assign]
             raise ZeroDivisionError("a defect")
 

@@ -123,6 +123,10 @@ def test_a_job_that_a_stop_cut_short_is_told_after_the_next_start(tmp_path: Path
         )
 
 
+def ends(heard: list[str]) -> dict[int, str]:
+    return {int(line.split()[1]): line for line in heard if line.startswith(("DONE", "FAIL"))}
+
+
 def test_whatever_the_moment_of_a_kill_every_acknowledged_job_is_told_its_end(
     tmp_path: Path, terminal: Terminal
 ) -> None:
@@ -137,8 +141,10 @@ def test_whatever_the_moment_of_a_kill_every_acknowledged_job_is_told_its_end(
         terminal.type(b"PING\n")
         while "PONG" not in heard:
             heard.append(terminal.line(20))
-        ended = {int(line.split()[1]): line for line in heard if line.startswith(("DONE", "FAIL"))}
+        until(lambda: len(cell.settled()) == len(jobs(cell.journal)), what="all jobs' ends")
         found = {job["job_id"]: job for job in jobs(cell.journal)}
+        while not found.keys() <= (ended := ends(heard)).keys():  # the newest may be told after the PONG
+            heard.append(terminal.line(20))
     assert found, "no kill left a job"
     assert ended.keys() == found.keys(), heard
     assert {int(line.split()[1]) for line in heard if line.startswith("ACK")} <= ended.keys()

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import json
+
 import cv2
 import numpy as np
 import pytest
 
+from contour.synthetic.board_poses import board_poses
+from service.cli.main import main
+from service.measuring.calibration_file import load_record
 from tests.support.gige_camera import GigeCamera, aravis_is_loaded, need_aravis
+from tests.support.pictures.board_scenes import CHARUCO, SMALL, picture
 from tests.support.pictures.combs import SIZES, comb, write_combs
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import called, lines, until
+from tests.support.processes.page_client import Client
+from tests.support.processes.processes import called, free_port, lines, until
 
 __all__ = ["aravis_is_loaded"]
 CAMERA = '{kind: genicam, serial: "GV7", width: 320, height: 240, exposure_us: 2000, timeout_s: 2%s}'
@@ -74,23 +81,56 @@ def test_a_camera_s_commands_work_on_it(gige, tmp_path):
     assert focused.returncode == 0, focused.stderr
     checked = called("check", "--config", config)
     assert "genicam GV7: 320 x 240 px" in checked.stdout, checked.stdout + checked.stderr
+    looked = called("live", "--config", config, "--frames", "3", "--json")
+    assert [json.loads(line)["sequence"] for line in looked.stdout.splitlines()] == [1, 2, 3], looked.stderr
+
+
+def test_a_deep_camera_is_calibrated_by_what_it_shows(tmp_path):
+    need_aravis()
+    poses = board_poses(CHARUCO, SMALL, 10, np.random.default_rng(4))
+    shown = [picture(CHARUCO, SMALL, pose, number).astype("<u2") << 4 for number, pose in enumerate(poses)]
+    config, views = tmp_path / "config.yaml", [tmp_path / f"{number}.png" for number in range(len(shown))]
+    made = "width: 960, height: 720, pixel_format: Mono12, exposure_us: 2000, packet_size: 9000, timeout_s: 5"
+    config.write_text(f"camera: {{kind: genicam, serial: GV7, {made}}}\ncontroller: {{kind: none}}\ntriggers: []\n")
+    with GigeCamera(tmp_path, [frame.view(np.uint8) for frame in shown]):
+        for _ in range(5 * len(views)):  # each opens the camera anew; a frame that came broken leaves a view for later
+            assert main(["grab", "--config", str(config), "--output", str(tmp_path / "seen.png")]) == 0
+            seen = cv2.imread(str(tmp_path / "seen.png"), cv2.IMREAD_UNCHANGED)
+            assert seen.dtype == np.uint16
+            number = next(n for n, frame in enumerate(shown) if (seen.ravel()[8:] >> 4 == frame.ravel()[8:]).all())
+            (tmp_path / "seen.png").rename(views[number])
+            if all(view.exists() for view in views):
+                break
+    board = ["--board", "charuco", "--squares", "11x8", "--square-mm", "30", "--marker-mm", "21"]
+    output = tmp_path / "cell.yaml"
+    assert main(["calibrate", *board, "--plane", str(views[0]), "--output", str(output), *map(str, views)]) == 0
+    record = load_record(output)
+    assert record.made["views"] == len(shown)
+    true = SMALL.back_project(np.array([[480.0, 360.0]]), 20.0) - poses[0].translation_mm[:2]
+    found = record.calibration.to_work(np.array([[480.0, 360.0]]), 20.0)
+    assert np.linalg.norm(found - true) < record.calibration.uncertainty.figure_mm(20.0) + 0.02
 
 
 def test_deep_frames_are_archived_whole_and_replayed_to_the_bit(tmp_path):
     need_aravis()
     write_combs(tmp_path / "combs")
     dim = [comb(*size).astype("<u2") for size in SIZES]  # 8 of 12 bits: a sixteenth of the light
+    page = Client(free_port())
     with GigeCamera(tmp_path, [picture.view(np.uint8) for picture in dim]):
         cell = Cell(
             tmp_path,
             camera=CAMERA % ", pixel_format: Mono12",
             calibration=tmp_path / "combs.yaml",
-            more="archive: {path: archive}\n",
+            more=f"archive: {{path: archive}}\npage: {{port: {page.port}}}\n",
         )
         try:
             cell.goes_on(3)
+            job = cell.number(1)
+            until(lambda: page.get(f"/api/v1/frames/{job}").status == 200, what="the frame on the page")
+            shown = page.get(f"/api/v1/frames/{job}")
         finally:
             cell.stop()
+    assert cv2.imdecode(np.frombuffer(shown.body, np.uint8), cv2.IMREAD_GRAYSCALE).max() > 150, "as dim as it was taken"
     frames = sorted((tmp_path / "archive").rglob("*-frame.png"))
     assert frames
     kept = cv2.imread(str(frames[0]), cv2.IMREAD_UNCHANGED)

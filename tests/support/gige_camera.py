@@ -43,6 +43,15 @@ EXTRA_FORMATS = {
     "BayerRG12Packed": 0x010C002B,
     "BayerRG12p": 0x010C0059,
 }
+EXTRA_CHOICES = {  # an enumeration's entries, and where its value lies
+    "BalanceWhiteAuto": (("Off", "Continuous"), 0x400),
+    "BalanceRatioSelector": (("Red", "Green", "Blue"), 0x404),
+    "LineSelector": (("Line1", "Line2"), 0x408),
+    "LineMode": (("Input", "Output"), 0x440),
+    "LineSource": (("Off", "ExposureActive"), 0x460),
+}
+EXTRA_NUMBERS = {"BlackLevelRaw": 0x40C, "BalanceRatioRaw": 0x420}  # 0 to 255
+SELECTED = {"BalanceRatioRaw": "BalanceRatioSelector", "LineMode": "LineSelector", "LineSource": "LineSelector"}
 
 
 def need_aravis():
@@ -98,6 +107,12 @@ class GigeCamera:
     def made(self):
         """How many frames it has exposed since it was switched on."""
         self._process.stdin.write("made\n")
+        self._process.stdin.flush()
+        return int(self._process.stdout.readline())
+
+    def at(self, place):
+        """What the register at this place holds."""
+        self._process.stdin.write(f"at {place}\n")
         self._process.stdin.flush()
         return int(self._process.stdout.readline())
 
@@ -158,13 +173,32 @@ def description(line):
         for name, value in EXTRA_FORMATS.items()
     )
     text = text.replace("<pValue>PixelFormatRegister</pValue>", entries + "<pValue>PixelFormatRegister</pValue>")
-    text = text.replace(
-        "<pFeature>TestRegister</pFeature>", "<pFeature>TestRegister</pFeature><pFeature>TestBoolean</pFeature>"
-    )
+    more = more_features()
+    listed = "".join(f"<pFeature>{name}</pFeature>" for name in ("TestBoolean", *more))
+    text = text.replace("<pFeature>TestRegister</pFeature>", "<pFeature>TestRegister</pFeature>" + listed)
+    text = text.replace("</RegisterDescription>", "".join(more.values()) + "</RegisterDescription>")
     if line:  # the fake exposes on the register of its software trigger alone, which is this line here
         text = re.sub(r'<EnumEntry Name="Line0".*?</EnumEntry>', "", text, flags=re.DOTALL)
         text = text.replace('<EnumEntry Name="Software"', '<EnumEntry Name="Line0"')
     return text
+
+
+def more_features():
+    """Descriptions of what cells set and the fake has not, by name: black level, white balance, a line for a strobe."""
+    places = {name: place for name, (_, place) in EXTRA_CHOICES.items()} | EXTRA_NUMBERS
+    described = {name: f'<Integer Name="{name}"><pValue>{name}At</pValue><Max>255</Max></Integer>' for name in places}
+    for name, (entries, _) in EXTRA_CHOICES.items():
+        values = "".join(
+            f'<EnumEntry Name="{entry}"><Value>{value}</Value></EnumEntry>' for value, entry in enumerate(entries)
+        )
+        described[name] = f'<Enumeration Name="{name}">{values}<pValue>{name}At</pValue></Enumeration>'
+    for name, place in places.items():
+        index = f'<pIndex Offset="4">{SELECTED[name]}At</pIndex>' if name in SELECTED else ""
+        described[name] += (
+            f'<IntReg Name="{name}At"><Address>{place}</Address>{index}<Length>4</Length><AccessMode>RW</AccessMode>'
+            "<pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>"
+        )
+    return described
 
 
 def host(args):
@@ -211,6 +245,9 @@ def host(args):
             fake.write_register(TRIGGER_SOFTWARE, 1)
         elif word == "width":
             fake.write_register(WIDTH, int(value))
+        elif word == "at":
+            print(fake.read_register(int(value))[1], flush=True)
+            continue
         elif word.strip() == "made":
             print(count, flush=True)
             continue

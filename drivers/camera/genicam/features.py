@@ -118,7 +118,7 @@ class Features:
             if not entries or text in entries:
                 return text
             near = difflib.get_close_matches(text, entries, 1)
-            expected = "one of " + ", ".join(entries) + (f"; did you mean {near[0]}?" if near else "")
+            expected = "one of " + ", ".join(entries) + (f" (did you mean {near[0]}?)" if near else "")
         else:
             if isinstance(value, int | float) and not isinstance(value, bool) and self._within(kind, name, value):
                 return float(value) if kind == "float" else int(value)

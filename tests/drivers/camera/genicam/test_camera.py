@@ -246,7 +246,10 @@ def test_cameras_are_listed_with_serial_number_and_user_name_and_found_by_either
         ({"width": 4000}, r"Width = 4000; expected a whole number, .* to 2048.*camera.width"),
         ({"gain_db": 11}, r"GainRaw = 11; expected a whole number, 0 to 10.*camera.gain_db"),
         ({"exposure_us": 1}, r"ExposureTimeAbs = 1; expected a number, 10 to 10000000.*camera.exposure_us"),
-        ({"black_level": 3}, r"no feature BlackLevel"),
+        ({"frame_rate": 1e9}, r"camera.frame_rate"),
+        ({"black_level": 300}, r"BlackLevelRaw = 300; expected a whole number, 0 to 255.*camera.black_level"),
+        ({"white_balance": {"red": 256}}, r"BalanceRatioRaw = 256; .*camera.white_balance.red"),
+        ({"strobe": "Line3"}, r"LineSelector = Line3; expected one of Line1, Line2 .*Correct camera.strobe"),
         ({"line": "Line7", "trigger": "line"}, r"TriggerSource = Line7; expected one of Line0, Software.*camera.line"),
         ({"features": {"TestBolean": True}}, r"no feature TestBolean; did you mean TestBoolean\?"),
         ({"features": {"TestBoolean": 3}}, r"TestBoolean = 3; expected true or false"),
@@ -269,6 +272,17 @@ def test_features_are_written_and_read_back(gige, opened):
     rate = written["AcquisitionFrameRate"]
     assert rate.held == pytest.approx(33.0, rel=0.01)
     assert "(asked 33)" in str(rate)  # the camera rounds it, and that is told
+
+
+def test_black_level_white_balance_and_strobe_reach_the_camera_s_registers(gige, opened):
+    camera = opened(black_level=9, white_balance={"red": 7, "blue": 5}, strobe="Line2")
+    black, balance, mode, source = 0x40C, 0x420, 0x440, 0x460
+    assert gige.at(black) == 9
+    assert [gige.at(balance + 4 * colour) for colour in range(3)] == [7, 0, 5]
+    assert [gige.at(mode + 4 * line) for line in range(2)] == [0, 1], "an input, and the output"
+    assert [gige.at(source + 4 * line) for line in range(2)] == [0, 1], "off, and on while exposing"
+    held = {entry.name: entry.held for entry in camera.opened.written}
+    assert (held["BlackLevelRaw"], held["LineSource"]) == (9, "ExposureActive")
 
 
 def test_a_refused_setting_lets_the_camera_go(gige, opened):

@@ -12,6 +12,7 @@ from contour.geometry.arrays import Float64s, Indices, distinct
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import nearest
+from contour.outline.uncertainty import RingBounds
 
 _SHORTEST_PITCHES = 1.0
 # A bridge joins two sides: walls seen over so much of each, and between them no more of a bend than this.
@@ -20,20 +21,26 @@ _STRAIGHT_PITCHES, _STRAIGHT_PX = 0.02, 0.7
 _SMOOTH_DEG = 12.0
 # What an edge may bend unseen, of the length bridged.
 _BEND = 0.02
+_LESS_SURE, _FOOT_PITCHES = 1.2, 1.5
 
 
 def ring_evidence(
-    number: int, ring: Ring, visible: VisibleRing, look: TableLook, rectifier: Rectifier | None, bound_px: float
+    number: int, ring: Ring, visible: VisibleRing, look: TableLook, rectifier: Rectifier | None, bounds: RingBounds
 ) -> tuple[Stretch, ...]:
-    """The stretches of `ring`, pixels, in its own order; `number` is its place in the contour."""
+    """The stretches of `ring`, pixels, in its own order; `number` is its place in the contour.
+
+    What is seen, but less sure than the outline as a whole by more than `_LESS_SURE`, is a stretch of its own.
+    """
     pitch_px = look.pitch_px
     places = places_along(ring, SPACING_PITCHES * pitch_px, rectifier)
-    if not len(visible.distrusted):
-        return (Stretch(number, 0.0, places.whole, "seen", None, bound_px),)
-    hidden = visible.hidden(places.points, look)
+    sure = bounds.at(places.points)
+    hidden = visible.hidden(places.points, look) if len(visible.distrusted) else np.zeros(len(sure), np.bool_)
     fills = visible.evidence.points[visible.filled & visible.fitted.inlier]
     filled = ~hidden & (nearest(places.points, fills) < 2 * SPACING_PITCHES * pitch_px)
-    label = np.where(filled, -1, 0)
+    told = places.points[hidden | filled]
+    # Walls that end inside beside a thing end at it: there its own bound counts.
+    unsure = (sure > _LESS_SURE * bounds.whole_px) & (nearest(places.points, told) > _FOOT_PITCHES * pitch_px)
+    label = np.where(unsure, -2, np.where(filled, -1, 0))
     # Shorter ones are gaps between ends, as there are everywhere.
     runs = [run for run in runs_of(hidden) if len(run) > _SHORTEST_PITCHES / SPACING_PITCHES]
     for index, run in enumerate(runs):
@@ -46,10 +53,12 @@ def ring_evidence(
         kind = int(label[first])
         if kind > 0:
             state, straight, length = states[kind - 1]
-            stretches.append(Stretch(number, begin, end, state, "object", bound_px + _BEND * length, straight))
+            bound_px = bounds.whole_px + _BEND * length
+            stretches.append(Stretch(number, begin, end, state, "object", bound_px, straight))
         else:
-            by: Hider | None = "compound" if kind < 0 else None
-            stretches.append(Stretch(number, begin, end, "seen", by, bound_px))
+            by: Hider | None = "compound" if kind == -1 else None
+            own_px = bounds.whole_px if kind != -2 else float(sure[first:last].max())
+            stretches.append(Stretch(number, begin, end, "seen", by, own_px))
     return tuple(stretches)
 
 

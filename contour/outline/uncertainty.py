@@ -40,6 +40,15 @@ _CAP_PITCHES = 0.5
 _OF_SCATTER = 0.8
 """Of the scatter of single witnesses: in four of five cases the middle ones of five lie no farther off by chance."""
 
+_ENDS = np.array([True, True, False, False])
+"""Kinds of witnesses that are ends of walls, by `WitnessKind`: one that lies inside may be where the edge runs."""
+
+_BEYOND = 1.1
+"""Times as far as such an end: beyond it the edge may run on as it came."""
+
+_NORMAL = 1.96
+"""Standard deviations within which 95 % of what is normal lies."""
+
 _HALVINGS = 24
 _REACH = np.linspace(0.0, 6.0, 601)
 _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
@@ -66,7 +75,8 @@ class Coefficients:
 class Stretches:
     """Stretches of outline between neighbouring witnesses on it, shape (S,) each, pixels.
 
-    length: along the coarse ring. The others are the causes of `Coefficients`, by the same names.
+    length: along the coarse ring. inside: how far inside of the outline ends of walls tell that the edge may run. The
+    others are the causes of `Coefficients`, by the same names.
     """
 
     length: Float64s
@@ -76,11 +86,30 @@ class Stretches:
     gap: Float64s
     misfit: Float64s
     outside: Float64s
+    inside: Float64s
 
     def sigma(self, coefficients: Coefficients) -> Float64s:
         """Standard deviation of the outline's place in each stretch."""
         terms = [getattr(coefficients, one.name) * getattr(self, one.name) for one in fields(coefficients)]
         return np.asarray(np.sqrt(np.sum(np.square(terms), axis=0)), np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class RingBounds:
+    """95 % bounds along one ring, pixels: `own_px` around each of the witnesses on it, `places` (K, 2), shape (K,).
+
+    None is below the bound of all rings together, `whole_px`: where ends of walls lie inside of the outline, or little
+    is seen, it is less sure.
+    """
+
+    whole_px: float
+    places: Float64s
+    own_px: Float64s
+
+    def at(self, points: Float64s) -> Float64s:
+        """The bound at points on the ring (N, 2), pixels: that around the nearest witness, shape (N,)."""
+        x, y = np.subtract.outer(points[:, 0], self.places[:, 0]), np.subtract.outer(points[:, 1], self.places[:, 1])
+        return np.asarray(self.own_px[(x * x + y * y).argmin(axis=1)])
 
 
 def uncertainty(
@@ -89,15 +118,21 @@ def uncertainty(
     pitch_px: float,
     blur_px: float,
     clipped: float = 0.0,
-    coefficients: Coefficients | None = None,
-) -> float:
-    """95 % bound on the distance between outline and truth, pixels, of all rings together.
+) -> tuple[RingBounds, ...]:
+    """How sure the outline is: each ring by place, and all of them as a whole.
 
     clipped: share of the witnesses beside which walls are at full scale.
     """
     stretches = [ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, clipped=clipped) for ring in rings]
-    sigma = np.concatenate([one.sigma(coefficients or Coefficients()) for one in stretches])
-    return max(bound(sigma, np.concatenate([one.length for one in stretches])), LEAST_PX)
+    sigma = [one.sigma(Coefficients()) for one in stretches]
+    whole = max(bound(np.concatenate(sigma), np.concatenate([one.length for one in stretches])), LEAST_PX)
+    found = []
+    for (evidence, fitted), deviation, stretch in zip(rings, sigma, stretches, strict=True):
+        own = np.maximum(_NORMAL * deviation, whole) + _BEYOND * stretch.inside
+        places = evidence.points[_on_line(evidence, fitted)]
+        # A witness lies between two stretches.
+        found.append(RingBounds(whole, places, np.maximum(own, np.roll(own, 1))))
+    return tuple(found)
 
 
 def bound(sigma: Float64s, length: Float64s) -> float:
@@ -118,9 +153,7 @@ def ring_stretches(
     evidence: RingEvidence, fitted: FittedRing, *, pitch_px: float, blur_px: float, clipped: float = 0.0
 ) -> Stretches:
     """The stretches of one ring and the causes of error in each."""
-    on_line = np.flatnonzero(fitted.inlier)
-    if len(on_line) < 2:
-        on_line = np.arange(len(evidence.points))
+    on_line = _on_line(evidence, fitted)
     position = evidence.position[on_line]
     coarse = evidence.coarse
     around = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
@@ -137,7 +170,38 @@ def ring_stretches(
         gap=np.maximum(length - pitch_px, 0.0),
         misfit=np.sqrt(np.maximum(together**2 - (_OF_SCATTER * fitted.spread_px) ** 2, 0.0)),
         outside=_largest_between(np.where(left_out, np.maximum(residual, 0.0), 0.0), on_line),
+        inside=_inside(evidence, fitted, on_line, _CAP_PITCHES * pitch_px),
     )
+
+
+def _inside(evidence: RingEvidence, fitted: FittedRing, on_line: Indices, deepest_px: float) -> Float64s:
+    """How far inside of the outline the edge may run in each stretch, since ends of walls lie there, shape (S,).
+
+    A single one is an inner wall, but where the outline bulges: there it may run from witness to witness. Two are not,
+    unless they lie `deepest_px` inside.
+    """
+    start = evidence.points[on_line]
+    along = np.roll(start, -1, axis=0) - start
+    square = np.maximum((along**2).sum(axis=1), 1e-12)
+    length = np.sqrt(square)
+    off = fitted.ring[:, None] - start
+    share = (off * along).sum(axis=2) / square
+    apart = np.abs(off[..., 0] * along[:, 1] - off[..., 1] * along[:, 0]) / length
+    bulge = np.where((share > 0.0) & (share < 1.0) & (apart < length), apart, 0.0).max(axis=0)
+    deepest, second = np.zeros(len(on_line)), np.zeros(len(on_line))
+    inner = (fitted.residual < 0.0) & (fitted.residual > -deepest_px)
+    ends = np.flatnonzero(~fitted.inlier & _ENDS[evidence.kind] & inner)
+    for end in ends.tolist():
+        stretch, depth = int(np.searchsorted(on_line, end)) - 1, -float(fitted.residual[end])
+        second[stretch] = max(second[stretch], min(depth, deepest[stretch]))
+        deepest[stretch] = max(deepest[stretch], depth)
+    return np.asarray(np.maximum(np.minimum(deepest, bulge), second))
+
+
+def _on_line(evidence: RingEvidence, fitted: FittedRing) -> Indices:
+    """The witnesses between which stretches lie: those on the outline, or all where it has hardly any."""
+    on_line = np.flatnonzero(fitted.inlier)
+    return on_line if len(on_line) >= 2 else np.arange(len(evidence.points))
 
 
 def _leverage(evidence: RingEvidence, fitted: FittedRing, place: Float64s, around: float) -> Float64s:

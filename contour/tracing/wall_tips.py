@@ -103,7 +103,7 @@ def _cut(
     # Rings are fitted with the material on their left in pixels; seen in the work frame, whose y runs up, that is
     # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
-    sure_px = uncertainty(
+    bounds = uncertainty(
         [(one.evidence, one.fitted) for one in visible],
         pitch_px=seen.pitch_px,
         blur_px=seen.blur_px,
@@ -113,9 +113,11 @@ def _cut(
     evidence = tuple(
         stretch
         for number, (ring, one) in enumerate(zip(contour.rings, visible, strict=True))
-        for stretch in ring_evidence(number, ring, one, look, rectifier, sure_px)
+        for stretch in ring_evidence(number, ring, one, look, rectifier, bounds[number])
     )
-    return replace(_trace(seen, contour, light, uncertainty_px=sure_px), edge="cut", evidence=evidence, look=look)
+    return replace(
+        _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px), edge="cut", evidence=evidence, look=look
+    )
 
 
 def visible_rings(

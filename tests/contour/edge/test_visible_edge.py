@@ -15,6 +15,7 @@ from contour.edge.table_look import TableLook
 from contour.edge.visible_edge import VisibleRing, fit_visible
 from contour.errors import NoBlockFound
 from contour.outline.fit import fit_ring
+from contour.outline.uncertainty import RingBounds
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.hand_looks import HEIGHT, WIDTH, look
 from tests.support.pictures.outline_scenes import PITCH, along, blob, circle, distances, errors, rectangle, witnesses
@@ -47,7 +48,8 @@ def fitted(evidence: RingEvidence, there: TableLook) -> VisibleRing:
 
 def told(one: VisibleRing, there: TableLook) -> list[Stretch]:
     """The stretches that are not plainly seen."""
-    stretches = ring_evidence(0, one.fitted.ring, one, there, None, 0.5)
+    sure = RingBounds(0.5, one.on_line, np.full(len(one.on_line), 0.5))
+    stretches = ring_evidence(0, one.fitted.ring, one, there, None, sure)
     return [stretch for stretch in stretches if stretch.state != "seen"]
 
 

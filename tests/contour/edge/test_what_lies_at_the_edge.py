@@ -57,11 +57,15 @@ def test_what_lies_over_a_straight_edge_is_found_there_and_the_edge_goes_on_bene
 
 
 @pytest.mark.parametrize("name", COVERED)
-def test_a_bridge_is_less_sure_than_what_is_seen_and_its_bound_holds(name: str) -> None:
+def test_a_bridge_is_less_sure_than_the_whole_and_what_is_seen_beside_it_and_its_bound_holds(name: str) -> None:
     scene = edge_scene(name)
     (stretch,) = scene.hidden
     assert scene.trace.evidence is not None
-    assert stretch.bound_px > max(one.bound_px for one in scene.trace.evidence if one.state == "seen")
+    own = [one for one in scene.trace.evidence if one.ring == stretch.ring]
+    index = own.index(stretch)
+    beside = [own[index - 1], own[(index + 1) % len(own)]]
+    assert {one.state for one in beside} == {"seen"}
+    assert stretch.bound_px > max(one.bound_px for one in beside) == min(one.bound_px for one in own)
     assert scene.off[~scene.rendered.visible[0]].max() < stretch.bound_px
 
 

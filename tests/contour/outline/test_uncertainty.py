@@ -28,7 +28,7 @@ few = settings(max_examples=12)
 
 def stated(*rings: RingEvidence, blur_px: float = 0.9, pitch_px: float = PITCH) -> float:
     fitted = [fit_ring(ring, pitch_px=pitch_px, wall_px=pitch_px / 7, rectifier=None) for ring in rings]
-    return uncertainty(list(zip(rings, fitted, strict=True)), pitch_px=pitch_px, blur_px=blur_px)
+    return uncertainty(list(zip(rings, fitted, strict=True)), pitch_px=pitch_px, blur_px=blur_px)[0].whole_px
 
 
 def without(evidence: RingEvidence, begin: float, end: float) -> RingEvidence:
@@ -64,7 +64,7 @@ def test_it_grows_with_the_witnesses_scatter_about_the_fit(
         spread_px=fitted.spread_px * factor,
         vertex_sigma_px=fitted.vertex_sigma_px * factor,
     )
-    one, other = (uncertainty([(evidence, fit)], pitch_px=PITCH, blur_px=0.9) for fit in (fitted, looser))
+    one, other = (uncertainty([(evidence, fit)], pitch_px=PITCH, blur_px=0.9)[0].whole_px for fit in (fitted, looser))
     assert other > one
 
 
@@ -122,8 +122,8 @@ def test_a_picture_enlarged_and_turned_has_the_bound_enlarged(
         spread_px=fitted.spread_px * scale,
         vertex_sigma_px=fitted.vertex_sigma_px * scale,
     )
-    one = uncertainty([(evidence, fitted)], pitch_px=PITCH, blur_px=1.0)
-    other = uncertainty([(turned, larger)], pitch_px=PITCH * scale, blur_px=scale)
+    one = uncertainty([(evidence, fitted)], pitch_px=PITCH, blur_px=1.0)[0].whole_px
+    other = uncertainty([(turned, larger)], pitch_px=PITCH * scale, blur_px=scale)[0].whole_px
     assert other == pytest.approx(max(one * scale, LEAST_PX), rel=1e-3)
 
 
@@ -143,6 +143,27 @@ def test_neighbours_off_on_one_side_and_material_left_outside_are_seen() -> None
     assert seen.outside.max() == 9.0
     assert np.count_nonzero(seen.misfit > 1.0) <= 3
     assert np.count_nonzero(seen.outside > 1.0) == 1
+
+
+def test_ends_of_walls_left_inside_make_their_own_place_less_sure_and_nothing_else() -> None:
+    """Two of a row do, a single one is an inner wall; what lies half a cell deep is one, too."""
+    evidence = witnesses(WIDE, seed=1, sigma=0.05)
+    fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
+    evidence = replace(evidence, kind=np.full_like(evidence.kind, WitnessKind.CLEAN))
+    for depths, told in (((6.0,), 0.0), ((7.0, 6.0), 6.0), ((7.0, 0.6 * PITCH), 0.0)):
+        residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
+        place = slice(10, 10 + len(depths))
+        residual[place], inlier[place] = -np.array(depths), False
+        seen = ring_stretches(evidence, replace(fitted, residual=residual, inlier=inlier), pitch_px=PITCH, blur_px=1.0)
+        assert seen.inside.max() == told
+        assert np.count_nonzero(seen.inside) == (told > 0.0)
+        (sure,) = uncertainty(
+            [(evidence, replace(fitted, residual=residual, inlier=inlier))], pitch_px=PITCH, blur_px=1.0
+        )
+        assert sure.own_px.min() == sure.whole_px
+        here = sure.at(evidence.points[place])
+        assert (here >= sure.whole_px + told).all()
+        assert here.max() < sure.whole_px + 1.2 * told + 0.5
 
 
 @given(st.floats(0.1, 3.0), st.integers(1, 40))
@@ -186,7 +207,8 @@ def test_walls_at_full_scale_leave_it_less_sure() -> None:
     evidence = witnesses(WIDE, seed=1)
     fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
     clear, clipped = (
-        uncertainty([(evidence, fitted)], pitch_px=PITCH, blur_px=1.0, clipped=share) for share in (0.0, 1.0)
+        uncertainty([(evidence, fitted)], pitch_px=PITCH, blur_px=1.0, clipped=share)[0].whole_px
+        for share in (0.0, 1.0)
     )
     assert clipped > clear
 

@@ -28,6 +28,9 @@ _GIVEN_UP_MOVES = 12
 _ROUGH_SHAPE_MM = 0.05
 _ROUGH_MOVE_MM = 0.05
 _LEAST_MOVE_MM = 1e-4
+_MOST_GROWTH = 4.0
+"""Times the first move: larger ones have more contacts than they gain."""
+
 _FINISHED = 3
 """Candidates that are followed from the rough to the least move."""
 
@@ -61,9 +64,10 @@ def best_placement(part: Contour, block: Contour, turns: Turns) -> Placement:
     """
     check_can_be_laid("part", part)
     check_can_be_laid("block", block)
-    found, field = candidates(part, block, turns)
+    rough_part, rough_block = _simpler(part), _simpler(block)
+    found, field = candidates(rough_part, rough_block, turns)
     first_move = _FIRST_MOVE_NODES * field.spacing_mm
-    lying = _Lying.of(_simpler(part), _simpler(block), field)
+    lying = _Lying.of(rough_part, rough_block, field)
     rough: list[tuple[Candidate, Placement]] = []
     for candidate in found[:_MEASURED]:
         best_so_far = max((placement.margin for _, placement in rough), default=-np.inf)
@@ -72,12 +76,35 @@ def best_placement(part: Contour, block: Contour, turns: Turns) -> Placement:
             break
         rough.append((candidate, lying.improved(candidate, first_move, _ROUGH_MOVE_MM, best_so_far)))
     lying = _Lying.of(part, block, field)
-    rough.sort(key=lambda one: -one[1].margin)
-    final = [
-        _checked(part, block, lying.improved(replace(candidate, pose=placement.pose), _ROUGH_MOVE_MM, _LEAST_MOVE_MM))
-        for candidate, placement in rough[:_FINISHED]
-    ]
-    return max(final, key=lambda placement: placement.margin)
+    final: list[Placement] = []
+    for candidate, placement in _best_apart(rough, part):
+        best_so_far = max((one.margin for one in final), default=-np.inf)
+        moved = replace(candidate, pose=placement.pose)
+        final.append(lying.improved(moved, _ROUGH_MOVE_MM, _LEAST_MOVE_MM, best_so_far))
+    return max((_checked(part, block, one) for one in final), key=lambda placement: placement.margin)
+
+
+def placement_at(part: Contour, block: Contour, pose: Pose) -> Placement:
+    """The part laid as the pose says: the margin that it has there, and where it is tightest."""
+    near = contacts(Outline.of(part).moved(pose), Outline.of(block), 0.0)
+    return _checked(part, block, _placement(pose, near))
+
+
+def _placement(pose: Pose, near: Contacts) -> Placement:
+    nearest = near.take(np.argmin(near.distance, keepdims=True))
+    (x, y), (u, v) = nearest.of_part[0].tolist(), nearest.of_block[0].tolist()
+    return Placement(pose, nearest.least, ((x, y), (u, v)))
+
+
+def _best_apart(rough: list[tuple[Candidate, Placement]], part: Contour) -> list[tuple[Candidate, Placement]]:
+    """The best `_FINISHED` of them, without those that moves have led to where a better one lies."""
+    far = np.array([part.exterior.min(axis=0), part.exterior.max(axis=0)])
+    kept: list[tuple[Candidate, Placement]] = []
+    for one in sorted(rough, key=lambda one: -one[1].margin):
+        lies = one[1].pose.moved(far)
+        if all(np.abs(other.pose.moved(far) - lies).max() > 2 * _ROUGH_MOVE_MM for _, other in kept):
+            kept.append(one)
+    return kept[:_FINISHED]
 
 
 def check_can_be_laid(name: str, shape: Contour) -> None:
@@ -124,6 +151,7 @@ class _Lying:
         """
         pose, limits = candidate.pose, candidate.turn_range
         arm = max(float(np.hypot(*(self.part.start - self.pivot).T).max()), 1e-9)
+        largest = _MOST_GROWTH * move_mm
         near = self._contacts(pose, 3 * move_mm)
         for _ in range(_MOST_MOVES):
             if move_mm < least_mm or near.least + _GIVEN_UP_MOVES * move_mm < beaten_by:
@@ -136,9 +164,8 @@ class _Lying:
             if gain > _KEPT_SHARE * promised:
                 pose, near = moved, then
             move_mm *= 1.5 if gain > 0.75 * promised else 0.7 if gain > _KEPT_SHARE * promised else 0.35
-        nearest = near.take(np.argmin(near.distance, keepdims=True))
-        (x, y), (u, v) = nearest.of_part[0].tolist(), nearest.of_block[0].tolist()
-        return Placement(pose, nearest.least, ((x, y), (u, v)))
+            move_mm = min(move_mm, largest)
+        return _placement(pose, near)
 
     def _contacts(self, pose: Pose, reach: float) -> Contacts:
         """Those no farther than the nearest and `reach` more; the fields say which vertices cannot be among them."""

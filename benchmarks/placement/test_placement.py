@@ -39,10 +39,10 @@ def test_parts_are_sound_and_of_the_size_that_is_said() -> None:
 
 def test_the_table_counts_what_fits_and_what_lies_nearer_than_its_bound() -> None:
     def laid(margin_mm: float, polished_mm: float, true_mm: float) -> Laid:
-        return Laid(5, margin_mm, margin_mm, Found(polished_mm, polished_mm), 0.5, true_mm, 0.2, 0.1)
+        return Laid(5, margin_mm, margin_mm, Found(polished_mm, polished_mm), 0.5, 0.25, true_mm, 0.2, 0.1)
 
     text = report([laid(4.0, 4.05, 3.8), laid(2.0, 2.3, 1.2), laid(-3.0, -np.inf, -np.inf)], 1)
     assert "| parts that fit with some margin | 2 of 3 |" in text
     assert "| behind these by more than 0.1 mm | 1 |" in text
-    assert "| nearer to the rendered edge than margin less its 95 % bound | 1 of 2 |" in text
+    assert "| nearer to the rendered edge than margin less the bound for parts | 1 of 2 |" in text
     assert "| the worst of them, by | 0.30 mm |" in text

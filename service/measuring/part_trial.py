@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from contour.calibration.calibration import Calibration
-from contour.geometry.rings import Contour
 from service.measuring.measurement import Measurement
 from service.reasons import Reason
 
 if TYPE_CHECKING:
     from service.config.recipes import AnyRecipe, PartToCut
     from service.parts.part import Part
+    from service.parts.sure_block import SureBlock
 
 
 class PartTrial:
@@ -41,8 +41,8 @@ class PartTrial:
         begun = self._begun(measured, (asked,), calibration)
         if isinstance(begun, Measurement):
             return begun
-        (part,), block, bound_mm, known = begun
-        fit = fit_part(part, block, bound_mm, asked)
+        (part,), block, known = begun
+        fit = fit_part(part, block, asked)
         measured = replace(measured, part=in_picture(fit, known, measured.thickness_mm or 0.0))
         return measured if fit.finding is None else _refused(measured, fit.finding)
 
@@ -53,9 +53,9 @@ class PartTrial:
         begun = self._begun(measured, recipe.parts, calibration)
         if isinstance(begun, Measurement):
             return begun
-        parts, block, bound_mm, known = begun
+        parts, block, known = begun
         wanted = list(zip(parts, recipe.parts, strict=True))
-        found = lay_parts(wanted, block, bound_mm, recipe.parts_apart_mm, recipe.parts_tries)
+        found = lay_parts(wanted, block, recipe.parts_apart_mm, recipe.parts_tries)
         if not found:
             names = ", ".join(dict.fromkeys(part.path.name for part in parts))
             return _refused(
@@ -66,9 +66,10 @@ class PartTrial:
 
     def _begun(
         self, measured: Measurement, asked: Sequence[PartToCut], calibration: Calibration | None
-    ) -> Measurement | tuple[list[Part], Contour, float, Calibration]:
-        """The parts, the block with its bound, and the calibration; else the measurement as it ends without them."""
+    ) -> Measurement | tuple[list[Part], SureBlock, Calibration]:
+        """The parts, the block and how sure it is, the calibration; else the measurement as it ends without them."""
         from service.parts.part import PartFileError
+        from service.parts.sure_block import SureBlock
 
         if measured.findings or measured.millimetres is None or calibration is None:
             return measured
@@ -82,7 +83,13 @@ class PartTrial:
                 "Whether the part fits cannot be said, since it is not known how sure the contour is. Use wall-tips, "
                 "and a calibration that knows the scale at the block's height.",
             )
-        return parts, measured.millimetres, measured.uncertainty_mm, calibration
+        try:
+            block = SureBlock.of(measured.millimetres, measured.uncertainty_mm, measured.evidence or ())
+        except PartFileError as error:
+            return _refused(measured, f"Whether the part fits cannot be said: {error}")
+        if block is None:
+            return _refused(measured, "No part fits: nowhere in the block is its edge sure enough. Light it better.")
+        return parts, block, calibration
 
 
 def _refused(measured: Measurement, text: str) -> Measurement:

@@ -13,10 +13,11 @@ from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
 from contour.geometry.rings import Contour, densified, perimeter
 from contour.image.overlay import DrawnPart
-from contour.placement.place import Placement, best_placement
+from contour.placement.place import Placement, best_placement, placement_at
 from contour.placement.pose import Pose
 from contour.placement.several import Wanted, lay_several
 from service.parts.part import CHORD_MM, Part
+from service.parts.sure_block import SureBlock
 
 if TYPE_CHECKING:
     from service.config.recipes import OneOfParts, PartToCut
@@ -30,9 +31,9 @@ _STEP_MM = 5.0
 class PartFit:
     """A part where its least margin to the measured block is largest, millimetres of the machine frame.
 
-    placed: its outline there. asked_mm: the margin that the recipe asks for. bound_mm: the 95 % bound on the block's
-    contour. number: its place among the recipe's parts, from 1. drawn: the same in the picture; None where it is not
-    in view.
+    placed: its outline there. asked_mm: the margin that the recipe asks for. bound_mm: by how much the true edge may
+    lie nearer to the part than it was measured. number: its place among the recipe's parts, from 1. drawn: the same
+    in the picture; None where it is not in view.
     """
 
     part: Part
@@ -82,7 +83,9 @@ class PartFit:
             if self.margin_mm >= 0
             else f"stands out of the block by {-self.margin_mm:.2f} mm or more"
         )
-        needed = f"{self.needed_mm:.2f} mm ({self.asked_mm:g} mm, and the contour's bound of {self.bound_mm:.2f} mm)"
+        needed = (
+            f"{self.needed_mm:.2f} mm ({self.asked_mm:g} mm, and {self.bound_mm:.2f} mm that the contour may be off)"
+        )
         return (
             f"The part {self.part.path.name} does not fit: where it lies best it {reached} at ({x:.1f}, {y:.1f}) mm, "
             f"needed are {needed}. It is short by {self.short_by_mm:.2f} mm. Lay a larger block, or allow less margin "
@@ -162,27 +165,38 @@ def _pair(kept: Any) -> tuple[tuple[float, float], tuple[float, float]]:
     return (x, y), (u, v)
 
 
-def fit_part(part: Part, block_mm: Contour, bound_mm: float, asked: PartToCut) -> PartFit:
-    """The part in the block, machine frame; `bound_mm` is the 95 % bound on where the block's edge lies."""
-    placement = best_placement(part.contour, block_mm, asked.turns)
-    return PartFit(part, placement, placement.pose.placed(part.contour), asked.margin_mm, bound_mm)
+def fit_part(part: Part, block: SureBlock, asked: PartToCut) -> PartFit:
+    """The part where its least margin to the block is largest; where it does not fit there since the edge near it is
+    less sure than elsewhere, where it does, if anywhere.
+    """
+    fit = _laid(part, block, best_placement(part.contour, block.measured, asked.turns), asked.margin_mm)
+    if fit.fits or fit.margin_mm < asked.margin_mm + block.bound_mm + CHORD_MM:
+        return fit
+    other = best_placement(part.contour, block.sure, asked.turns)
+    elsewhere = _laid(part, block, placement_at(part.contour, block.measured, other.pose), asked.margin_mm)
+    return elsewhere if elsewhere.fits else fit
 
 
 def lay_parts(
-    wanted: Sequence[tuple[Part, OneOfParts]], block_mm: Contour, bound_mm: float, apart_mm: float, tries: int
+    wanted: Sequence[tuple[Part, OneOfParts]], block: SureBlock, apart_mm: float, tries: int
 ) -> tuple[PartFit, ...]:
     """As many of the parts as can be laid into the block, machine frame, each keeping its margin."""
     asked = [
-        Wanted(part.contour, one.quantity, one.margin_mm + bound_mm + CHORD_MM, one.priority, one.turns)
+        Wanted(part.contour, one.quantity, one.margin_mm + block.bound_mm + CHORD_MM, one.priority, one.turns)
         for part, one in wanted
     ]
     found = []
     # Two parts beside one another each lose their chords.
-    for laid in lay_several(asked, block_mm, apart_mm + 2 * CHORD_MM, tries):
+    for laid in lay_several(asked, block.sure, apart_mm + 2 * CHORD_MM, tries):
         part, one = wanted[laid.index]
-        placed = laid.placement.pose.placed(part.contour)
-        found.append(PartFit(part, laid.placement, placed, one.margin_mm, bound_mm, number=laid.index + 1))
+        placement = placement_at(part.contour, block.measured, laid.placement.pose)
+        found.append(replace(_laid(part, block, placement, one.margin_mm), number=laid.index + 1))
     return tuple(found)
+
+
+def _laid(part: Part, block: SureBlock, placement: Placement, asked_mm: float) -> PartFit:
+    bound_mm = block.bound_at(part.contour, placement)
+    return PartFit(part, placement, placement.pose.placed(part.contour), asked_mm, bound_mm)
 
 
 def in_picture(fit: PartFit, calibration: Calibration, thickness_mm: float) -> PartFit:

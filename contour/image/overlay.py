@@ -58,13 +58,14 @@ class Hidden:
 @dataclass(frozen=True)
 class DrawnPart:
     """A part laid into the block, in pixels: its outline, how wide a margin it needs around it, where it is tightest
-    (a place on its outline and one on the block's), and whether it fits.
+    (a place on its outline and one on the block's), and whether it fits. number: among several; None = the only one.
     """
 
     outline: Contour
     margin_px: float
     tightest: tuple[tuple[float, float], tuple[float, float]]
     fits: bool
+    number: int | None = None
 
 
 def draw_overlay(
@@ -85,7 +86,7 @@ def draw_overlay(
     is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `shown_px`,
     paths (N, 2) that show why it is refused, lie over all in yellow. Of `hidden` parts bridged ones are
     dashed, covered ones red and wide; the rest of a refused exterior then is orange. `parts` are drawn in violet, or
-    red where one does not fit, margins as veils around them, tightest places as lines with dots. Raises
+    red where one does not fit, margins as veils around them, tightest places as lines with dots, numbers within. Raises
     PictureError.
     """
     check_picture(picture)
@@ -173,6 +174,20 @@ def _draw_part(canvas: Bytes, part: DrawnPart, unit: float) -> None:
     _draw_path(canvas, ends, (0, 0, 0), _line_width(unit) + 4)
     _draw_path(canvas, ends, VERTEX, _line_width(unit) + 2)
     _mark_vertices(canvas, ends, 1.6 * unit)
+    if part.number is not None:
+        _draw_number(canvas, str(part.number), inside, unit)
+
+
+def _draw_number(canvas: Bytes, number: str, inside: Bytes, unit: float) -> None:
+    """The number, its middle where it is farthest from the border of `inside`."""
+    left, top, width, height = cv2.boundingRect(inside)
+    framed = np.pad(inside[top : top + height, left : left + width], 1)
+    depth = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_3)
+    _, _, _, (x, y) = cv2.minMaxLoc(depth)
+    wide = _text_width(number, unit)
+    place = (left + int(x) - wide // 2, top + int(y) + round(11 * unit))
+    for tone, stroke in (((0, 0, 0), round(5 * unit)), (_TEXT, max(round(2 * unit), 1))):
+        cv2.putText(canvas, number, place, cv2.FONT_HERSHEY_SIMPLEX, unit, tone, stroke, cv2.LINE_AA)
 
 
 def _line_width(unit: float) -> int:

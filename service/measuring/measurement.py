@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,8 @@ class Measurement:
     has a figure for each stage that ran, and "total". shown_px: paths in the picture that show what speaks
     against it, (N, 2) each. edge: cut, cells or mixed, as the picture shows it. evidence: what the contour rests on,
     stretches along its rings; None where nobody says. part: the recipe's part in it; None where the recipe has none,
-    or the contour was refused before it was tried. parts: those of a recipe with several that lie in it.
+    or the contour was refused before it was tried. parts: those of a recipe with several that lie in it; wanted: how
+    many of each were to be laid.
     """
 
     method: str
@@ -46,6 +48,7 @@ class Measurement:
     evidence: tuple[SentStretch, ...] | None = None
     part: PartFit | None = None
     parts: tuple[PartFit, ...] = ()
+    wanted: tuple[int, ...] = ()
     thickness_mm: float | None = None
     aligned: bool = False
     quality: Quality | None = None
@@ -79,6 +82,12 @@ class Measurement:
     def laid(self) -> tuple[PartFit, ...]:
         """The part, or the parts, that lie in it."""
         return self.parts if self.part is None else (self.part,)
+
+    @property
+    def laid_of_each(self) -> list[tuple[int, int, int]]:
+        """Of several parts each number, how many of it were laid, and how many were wanted."""
+        laid = Counter(fit.number for fit in self.parts)
+        return [(number, laid[number], wanted) for number, wanted in enumerate(self.wanted, start=1)]
 
     @property
     def evidence_fields(self) -> list[dict[str, Any]] | None:

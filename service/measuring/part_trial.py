@@ -61,8 +61,8 @@ class PartTrial:
             return _refused(
                 measured, f"None of the parts fits: {names}. Lay a larger block, or allow less margin or more turns."
             )
-        thickness_mm = measured.thickness_mm or 0.0
-        return replace(measured, parts=tuple(in_picture(fit, known, thickness_mm) for fit in found))
+        laid = tuple(in_picture(fit, known, measured.thickness_mm or 0.0) for fit in found)
+        return replace(measured, parts=laid, wanted=tuple(one.quantity for one in recipe.parts))
 
     def _begun(
         self, measured: Measurement, asked: Sequence[PartToCut], calibration: Calibration | None

@@ -32,8 +32,8 @@ class PartFit:
     """A part where its least margin to the measured block is largest, millimetres of the machine frame.
 
     placed: its outline there. asked_mm: the margin that the recipe asks for. bound_mm: by how much the true edge may
-    lie nearer to the part than it was measured. number: its place among the recipe's parts, from 1. drawn: the same
-    in the picture; None where it is not in view.
+    lie nearer to the part than it was measured. number: its place among the recipe's parts, from 1; several: it has
+    such. drawn: the same in the picture; None where it is not in view.
     """
 
     part: Part
@@ -43,11 +43,17 @@ class PartFit:
     bound_mm: float
     drawn: DrawnPart | None = None
     number: int = 1
+    several: bool = False
 
     @property
     def needed_mm(self) -> float:
         """What the margin must be: what is asked for, the bound, and what curves lost as chords."""
         return self.asked_mm + self.bound_mm + CHORD_MM
+
+    @property
+    def label(self) -> int | None:
+        """What is written on it: its number, where there are several."""
+        return self.number if self.several else None
 
     @property
     def margin_mm(self) -> float:
@@ -118,6 +124,7 @@ class PartFit:
             "asked_mm": self.asked_mm,
             "bound_mm": self.bound_mm,
             "number": self.number,
+            "several": self.several,
             "millimetres": _rings_kept(self.placed),
             "drawn": None
             if drawn is None
@@ -137,12 +144,14 @@ class PartFit:
             kept["asked_mm"],
             kept["bound_mm"],
             number=kept.get("number", 1),
+            several=kept.get("several", False),
         )
         drawn = kept["drawn"]
         if drawn is None:
             return fit
         outline = _rings_of(drawn["pixels"])
-        return replace(fit, drawn=DrawnPart(outline, drawn["margin_px"], _pair(drawn["tightest_px"]), fit.fits))
+        tightest = _pair(drawn["tightest_px"])
+        return replace(fit, drawn=DrawnPart(outline, drawn["margin_px"], tightest, fit.fits, fit.label))
 
     def summary(self) -> dict[str, Any]:
         """What the journal keeps of it."""
@@ -190,7 +199,7 @@ def lay_parts(
     for laid in lay_several(asked, block.sure, apart_mm + 2 * CHORD_MM, tries):
         part, one = wanted[laid.index]
         placement = placement_at(part.contour, block.measured, laid.placement.pose)
-        found.append(replace(_laid(part, block, placement, one.margin_mm), number=laid.index + 1))
+        found.append(replace(_laid(part, block, placement, one.margin_mm), number=laid.index + 1, several=True))
     return tuple(found)
 
 
@@ -209,4 +218,4 @@ def in_picture(fit: PartFit, calibration: Calibration, thickness_mm: float) -> P
     scale = perimeter(rings[0]) / perimeter(fit.placed.exterior)
     (x, y), (u, v) = ends.tolist()
     outline = Contour(rings[0], tuple(rings[1:]))
-    return replace(fit, drawn=DrawnPart(outline, scale * fit.needed_mm, ((x, y), (u, v)), fit.fits))
+    return replace(fit, drawn=DrawnPart(outline, scale * fit.needed_mm, ((x, y), (u, v)), fit.fits, fit.label))

@@ -17,3 +17,9 @@ def contour_of(polygon: shapely.Polygon) -> Contour:
     """The polygon as a contour, its exterior counter-clockwise, holes clockwise."""
     rings = [np.asarray(ring.coords, np.float64)[:-1, :2] for ring in (polygon.exterior, *polygon.interiors)]
     return oriented_contour(Contour(rings[0], tuple(rings[1:])), counter_clockwise=True)
+
+
+def point_within(contour: Contour) -> tuple[float, float]:
+    """A place in the material, well inside of most shapes."""
+    place = polygon_of(contour).representative_point()
+    return round(float(place.x), 2), round(float(place.y), 2)

@@ -66,5 +66,6 @@ def caption(measurement: Measurement) -> list[str]:
         found += f", within {measurement.uncertainty_px:.1f} px"
     part = measurement.part
     if part is None:
-        return [verdict, found, *([f"{len(measurement.parts)} parts"] if measurement.parts else [])]
+        laid = [f"part {number}: {laid} of {wanted}" for number, laid, wanted in measurement.laid_of_each]
+        return [verdict, found, *([f"laid: {', '.join(laid)}"] if laid else [])]
     return [verdict, found, f"{part.part.path.name}: margin {part.margin_mm:.2f} mm, needed {part.needed_mm:.2f} mm"]

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -24,7 +25,7 @@ from contour.geometry.rings import Contour, area
 from service.measuring.calibration_file import CalibrationFileError, CalibrationRecord, record_of
 from service.parts.fit import PartFit
 from service.records.archived_job import ArchivedJob, EvidenceError
-from service.web.models import Axis, Drawing, Grid, HiddenPart, LaidPart, SentinelMark
+from service.web.models import Axis, Drawing, Grid, HiddenPart, LaidPart, SentinelMark, WantedPart
 
 GRID_COLUMNS, GRID_ROWS = 33, 25  # a browser interpolates between them: docs/how-to/operators-guide.md says how well
 LINES_WANTED = 10
@@ -54,6 +55,7 @@ def drawing(archived: ArchivedJob) -> Drawing:
         band_px=_band_px(measured["uncertainty_mm"] if measured else None, pixels, millimetres),
         part=_part(archived.part) if measured else None,
         parts=[part for fit in archived.parts if (part := _part(fit)) is not None] if measured else [],
+        wanted=_wanted(archived) if measured and archived.parts else [],
         size_mm=None if millimetres is None else _size(millimetres),
         sentinels=list(backdrop.sentinels),
         grid=backdrop.grid,
@@ -101,6 +103,8 @@ def _hidden(evidence: Sequence[SentStretch], pixels: Contour) -> list[HiddenPart
 def _part(fit: PartFit | None) -> LaidPart | None:
     if fit is None or fit.drawn is None:
         return None
+    from service.parts.shapely_contours import point_within
+
     return LaidPart(
         exterior=_pairs(fit.drawn.outline.exterior),
         holes=[_pairs(hole) for hole in fit.drawn.outline.holes],
@@ -110,7 +114,15 @@ def _part(fit: PartFit | None) -> LaidPart | None:
         asked_mm=fit.asked_mm,
         needed_mm=round(fit.needed_mm, 3),
         px_per_mm=round(fit.drawn.margin_px / fit.needed_mm, 4),
+        number=fit.number,
+        middle=point_within(fit.drawn.outline),
+        file=fit.part.path.name,
     )
+
+
+def _wanted(archived: ArchivedJob) -> list[WantedPart]:
+    asked = enumerate(archived.recipe_settings.get("parts", ()), start=1)
+    return [WantedPart(number=k, file=Path(one["file"]).name, quantity=one["quantity"]) for k, one in asked]
 
 
 def _size(millimetres: Contour) -> tuple[float, float]:

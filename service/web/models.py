@@ -216,6 +216,17 @@ class LaidPart(Answer):
     asked_mm: float = Field(description="The margin that the recipe asks for.")
     needed_mm: float = Field(description="That and the contour's own bound.")
     px_per_mm: float
+    number: int = Field(description="Among the recipe's parts, from 1.")
+    middle: tuple[float, float] = Field(description="A place in its material, for the number.")
+    file: str
+
+
+class WantedPart(Answer):
+    """One of a recipe's several parts: how many of it were to be laid."""
+
+    number: int
+    file: str
+    quantity: int
 
 
 class Drawing(Answer):
@@ -232,6 +243,7 @@ class Drawing(Answer):
     band_px: float | None = Field(description="What the contour may be off by.")
     part: LaidPart | None
     parts: list[LaidPart] = Field(description="Those of a recipe with several.")
+    wanted: list[WantedPart] = Field(description="What such a recipe would have laid.")
     size_mm: tuple[float, float] | None
     sentinels: list[SentinelMark]
     grid: Grid | None

@@ -124,7 +124,7 @@ def _record(image: Path, measurement: Measurement | None, status: str = "ok", de
         "status": "refused" if measurement.findings else "ok",
         "reasons": [reason.label for reason in measurement.reasons],
         **told,
-        **({"parts": _parts(measurement)} if measurement.parts else {}),
+        **({"parts": _parts(measurement), "not_laid": _not_laid(measurement)} if measurement.parts else {}),
         "uncertainty_mm": measurement.uncertainty_mm,
         "timings_ms": {name: round(value, 3) for name, value in measurement.timings_ms.items()},
         "details": list(measurement.texts),
@@ -152,6 +152,12 @@ def _kept(args: argparse.Namespace, picture: Any, measurement: Measurement) -> s
 def _parts(measurement: Measurement) -> list[dict[str, Any]]:
     """Each of several parts, in the order in which they were laid, with its number in the recipe and its drawing."""
     return [{"part": fit.number, "file": fit.part.path.name, **fit.fields()} for fit in measurement.parts]
+
+
+def _not_laid(measurement: Measurement) -> list[dict[str, int]]:
+    """Of several parts the numbers of those that found no more room, and how many of each."""
+    each = measurement.laid_of_each
+    return [{"part": number, "missing": wanted - laid} for number, laid, wanted in each if laid < wanted]
 
 
 def _write_overlay(path: Path, picture: Any, measurement: Measurement) -> None:

@@ -35,7 +35,7 @@ def sentence(measurement: Measurement, language: str) -> str:
     if measurement.part is not None:
         text += f", {measurement.part.sentence}"
     if measurement.parts:
-        text += f", {len(measurement.parts)} parts laid"
+        text += f", {len(measurement.parts)} of {sum(measurement.wanted)} parts laid"
     return f"{text}, {measurement.timings_ms['total']:.0f} ms"
 
 

@@ -3,7 +3,7 @@
 import { at, make, say } from "./dom.js";
 import { amount, moment, number, onLanguage, words } from "./words.js";
 import { ORIGINS, current, reasonOf } from "./now.js";
-import { show as showPart } from "./part.js";
+import { list as listParts, show as showPart } from "./part.js";
 
 const STAGES = ["frame", "table", "mask", "trace", "quality", "convert", "simplify", "judge", "guard", "part", "pages", "transfer", "total"];
 const WIDE = ["uncertainty", "recipe", "when", "origin"]; // a line of their own
@@ -26,6 +26,7 @@ function refresh() {
   because();
   values();
   showPart(drawing?.part ?? null);
+  listParts(drawing?.parts ?? [], drawing?.wanted ?? []);
   stages();
   downloads();
 }

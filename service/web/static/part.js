@@ -1,9 +1,10 @@
 // The part laid into the block: drawn with the margin that it needs and its tightest place; and what another margin would do.
 
-import { at, draw, say } from "./dom.js";
+import { at, draw, make, say } from "./dom.js";
 import { amount, onLanguage, words } from "./words.js";
 
 const LEAST_MM = 10; // the slider goes that far at least
+const NUMBER_PX = 36;
 
 let part = null;
 let clips = 0; // each part has a clip path of its own
@@ -31,8 +32,19 @@ function needed(one) {
   return asked + one.needed_mm - one.asked_mm;
 }
 
+/** Show how many of several parts were laid, each with the least margin among them. */
+export function list(parts, wanted) {
+  at("laid").hidden = !parts.length;
+  at("laid").replaceChildren(...wanted.map((one) => {
+    const own = parts.filter(({ number }) => number === one.number);
+    const margin = amount(Math.min(...own.map((part) => part.margin_mm)), "mm", 2);
+    const text = words(own.length ? "parts_laid" : "parts_not_laid", { part: one.number, file: one.file, laid: own.length, wanted: one.quantity, margin });
+    return make("li", { "data-kind": own.length < one.quantity ? "short" : "all" }, text);
+  }));
+}
+
 /** What is drawn of a part over the frame, with its path by `path`, in a picture of that width and height. */
-export function drawn(part, path, width, height) {
+export function drawn(part, path, width, height, several) {
   const rings = [part.exterior, ...part.holes].map(path).join("");
   const [[x, y], [u, v]] = part.tightest;
   // The margin lies around the material, never in it.
@@ -43,7 +55,13 @@ export function drawn(part, path, width, height) {
     draw("path", { class: "part-margin", d: rings, "stroke-width": veil(part), "clip-path": `url(#${clip})` }),
     draw("path", { class: "part-under", d: rings }),
     draw("path", { class: "part-outline", d: rings }),
-    draw("path", { class: "part-tightest", d: `M${x} ${y}L${u} ${v}` }));
+    draw("path", { class: "part-tightest", d: `M${x} ${y}L${u} ${v}` }),
+    ...(several ? [numbered(part)] : []));
+}
+
+function numbered(part) {
+  const [x, y] = part.middle;
+  return draw("text", { class: "part-number", x, y, "font-size": NUMBER_PX }, String(part.number));
 }
 
 function veil(of) {

@@ -78,7 +78,7 @@ function outline() {
   group.append(draw("path", { class: "exterior", d: path(drawing.exterior) }));
   for (const { covered, points } of drawing.hidden) group.append(draw("path", { class: covered ? "covered" : "bridged", d: line(points) }));
   const corners = rings.flat();
-  for (const part of drawing.part ? [drawing.part] : drawing.parts) group.append(drawnPart(part, path, drawing.width, drawing.height));
+  for (const part of drawing.part ? [drawing.part] : drawing.parts) group.append(drawnPart(part, path, drawing.width, drawing.height, !drawing.part));
   if (corners.length <= MOST_MARKS) group.append(draw("path", { class: "vertices", d: corners.map(([x, y]) => `M${x} ${y}h0`).join("") }));
   return group;
 }

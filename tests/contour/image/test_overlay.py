@@ -146,3 +146,19 @@ def test_a_part_is_drawn_with_its_margin_and_its_tightest_place(fits: bool, colo
     assert (drawn[191, 450] != 60).any()
     assert (drawn[212, 450] == 60).all()
     assert (drawn[185, 450] == 60).all()
+
+
+def test_one_of_several_parts_has_its_number_in_its_material() -> None:
+    hollow = Contour(SQUARE * [30, 20] + [300.0, 200.0], (SQUARE[::-1] * [10, 16] + [440.0, 220.0],))
+    one, other = (
+        draw_overlay(
+            np.full((600, 800), 60, np.uint8),
+            OUTLINE,
+            parts=(DrawnPart(hollow, 0.0, ((300.0, 250.0), (280.0, 250.0)), True, number),),
+        )
+        for number in (None, 3)
+    )
+    rows, columns = np.nonzero((one != other).any(axis=2))
+    assert len(rows)
+    assert 300 < columns.min() <= columns.max() < 440
+    assert 200 < rows.min() <= rows.max() < 400

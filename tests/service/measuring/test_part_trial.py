@@ -140,6 +140,8 @@ def test_as_many_parts_as_fit_are_laid_each_with_its_margin_and_apart(small: Par
     assert min(one.distance(two) for k, one in enumerate(shapes) for two in shapes[:k]) >= 4.0
     assert [PartFit.of_kept(json.loads(json.dumps(fit.kept()))).number for fit in measured.parts] == [1] * 4
     assert len(measured.summary()["parts"]) == 4
+    assert measured.laid_of_each == [(1, 4, 9)]
+    assert [fit.drawn and fit.drawn.number for fit in measured.parts] == [1] * 4
 
 
 def test_a_block_in_which_none_of_several_fits_is_refused_by_their_names(small: PartToCut) -> None:

@@ -156,6 +156,47 @@ def test_the_part_is_drawn_and_the_slider_tells_what_another_margin_would_do(pan
     expect(page.locator("#view path.part-outline")).to_have_count(0)
 
 
+def test_several_parts_are_drawn_with_their_numbers_and_what_found_no_room_is_told(panel: Panel) -> None:
+    page = panel.page
+
+    def part(number: int, left: float, margin_mm: float) -> dict[str, object]:
+        square = [[left, 200], [left + 100, 200], [left + 100, 300], [left, 300]]
+        return {
+            "exterior": square, "holes": [], "tightest": [[left, 250], [left, 180]], "fits": True,
+            "margin_mm": margin_mm, "asked_mm": 3.0, "needed_mm": 3.5, "px_per_mm": 2.5,
+            "number": number, "middle": [left + 50, 250], "file": f"{number}.dxf",
+        }  # fmt: skip
+
+    parts = [part(1, 300, 8.0), part(1, 450, 4.25), part(2, 600, 5.5)]
+    wanted = [{"number": number, "file": f"{number}.dxf", "quantity": 2} for number in (1, 2, 3)]
+
+    def with_parts(route: Route) -> None:
+        route.fulfill(json={**route.fetch().json(), "parts": parts, "wanted": wanted})
+
+    page.route("**/drawing", with_parts)
+    panel.ordered()
+    expect(page.locator("#view path.part-outline")).to_have_count(3)
+    expect(page.locator("#view path.part-tightest").nth(2)).to_have_attribute("d", "M600 250L600 180")
+    expect(page.locator("#view path.part-margin").nth(1)).to_have_attribute("stroke-width", "17.5")
+    expect(page.locator("#view .part-number")).to_have_text(["1", "1", "2"])
+    laid = page.locator("#laid li")
+    expect(laid).to_have_text(
+        [
+            "Part 1, 1.dxf: 2 of 2 laid, with 4.25\u00a0mm or more.",
+            "Part 2, 2.dxf: 1 of 2 laid, with 5.50\u00a0mm or more.",
+            "Part 3, 3.dxf: none of 2 laid.",
+        ]
+    )
+    assert [one.get_attribute("data-kind") for one in laid.all()] == ["all", "short", "short"]
+    page.locator("#language").click()
+    expect(laid.last).to_have_text("Деталь 3, 3.dxf: не уложено ни одной из 2.")
+    page.locator("#language").click()
+    page.unroute_all(behavior="wait")
+    panel.ordered()
+    expect(page.locator("#laid")).to_be_hidden()
+    expect(page.locator("#view .part-number")).to_have_count(0)
+
+
 def test_the_pointer_tells_millimetres_and_the_picture_zooms_and_moves(panel: Panel) -> None:
     page = panel.page
     (number,) = panel.accepted(1)

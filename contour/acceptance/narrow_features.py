@@ -6,12 +6,13 @@ strip of cells makes that lies against it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.arrays import Bytes, Float64s, Indices
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring
 
@@ -61,24 +62,44 @@ def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
     A corner is none, nor is the end of an arm: there the edges beside it run another way.
     """
     found = [one for ring in contour.rings for one in [_deepest(ring, pitch_px)] if one is not None]
-    found += _arms(contour, pitch_px)
+    found += _arms(contour, pitch_px) + _slits(contour, pitch_px)
     found += [step for ring in contour.rings for step in _steps(ring, pitch_px)]
     return max(found, key=lambda one: one.depth_pitches) if found else None
 
 
 def _arms(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
     """Parts of a contour far from all that is wider than they are."""
+    drawn, first = _drawn(contour.rings, pitch_px, 1.0)
+    return _narrow_parts(drawn, first, pitch_px, _ARMS, outwards=True)
+
+
+def _slits(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
+    """What goes into a contour as narrow as an arm, however deep: an outline had followed a cable in, and back."""
+    drawn, first = _drawn([contour.exterior], pitch_px, _WIDTH)
+    return _narrow_parts(1 - drawn, first, pitch_px, _ARMS[1:], outwards=False)
+
+
+def _drawn(rings: Sequence[Ring], pitch_px: float, margin: float) -> tuple[Bytes, Float64s]:
+    """1 inside of rings in pixels, exterior first, (h, w), with so many pitches around, and the grid's first pixel."""
+    first = rings[0].min(axis=0) - margin * pitch_px
     step = pitch_px / _PITCH_SAMPLES
-    first = contour.exterior.min(axis=0) - pitch_px
-    width, height = np.ceil((contour.exterior.max(axis=0) + pitch_px - first) / step).astype(int).tolist()
+    width, height = np.ceil((rings[0].max(axis=0) + margin * pitch_px - first) / step).astype(int).tolist()
     drawn = np.zeros((height, width), np.uint8)
-    cv2.fillPoly(drawn, [np.rint((ring - first) / step).astype(np.int32) for ring in contour.rings], 1)
+    cv2.fillPoly(drawn, [np.rint((ring - first) / step).astype(np.int32) for ring in rings], 1)
+    return drawn, first
+
+
+def _narrow_parts(
+    drawn: Bytes, first: Float64s, pitch_px: float, kinds: Sequence[tuple[float, float, float]], *, outwards: bool
+) -> list[NarrowFeature]:
+    step = pitch_px / _PITCH_SAMPLES
+    height, width = drawn.shape
     room = np.asarray(cv2.distanceTransform(drawn, cv2.DIST_L2, 5), np.float32) / np.float32(_PITCH_SAMPLES)
     end = round(_ARM_END * _PITCH_SAMPLES)
     disc = np.hypot(*np.ogrid[-end : end + 1, -end : end + 1]) < _ARM_END * _PITCH_SAMPLES
     framed = cv2.copyMakeBorder(room, end, end, end, end, cv2.BORDER_CONSTANT)
     found = []
-    for narrow, long, blunt in _ARMS:
+    for narrow, long, blunt in kinds:
         wide = (room >= 0.5 * narrow).astype(np.uint8)
         away = np.minimum(cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5), width + height) / _PITCH_SAMPLES
         away -= 0.5 * narrow
@@ -90,7 +111,7 @@ def _arms(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
             blunter = framed[y : y + 2 * end + 1, x : x + 2 * end + 1][disc].max() >= blunt
             if away[y, x] > long and blunter:
                 place_x, place_y = (first + step * np.array([x, y])).tolist()
-                found.append(NarrowFeature(float(away[y, x]), narrow, (place_x, place_y), True))
+                found.append(NarrowFeature(float(away[y, x]), narrow, (place_x, place_y), outwards))
     return found
 
 

@@ -142,6 +142,21 @@ def test_a_thread_of_any_length_is_found_at_its_end(long: float) -> None:
     assert one.place_px == pytest.approx((760 + long * PITCH, 560), abs=1.5 * PITCH)
 
 
+@pytest.mark.parametrize("deep", [6.0, 14.0])
+def test_a_slit_of_any_depth_is_found_and_goes_inwards(deep: float) -> None:
+    """As an outline makes that follows a cable in from the edge, and back on its other side."""
+    cable = shapely.LineString([(300, 520), (320, 500 - 3 * PITCH), (320, 500 - deep * PITCH)]).buffer(1.6 * PITCH)
+    one = found(BLOCK - cable)
+    assert one is not None
+    assert not one.outwards
+    assert one.depth_pitches > 0.6 * deep
+
+
+def test_a_wide_bay_and_one_that_runs_to_a_point_are_the_blocks_own() -> None:
+    assert found(BLOCK - shapely.box(300, 500 - 12 * PITCH, 300 + 6 * PITCH, 600)) is None
+    assert found(BLOCK - shapely.Polygon([(200, 501), (600, 501), (400, 200)])) is None
+
+
 @pytest.mark.parametrize("turn_deg", [0.0, 25.0])
 @pytest.mark.parametrize("width", [2.2, 3.0])
 def test_a_strip_of_cells_at_a_corner_is_found_whatever_way_it_lies(width: float, turn_deg: float) -> None:

@@ -31,7 +31,7 @@ from contour.synthetic import Rendered, render, render_empty_table
 from service.config.recipes import Recipe
 from service.measuring.measure import Measurer
 from service.measuring.table_file import TableRecord
-from tests.support.scenes.shop_floor_scenes import KINDS, ShopFloorScene, shop_floor_scene
+from tests.support.scenes.shop_floor_scenes import GUARDS, KINDS, ShopFloorScene, shop_floor_scene
 from tests.support.scenes.trials import calibration_for
 
 FIRST = 500_000
@@ -216,7 +216,9 @@ def run(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when no wrong outline was accepted, else 1."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy.shop_floor", description=__doc__)
-    parser.add_argument("--kinds", help="comma-separated; all if not given (with --taught: tables that are not plain)")
+    parser.add_argument(
+        "--kinds", help="comma-separated; all but guards if not given (with --taught: tables not plain)"
+    )
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="pictures of each kind")
     parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="the first seed")
     parser.add_argument("--alone", action="store_true", help="never two kinds at once")
@@ -228,9 +230,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     usual = STRUCTURED if options.taught else tuple(KINDS)
     kinds = options.kinds.split(",") if options.kinds else usual
-    unknown = [kind for kind in kinds if kind not in KINDS]
+    known = KINDS | GUARDS
+    unknown = [kind for kind in kinds if kind not in known]
     if unknown:
-        parser.error(f"unknown kinds {', '.join(unknown)}; expected some of {', '.join(KINDS)}")
+        parser.error(f"unknown kinds {', '.join(unknown)}; expected some of {', '.join(known)}")
     if options.save is not None:
         options.save.mkdir(parents=True, exist_ok=True)
     seeds = range(options.first, options.first + options.seeds)

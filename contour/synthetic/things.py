@@ -146,9 +146,9 @@ class Fade:
 class Structure:
     """A table that is not even: its light is multiplied by a pattern of mean about 1."""
 
-    kind: Literal["wood", "brushed", "slots", "old-cuts"]
+    kind: Literal["wood", "brushed", "slots", "old-cuts", "expanded", "ribbed", "cork"]
     scale_mm: float
-    """Width of a plank, of the broad bands of a brushed sheet, spacing of slots or old cuts."""
+    """Width of a plank, of broad bands of a brushed sheet, spacing of slots, old cuts, a mesh, ribs, size of grains."""
     contrast: float = 0.2
     angle_deg: float = 0.0
 

@@ -1,4 +1,4 @@
-"""Tables that are not even: wood, brushed metal, T-slots, a spoilboard with old cuts."""
+"""Tables that are not even: wood, brushed metal, T-slots, a spoilboard with old cuts, expanded metal, ribs, cork."""
 
 from __future__ import annotations
 
@@ -99,4 +99,39 @@ def _old_cuts(scene: Scene, structure: Structure, rng: np.random.Generator) -> F
     return np.asarray(picture * (1.0 - np.float32(min(0.85, 2.0 * structure.contrast)) * lines), dtype=np.float32)
 
 
-_PATTERNS = {"wood": _wood, "brushed": _brushed, "slots": _slots, "old-cuts": _old_cuts}
+def _expanded(scene: Scene, structure: Structure, rng: np.random.Generator) -> Float32s:
+    """A mesh of bright strands around rhombs, twice as long as wide: closed cells in even rows, but no comb."""
+    along, across, _ = _across(scene, structure)
+    turn, start = np.float32(math.pi / structure.scale_mm), np.float32(rng.uniform(0.0, math.pi))
+    strand = np.minimum(
+        np.abs(np.sin((0.5 * along + across) * turn + start)), np.abs(np.sin((0.5 * along - across) * turn))
+    )
+    mesh = np.clip((np.float32(0.35) - strand) * np.float32(6.0), 0.0, 1.0)
+    return np.asarray(1.0 + np.float32(2.0 * structure.contrast) * (mesh - 0.4), dtype=np.float32)
+
+
+def _ribbed(scene: Scene, structure: Structure, rng: np.random.Generator) -> Float32s:
+    """Round ribs of rubber, lit from one side, with dust in the grooves."""
+    _, across, _ = _across(scene, structure)
+    place = across * np.float32(2.0 * math.pi / structure.scale_mm)
+    dust = np.float32(0.3) * smooth_noise(rng, across.shape, 4.0)
+    return np.asarray(1.0 + np.float32(structure.contrast) * (np.sin(place) + dust), dtype=np.float32)
+
+
+def _cork(scene: Scene, structure: Structure, rng: np.random.Generator) -> Float32s:
+    """Pressed grains, light and dark, with dark gaps between some of them."""
+    shape = (scene.camera.height, scene.camera.width)
+    grain = smooth_noise(rng, shape, structure.scale_mm / px_mm(scene))
+    gaps = np.clip(-smooth_noise(rng, shape, 0.5 * structure.scale_mm / px_mm(scene)) - 1.0, 0.0, 2.0)
+    return np.asarray(1.0 + np.float32(structure.contrast) * (0.7 * grain - gaps), dtype=np.float32)
+
+
+_PATTERNS = {
+    "wood": _wood,
+    "brushed": _brushed,
+    "slots": _slots,
+    "old-cuts": _old_cuts,
+    "expanded": _expanded,
+    "ribbed": _ribbed,
+    "cork": _cork,
+}

@@ -275,7 +275,7 @@ def test_walls_fade_in_the_middle_and_stay_at_the_edge():
     assert np.array_equal(plain[:, 240:], done[:, 240:])
 
 
-@pytest.mark.parametrize("kind", ["wood", "brushed", "slots", "old-cuts"])
+@pytest.mark.parametrize("kind", ["wood", "brushed", "slots", "old-cuts", "expanded", "ribbed", "cork"])
 def test_a_structured_table_varies_about_its_level(kind):
     table = with_things(Structure(kind, 30.0, 0.2, 30.0)).picture[:50]
     assert table.mean() == pytest.approx(0.2 * 255, rel=0.3)

@@ -43,7 +43,14 @@ KINDS: dict[str, light.Drawn] = {
     "old_cuts": light.structured("old-cuts"),
 }
 
-_LIGHT = {"gamma", "blown_out", "dim", "coloured", "light_table", "wood", "brushed", "slots", "old_cuts"}
+GUARDS: dict[str, light.Drawn] = {
+    "expanded": light.structured("expanded"),
+    "ribbed": light.structured("ribbed"),
+    "cork": light.structured("cork"),
+}
+"""Tables that nothing is tuned on: they tell whether what was learnt on others holds. Never a second kind."""
+
+_LIGHT = {"gamma", "blown_out", "dim", "coloured", "light_table", "wood", "brushed", "slots", "old_cuts", *GUARDS}
 """Kinds that change in what light and on what table other things are seen: they come first, for levels to be drawn."""
 
 
@@ -66,9 +73,9 @@ def shop_floor_scene(kind: str, seed: int, *, alone: bool = False) -> ShopFloorS
     kinds = [kind]
     if not alone and kind != "undisturbed" and rng.random() < 0.25:
         kinds.append(str(rng.choice([name for name in KINDS if name not in _alike(kind)])))
-    scene = shop_floor_block(seed)
+    scene, drawn = shop_floor_block(seed), KINDS | GUARDS
     for name in sorted(kinds, key=lambda name: name not in _LIGHT):
-        scene = KINDS[name](rng, scene)
+        scene = drawn[name](rng, scene)
     return ShopFloorScene(scene, tuple(kinds))
 
 
@@ -77,6 +84,6 @@ def _alike(kind: str) -> set[str]:
     groups = (
         {"dim", "blown_out", "gamma"},
         {"motion", "motion_far", "defocus"},
-        {"light_table", "wood", "brushed", "slots", "old_cuts", "mirror"},
+        {"light_table", "wood", "brushed", "slots", "old_cuts", "mirror", *GUARDS},
     )
     return {"undisturbed", kind}.union(*(group for group in groups if kind in group))

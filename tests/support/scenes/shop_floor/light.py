@@ -72,7 +72,11 @@ def light_table(rng: np.random.Generator, scene: Scene) -> Scene:
     return replace(scene, table=replace(scene.table, level=min(level, 1.0)))
 
 
-def structured(kind: Literal["wood", "brushed", "slots", "old-cuts"]) -> Drawn:
+_FINE = {"expanded": (0.6, 3.0), "ribbed": (0.4, 2.0), "cork": (0.3, 1.0)}
+"""Pitches: as large as cells are, where other patterns are larger."""
+
+
+def structured(kind: Literal["wood", "brushed", "slots", "old-cuts", "expanded", "ribbed", "cork"]) -> Drawn:
     """A table of this kind, about as bright as the walls (brighter than dark ones)."""
 
     def draw(rng: np.random.Generator, scene: Scene) -> Scene:
@@ -84,6 +88,8 @@ def structured(kind: Literal["wood", "brushed", "slots", "old-cuts"]) -> Drawn:
             colour = (0.62, 0.98, 1.4) if kind == "wood" else (0.75, 1.0, 1.25)
         scale = {"wood": rng.uniform(5.0, 25.0), "brushed": rng.uniform(4.0, 30.0)}.get(kind, rng.uniform(2.5, 10.0))
         contrast = {"wood": rng.uniform(0.08, 0.3), "brushed": rng.uniform(0.05, 0.2)}.get(kind, rng.uniform(0.1, 0.35))
+        if kind in _FINE:
+            scale = rng.uniform(*_FINE[kind])
         table = replace(scene.table, level=level, colour=colour)
         pattern = Structure(kind, float(scale) * pitch, float(contrast), float(rng.uniform(0.0, 180.0)))
         return with_things(replace(scene, table=table), pattern)

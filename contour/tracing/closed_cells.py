@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.arrays import Bools, Bytes, Float64s, median
 from contour.geometry.rings import Contour, Ring
 from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_sampling import sample_at
@@ -35,12 +35,16 @@ _NEARBY_PITCHES = 0.8
 _SOFT = 0.2
 # The least cell that a faint wall closes, in squares of the pitch.
 _LEAST_CELL = 0.5
+_LEAST_BAY = 0.1
 # An opening as large as this is a hole, however narrow; broken walls join fewer cells.
 _HOLE = 5.0
 _SIMPLE_PX = 0.25
 # How near to a cut the outline runs along it: what is drawn is off by as much as pixels are, and walls end round.
 _ON_CUT_PX = 2.0
 _NO_CUTS = np.empty((0, 2, 2))
+# Where cells differ from the table by so many grey levels, what differs by less than this share of that is a bay that a
+# cut closed, no cell that it opened. Nearer to a wall its blur tells nothing.
+_FLOOR_LEVELS, _LIKE_FLOOR, _FROM_WALL_PX = 6.0, 0.35, 7
 # Of the width of the edge: half a level off moves the outline by so much. And of a wall's: the outermost one leans,
 # shows its side, or stands on a foot: in photographs nobody can say which of that is the edge. Webs of a sheet do not.
 _LEAST_BOUND_PX, _BOUND_OF_WIDTH, _BOUND_OF_WALL = 0.3, 0.4, 0.5
@@ -93,7 +97,8 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
 
 
 def closed_along(material: MaterialEdge, cuts: Float64s, pitch_px: float) -> MaterialEdge:
-    """The outline around material with the cells filled that straight cuts opened: it follows the cuts there.
+    """The outline around material with the cells filled that straight cuts opened: it follows the cuts there, but not
+    across bays that show the table.
 
     `cuts`: where each begins and ends, (N, 2, 2), pixels.
     """
@@ -101,7 +106,24 @@ def closed_along(material: MaterialEdge, cuts: Float64s, pitch_px: float) -> Mat
     for cut in cuts:
         start, end = (tuple(np.rint(place).astype(int).tolist()) for place in cut)
         cv2.line(region, start, end, 1)
-    return _outlined(replace(material.apart, region=_filled(region, pitch_px)), cuts)
+    region = _without_bays(_filled(region, pitch_px), material.apart, pitch_px)
+    return _outlined(replace(material.apart, region=region), cuts)
+
+
+def _without_bays(closed: Bytes, apart: Apart, pitch_px: float) -> Bytes:
+    """A region without what was added to that of material and shows the table, where cells do not."""
+    away = np.ones((_FROM_WALL_PX,) * 2, np.uint8)
+    free = cv2.erode((apart.difference <= apart.level).astype(np.uint8), away) > 0
+    cells = apart.difference[(apart.region > 0) & free]
+    floor = median(cells.astype(np.float64)) if len(cells) else 0.0
+    if floor < _FLOOR_LEVELS:
+        return closed
+    labels, area = pieces_and_areas(closed & (1 - apart.region), 4)
+    kept = np.ones(len(area), np.uint8)
+    for number in 1 + np.flatnonzero(area[1:] > _LEAST_BAY * pitch_px * pitch_px):
+        inner = apart.difference[(labels == number) & free]
+        kept[number] = not len(inner) or median(inner.astype(np.float64)) > _LIKE_FLOOR * floor
+    return closed & kept[labels]
 
 
 def _outlined(apart: Apart, cuts: Float64s = _NO_CUTS) -> MaterialEdge:
@@ -253,6 +275,8 @@ def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s, cuts: Float64s
     # Over an opened cell there is no edge to be seen.
     feet, on_cut = _on_cuts(smooth, cuts)
     moved, seen = np.where(on_cut[:, None], feet, smooth + shift[:, None] * normal), ~on_cut
+    if on_cut.all():
+        seen = on_cut
     steepest = (values[seen, :-4] - values[seen, 4:]).max(axis=1)
     behind = chain[seen].astype(np.intp)
     widths = 2.0 * levels[behind[:, 1], behind[:, 0]] / np.maximum(steepest, 1.0)

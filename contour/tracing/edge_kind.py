@@ -27,10 +27,19 @@ _MOST_TIPS = 0.2
 # Glints look like ends of walls, and teeth of closed triangles stand out like them: what is both, is one. Of 60 closed
 # lattices none has two, of 45 that were then cut along one line all have three.
 _SAME_PITCHES, _FEWEST_ENDS = 0.4, 2
+# Pixels make teeth of fine cells; of 68 closed lattices of larger ones none has a single end.
+_FINE_PITCH_PX = 12.0
+# Of triangles only what a disc half again as wide as a wall does not get into is one, for so many of its radii: into a
+# tooth of 60 degrees it gets to one radius. Of 17 closed lattices none has such an end, of 17 cut along one line 16.
+_THIN_WALLS, _THIN_PX, _THIN_RADII = 0.6, 1.0, 1.15
 
 
-def few_ends(seen: BlockEvidence) -> bool:
-    """Whether so few walls end along the border that it may close its cells; `edge_kind` tells."""
+def may_be_closed(seen: BlockEvidence) -> bool:
+    """Whether so few walls end along the border that it may close its cells, or triangles make it hard to tell;
+    `edge_kind` tells.
+    """
+    if _triangular(seen):
+        return True
     gaps = _gaps(seen, seen.rings[0].position[seen.rings[0].kind <= WitnessKind.BLUNT])
     return float(gaps[gaps > _FAR_PITCHES * seen.pitch_px].sum()) > _MOST_WITHOUT_ENDS * float(gaps.sum())
 
@@ -40,7 +49,7 @@ def edge_kind(material: MaterialEdge, seen: BlockEvidence) -> Edge:
     sides of the block, mixed, where they lie on one, cells, where there are none.
     """
     sure = [ring.position[sure_ends(material, ring, seen)] for ring in seen.rings]
-    if sum(len(ends) for ends in sure) < _FEWEST_ENDS:
+    if sum(len(ends) for ends in sure) < (_FEWEST_ENDS if seen.pitch_px < _FINE_PITCH_PX else 1):
         return "cells"
     gaps = _gaps(seen, sure[0])
     return "mixed" if gaps.max() > _LONGEST_WITHOUT_ENDS * gaps.sum() else "cut"
@@ -49,7 +58,26 @@ def edge_kind(material: MaterialEdge, seen: BlockEvidence) -> Edge:
 def sure_ends(material: MaterialEdge, ring: RingEvidence, seen: BlockEvidence) -> Bools:
     """Which witnesses of a ring are ends of walls at the edge of material, too, shape (N,)."""
     tips = np.concatenate([ring_tips(one, seen.pitch_px, seen.wall_px) for one in material.border])
+    if _triangular(seen):
+        tips = tips[_thin(material, tips, seen.wall_px)]
+    if not len(tips):
+        return np.zeros(len(ring.points), np.bool_)
     return (ring.kind <= WitnessKind.BLUNT) & (nearest(ring.points, tips) < _SAME_PITCHES * seen.pitch_px)
+
+
+def _triangular(seen: BlockEvidence) -> bool:
+    return seen.comb is not None and seen.comb.triangular
+
+
+def _thin(material: MaterialEdge, tips: Float64s, wall_px: float) -> Bools:
+    """Which tips of material, (N, 2), pixels, are as thin behind as a wall, shape (N,)."""
+    radius = _THIN_WALLS * wall_px + _THIN_PX
+    pad = int(radius) + 2
+    region = cv2.copyMakeBorder(material.apart.region, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
+    thick = (cv2.distanceTransform(region, cv2.DIST_L2, 5) > radius).astype(np.uint8)
+    away = cv2.distanceTransform(1 - thick, cv2.DIST_L2, 5)
+    column, row = (np.rint(tips) + pad).astype(int).T
+    return np.asarray(away[row, column] > (1.0 + _THIN_RADII) * radius)
 
 
 def check_promise(promise: str, kind: Edge, *, traced: bool) -> None:

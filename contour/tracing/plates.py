@@ -14,7 +14,7 @@ from contour.walls.comb_likeness import Comb
 
 # Webs of a sheet are wider than most walls; its holes are orderly, and round: a circle fills 0.79 of the box around it,
 # a hexagon 0.75 to 0.87, a square of a chessboard all of it.
-_LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID, _MOST_BOXED = 0.26, 0.6, 0.93, 0.89
+_LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID, _MOST_BOXED = 0.2, 0.4, 0.93, 0.89
 # Webs of fine cells are not told from walls, which look wider than they are.
 _FINE_PITCH_PX, _WIDER_PX = 15.0, 1.5
 # Of what the sheet differs from the table by, what its holes do: they are in shadow. Ink differs from most tables.
@@ -39,10 +39,11 @@ def like_plate(comb: Comb | None) -> bool:
     )
 
 
-def plate_edge(material: MaterialEdge, pitch_px: float) -> tuple[MaterialEdge, Edge] | None:
-    """The outline of a perforated sheet, along a straight cut where that opened its holes, and how its border runs.
+def plate_edge(material: MaterialEdge, pitch_px: float) -> tuple[MaterialEdge | None, Edge] | None:
+    """The outline of a perforated sheet, along a straight cut where that opened its holes, and how its border runs: no
+    outline, where more than one cut opened them, as webs end all around then.
 
-    None where its holes are not round or do not show the table, or are opened by something else than one cut.
+    None where it is no sheet: its holes are not round or do not show the table.
     """
     boxed, shade = _holes(material, pitch_px)
     if boxed > _MOST_BOXED or shade > _LIKE_TABLE:
@@ -52,9 +53,9 @@ def plate_edge(material: MaterialEdge, pitch_px: float) -> tuple[MaterialEdge, E
         return material, "cells"
     cuts = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
     if len(cuts) != 1:
-        return None
+        return None, "cut"
     closed = closed_along(material, _along_webs(material.contour.rings, cuts[0])[None], pitch_px)
-    return None if len(_bays(closed.apart.region, _LARGE_BAY, pitch_px)[0]) else (closed, "mixed")
+    return (None, "cut") if len(_bays(closed.apart.region, _LARGE_BAY, pitch_px)[0]) else (closed, "mixed")
 
 
 def _holes(material: MaterialEdge, pitch_px: float) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import MaterialEdge, material_edge
 from contour.tracing.cut_lines import with_cuts
-from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, few_ends
+from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed
 from contour.tracing.evidence_check import check_against_evidence
 from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
@@ -57,9 +57,11 @@ def wall_tips(
         return _closed_cells(picture, light, settings, on_stage)
     seen, look = looked_at(picture, light, settings, on_stage)
     plate = _plate(picture, light, settings, on_stage, seen)
-    if plate is not None:
+    if isinstance(plate, Trace):
         return plate
-    if few_ends(seen):
+    if plate is not None:
+        seen = plate
+    elif may_be_closed(seen):
         closed, kind = _if_closed(picture, light, settings, on_stage, seen)
         # Where something hides the border no walls end either.
         if kind != "mixed" or not doubtful(seen.rings[0], look).any():
@@ -194,8 +196,10 @@ def _if_closed(
 
 def _plate(
     picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage, seen: BlockEvidence
-) -> Trace | None:
-    """The outline of a perforated sheet; None where it is none, or cut in more than one line."""
+) -> Trace | BlockEvidence | None:
+    """The outline of a perforated sheet; what is seen of it, as of a sheet, where it was cut along more than one line;
+    None where it is none.
+    """
     if settings.edge != "auto" or not like_plate(seen.comb):
         return None
     cells, walls = _cells_and_walls(light, settings)
@@ -206,7 +210,10 @@ def _plate(
     if found is None:
         return None
     comb = replace(cells.comb, plate=True)
-    return replace(_around(found[0], light, cells, walls, on_stage), comb=comb, edge=found[1])
+    outline, edge = found
+    if outline is None:
+        return replace(seen, comb=comb)
+    return replace(_around(outline, light, cells, walls, on_stage), comb=comb, edge=edge)
 
 
 def _closed_cells(picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage) -> Trace:

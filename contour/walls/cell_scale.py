@@ -13,7 +13,7 @@ from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.opencv import pieces_and_areas
 from contour.image.side_by_side import side_by_side
-from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
+from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb, triangle_order
 from contour.walls.wall_mask import wall_mask
 
 _TILE_PX = 512
@@ -38,8 +38,8 @@ class CellScale:
     the part of the tile they fill, the wall contrast in grey levels, the share of the
     walls that hang together, and the grey levels of walls and of cells' floors.
 
-    order_and_solidity: tells the share of the cells with neighbours all around, and the share of its convex hull that a
-    cell fills; of most readings nobody asks."""
+    form: tells the share of the cells with neighbours all around, of those with a triangle's, and the share of its
+    convex hull that a cell fills; of most readings nobody asks."""
 
     pitch_px: float
     wall_px: float
@@ -51,7 +51,7 @@ class CellScale:
     connected: float
     level: float
     floor: float
-    order_and_solidity: Callable[[], tuple[float, float]]
+    form: Callable[[], tuple[float, float, float]]
 
     @property
     def score(self) -> float:
@@ -64,7 +64,7 @@ class CellScale:
     def comb(self) -> Comb:
         """What tells a comb from other things that have patches side by side."""
         regular = self.regularity * self.filled
-        order, solid = self.order_and_solidity()
+        order, triangles, solid = self.form()
         return Comb(
             self.pitch_px,
             self.wall_px,
@@ -74,6 +74,7 @@ class CellScale:
             regular,
             order=order,
             solid=solid,
+            triangular=triangles > 0.5 * order,
         )
 
 
@@ -209,6 +210,7 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
         quantile(light[mask == 0][::7], 0.3 if bright else 0.7),
         lambda: (
             lattice_order(places[regular], size),
+            triangle_order(places[regular]),
             solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
         ),
     )

@@ -43,7 +43,8 @@ class Comb:
     that was looked at, how good a comb they make (0 to 1), and the share that is regular and fills its place (0 to 1).
 
     order: share of the cells with neighbours all around, a pitch away. solid: share of its convex hull that a cell
-    fills, the median. plate: whether holes were seen that show the table.
+    fills, the median. triangular: whether its neighbours are those of triangles. plate: whether holes were seen that
+    show the table.
     """
 
     pitch_px: float
@@ -54,6 +55,7 @@ class Comb:
     regular: float
     order: float = 1.0
     solid: float = 1.0
+    triangular: bool = False
     plate: bool = False
 
 
@@ -105,15 +107,24 @@ def lattice_order(places: Float64s, pitch_px: float) -> float:
     """Share of cells with neighbours all around, 0 to 1; centroids of cells (N, 2), pixels: four or more about a pitch
     away, or three nearer ones and then six, as triangles have.
     """
-    some = places[_spread(len(places))]
-    near = np.abs(some[:, None, :] - places[None, :, :])
-    square = (near[:, :, 0] ** 2 + near[:, :, 1] ** 2) / pitch_px**2
+    square = _squared_distances(places) / pitch_px**2
 
     def between(low: float, high: float) -> Indices:
         return np.asarray(((square > low**2) & (square < high**2)).sum(axis=1), np.intp)
 
     around = between(*_NEIGHBOUR_PITCHES) >= _NEIGHBOURS
-    return float(max(np.mean(around), np.mean(_among_triangles(square))))
+    return max(float(np.mean(around)), triangle_order(places))
+
+
+def triangle_order(places: Float64s) -> float:
+    """Share of cells with the neighbours that triangles have, 0 to 1; centroids of cells (N, 2), pixels."""
+    return float(np.mean(_among_triangles(_squared_distances(places))))
+
+
+def _squared_distances(places: Float64s) -> Float64s:
+    """From some of the places to all of them, (M, N)."""
+    near = np.abs(places[_spread(len(places))][:, None, :] - places[None, :, :])
+    return np.asarray(near[:, :, 0] ** 2 + near[:, :, 1] ** 2, np.float64)
 
 
 def _among_triangles(square: Float64s) -> Bools:

@@ -70,6 +70,14 @@ def test_closed_cells_that_were_cut_along_a_line_are_traced_stretch_by_stretch(c
     assert near.holds(found.uncertainty_px)
 
 
+@pytest.mark.parametrize(("seed", "border"), [(994007, "closed"), (994008, "closed"), (994014, "mixed")])
+def test_teeth_of_closed_triangles_are_no_ends_of_walls(seed: int, border: Border) -> None:
+    one = lattice(seed, "triangular", border)
+    found = traced(one)
+    assert found.edge == {"closed": "cells", "mixed": "mixed"}[border]
+    assert agreement(found.contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
+
+
 def test_a_border_of_both_kinds_does_not_hold_the_promise_that_it_was_cut() -> None:
     with pytest.raises(EdgeContradicted, match="was cut there"):
         traced(drawn("hexagonal", "mixed"), "cut")

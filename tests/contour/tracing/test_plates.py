@@ -12,7 +12,7 @@ from contour.geometry.rings import Contour
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
 from service.reasons import Reason
-from tests.support.scenes.lattices import lattice
+from tests.support.scenes.lattices import Border, lattice
 
 TABLE, SHEET = 60, 200
 PITCH, RADIUS = 30, 8
@@ -47,17 +47,15 @@ def test_patches_that_do_not_show_the_table_or_are_square_are_a_print(dot: int, 
     assert Reason.NO_BLOCK_FOUND in found.reasons
 
 
-def test_a_sheet_that_was_cut_through_its_holes_along_a_line_is_traced_along_that() -> None:
-    one = lattice(977004, "round", "mixed")
+@pytest.mark.parametrize(
+    ("seed", "border"), [(977003, "mixed"), (977004, "mixed"), (977005, "mixed"), (977006, "cut"), (977007, "cut")]
+)
+def test_a_sheet_that_was_cut_through_its_holes_is_traced_along_that(seed: int, border: Border) -> None:
+    one = lattice(seed, "round", border)
     found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
-    assert (found.reasons, found.edge) == ((), "mixed")
+    assert (found.reasons, found.edge) == ((), border)
     assert found.pixels is not None
     assert found.uncertainty_px is not None
     near = agreement(found.pixels, one.outline)
     assert near.hausdorff_px < 0.3 * one.pitch_px
     assert near.holds(found.uncertainty_px)
-
-
-@pytest.mark.parametrize("seed", [977003, 977005])
-def test_a_cut_sheet_whose_cut_is_not_found_is_refused(seed: int) -> None:
-    assert Measurer(None).measure(lattice(seed, "round", "mixed").picture, PlainRecipe(), 0.0).findings

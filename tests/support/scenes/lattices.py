@@ -56,7 +56,7 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
     if border != "cut" and cells != "round":
         body = _whole_cells(outline, number, centre, wall)
     if border == "mixed":
-        body = body & _half_plane(rng, x, y)
+        body = _cut_along(body, _half_plane(rng, x, y), number)
     if cells == "round" and border != "cut":
         # Only whole holes are drilled; the sheet goes on around them.
         drilled = _at(_depth(outline), centre) > 0.62 * pitch
@@ -159,6 +159,19 @@ def _half_plane(rng: np.random.Generator, x: Floats, y: Floats) -> NDArray[np.bo
     angle = float(rng.uniform(0, 2 * np.pi))
     away = (x - WIDTH / 2) * np.cos(angle) + (y - HEIGHT / 2) * np.sin(angle)
     return np.asarray(away < rng.uniform(60, 110))
+
+
+def _cut_along(body: NDArray[np.bool_], kept: NDArray[np.bool_], number: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """What is kept of a body, with the bays no larger than a cell that the cut shuts: cells cut open look the same.
+
+    What hangs on by a thread alone falls off.
+    """
+    _, labels, stats, _ = cv2.connectedComponentsWithStats((kept & ~body).astype(np.uint8), connectivity=4)
+    bays = stats[:, cv2.CC_STAT_AREA] <= np.bincount(number.ravel()).max()
+    bays[0] = False
+    body = (body & kept) | bays[labels]
+    threads = cv2.morphologyEx(body.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2 * _FINER, 2 * _FINER), np.uint8)) > 0
+    return np.asarray(body & (cv2.dilate(_largest(threads).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0))
 
 
 def _largest(body: NDArray[np.bool_]) -> NDArray[np.bool_]:

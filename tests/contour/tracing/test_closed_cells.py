@@ -1,0 +1,43 @@
+"""Along a straight cut the outline around material runs over cells that were cut open, not over bays of the table."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from contour.geometry.arrays import Bytes
+from contour.geometry.rings import area
+from contour.tracing.closed_cells import closed_along, material_edge
+from contour.walls.wall_mask import wall_mask
+
+TABLE, FLOOR, WALL = 90, 76, 220
+PITCH, COLUMNS, ROWS, LEFT, TOP = 40, 8, 6, 60, 50
+CUT_X = LEFT + PITCH * COLUMNS - PITCH // 2
+
+
+def cut_squares(bay: int) -> Bytes:
+    """Square cells, the last column cut open along a vertical line; the floor of one of these is of level `bay`."""
+    picture = np.full((340, 460), TABLE, np.uint8)
+    right, bottom = LEFT + PITCH * COLUMNS, TOP + PITCH * ROWS
+    cv2.rectangle(picture, (LEFT, TOP), (right, bottom), FLOOR, -1)
+    cv2.rectangle(picture, (right - PITCH, TOP + 2 * PITCH), (right, TOP + 3 * PITCH), bay, -1)
+    for x in range(LEFT, right + 1, PITCH):
+        cv2.line(picture, (x, TOP), (x, bottom), WALL, 5)
+    for y in range(TOP, bottom + 1, PITCH):
+        cv2.line(picture, (LEFT, y), (right, y), WALL, 5)
+    picture[:, CUT_X + 1 :] = TABLE
+    return np.asarray(cv2.GaussianBlur(picture, (0, 0), 0.8), np.uint8)
+
+
+def area_along_cut(bay: int) -> float:
+    """What lies in the outline of these cells along the cut, square pixels."""
+    picture = cut_squares(bay)
+    material = material_edge(picture, PITCH, wall_mask(picture, PITCH, bright=True).mask)
+    cut = np.array([[[CUT_X, TOP - 2.0], [CUT_X, TOP + PITCH * ROWS + 2.0]]])
+    return area(closed_along(material, cut, PITCH).contour)
+
+
+def test_a_bay_that_shows_the_table_is_no_cell_that_a_cut_opened() -> None:
+    cell = (PITCH // 2 - 2.5) * (PITCH - 5)
+    assert area_along_cut(FLOOR) - area_along_cut(TABLE) == pytest.approx(cell, rel=0.15)

@@ -14,7 +14,9 @@ from contour.walls.comb_likeness import Comb
 
 # Webs of a sheet are wider than most walls; its holes are orderly, and round: a circle fills 0.79 of the box around it,
 # a hexagon 0.75 to 0.87, a square of a chessboard all of it.
-_LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID, _MOST_BOXED = 0.2, 0.4, 0.93, 0.89
+_LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID = 0.2, 0.4, 0.93
+# Squares that hang together by their corners fill less than half of theirs.
+_LEAST_BOXED, _MOST_BOXED = 0.7, 0.89
 # Webs of fine cells are not told from walls, which look wider than they are.
 _FINE_PITCH_PX, _WIDER_PX = 15.0, 1.5
 # Of what the sheet differs from the table by, what its holes do: they are in shadow. Ink differs from most tables.
@@ -46,7 +48,7 @@ def plate_edge(material: MaterialEdge, pitch_px: float) -> tuple[MaterialEdge | 
     None where it is no sheet: its holes are not round or do not show the table.
     """
     boxed, shade = _holes(material, pitch_px)
-    if boxed > _MOST_BOXED or shade > _LIKE_TABLE:
+    if not _LEAST_BOXED < boxed < _MOST_BOXED or shade > _LIKE_TABLE:
         return None
     corners, normals = _bays(material.apart.region, _LEAST_BAY, pitch_px)
     if not len(corners):

@@ -41,6 +41,17 @@ def test_a_sheet_whose_round_holes_show_the_table_is_traced() -> None:
     assert agreement(found.pixels, truth).p95_px < 1.0
 
 
+def test_a_board_whose_squares_are_as_dark_as_the_table_is_none() -> None:
+    picture = np.full((520, 640), TABLE, np.uint8)
+    rows, columns = np.mgrid[:360, :480] // 40
+    picture[80:440, 80:560] = np.where((rows + columns) % 2 == 0, TABLE - 25, SHEET)
+    assert (
+        Measurer(None)
+        .measure(np.asarray(cv2.GaussianBlur(picture, (0, 0), 0.8), np.uint8), PlainRecipe(), 0.0)
+        .findings
+    )
+
+
 @pytest.mark.parametrize(("dot", "square"), [(130, False), (TABLE, True)], ids=["ink", "squares"])
 def test_patches_that_do_not_show_the_table_or_are_square_are_a_print(dot: int, square: bool) -> None:
     found = Measurer(None).measure(dotted(dot, square=square), PlainRecipe(), 0.0)

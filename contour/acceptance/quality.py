@@ -7,6 +7,7 @@ so that the size of the picture does not matter. Where nothing was traced only t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import cv2
 import numpy as np
@@ -21,10 +22,9 @@ _MOST_TILES = 48
 _LEAST_TILE_PX = 16
 _TILE_PITCHES = 1.6
 _USUAL_PITCH_PX = 24.0
-# Walls and cells cover more than this of any tile; dust and glints less.
-_TAIL = 0.04
-# Spread between these tails of nothing but normal noise, in standard deviations.
-_TAILS_OF_NOISE = 3.5
+# Walls and cells cover more than this of any tile; dust and glints less. Of large cells walls a pixel wide cover two
+# pixels over the pitch: half of that then.
+_TAIL, _TAIL_PX = 0.04, 1.0
 # What a fifth of normal deviates stay below in size, times what a second difference both ways adds up: 6 deviations.
 _SECOND_OF_NOISE = 0.2533 * 6.0
 # Steepest rise of a blurred step, and of a blurred line, over their height: 0.40 and 0.61 of 1/sigma.
@@ -46,9 +46,9 @@ _LEAST_EDGE = 12.0
 class Quality:
     """How the walls of a block are seen.
 
-    level: grey level of what is brightest in it (96th percentile). contrast: from cells to walls, grey levels. noise:
-    standard deviation of a pixel. blur_px: standard deviation of the blur, in the direction in which it is worst.
-    pitch_px: of the cells. clipped_share: of the pixels at and inside the outline, those at full scale.
+    level: grey level of what is brightest in it (96th percentile and more). contrast: from cells to walls, grey levels.
+    noise: standard deviation of a pixel. blur_px: standard deviation of the blur, in the direction in which it is
+    worst. pitch_px: of the cells. clipped_share: of the pixels at and inside the outline, those at full scale.
     """
 
     level: float
@@ -84,9 +84,12 @@ def block_quality(picture: Bytes, light: Bytes, contour: Contour, pitch_px: floa
     places = _tile_places(light.shape, contour.exterior, pitch_px)
     colours, tiles = _tiles(picture, places), _tiles(light, places)
     clipped = float(np.mean(colours.reshape(*tiles.shape, -1).max(axis=3) >= FULL_SCALE))
-    low, high = _tails(tiles)
+    tail = min(_TAIL, _TAIL_PX / pitch_px)
+    low, high = _tails(tiles, tail)
     noise = _noise(tiles)
-    contrast = np.maximum(high - low - _TAILS_OF_NOISE * noise, 0.0)
+    # Between such tails of nothing but normal noise there is a spread, too.
+    of_noise = 2.0 * NormalDist().inv_cdf(1.0 - tail) * noise
+    contrast = np.maximum(high - low - np.float32(of_noise), np.float32(0.0))
     blur = _blur_px(tiles, contrast, noise)
     return Quality(
         level=median(high),
@@ -169,10 +172,10 @@ def _tiles(picture: Bytes, at: _TilePlaces) -> Bytes:
     return np.stack([picture[y : y + at.side, x : x + at.side] for x, y in zip(at.left, at.top, strict=True)])
 
 
-def _tails(light: Bytes) -> tuple[Float32s, Float32s]:
-    """Grey levels that _TAIL of each tile lies below and above, shape (N,) each."""
+def _tails(light: Bytes, tail: float) -> tuple[Float32s, Float32s]:
+    """Grey levels that such a share of each tile lies below and above, shape (N,) each."""
     flat = light.reshape(len(light), -1)
-    cut = max(1, round(_TAIL * flat.shape[1]))
+    cut = max(1, round(tail * flat.shape[1]))
     ordered = np.partition(flat, (cut, flat.shape[1] - 1 - cut), axis=1)
     return ordered[:, cut].astype(np.float32), ordered[:, -1 - cut].astype(np.float32)
 

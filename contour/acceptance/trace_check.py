@@ -52,8 +52,8 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
     `picture` and `rectifier` are those it was traced with.
     """
     quality = block_quality(picture, traced.light, traced.contour, traced.pitch_px)
-    # What is at full scale beside dark material is the table; the edge of the material is seen all the better.
-    if traced.polarity == "dark" and traced.edge in ("cells", "mixed"):
+    # What is at full scale beside dark walls is the table; their ends are seen all the better.
+    if traced.polarity == "dark":
         quality = replace(quality, clipped_share=0.0)
     if traced.pitch_px is None:
         return CheckedTrace(traced, quality)

@@ -16,6 +16,7 @@ from contour.acceptance.quality import (
     picture_faults,
     quality_faults,
 )
+from contour.geometry.rings import Contour
 from contour.walls.lightness import wall_light
 from tests.support.pictures.small_scenes import block
 
@@ -91,6 +92,16 @@ def test_the_size_of_the_picture_does_not_matter() -> None:
     large = block_quality(twice, wall_light(twice), scaled, 2 * rendered.pitch_px)
     assert large.contrast == pytest.approx(small.contrast, rel=0.15)
     assert large.blur_px / large.pitch_px == pytest.approx(small.blur_px / small.pitch_px, rel=0.5)
+
+
+@pytest.mark.parametrize("pitch", [24, 45, 90])
+def test_crisp_walls_a_pixel_wide_are_seen_however_large_the_cells(pitch: int) -> None:
+    picture = np.zeros((12 * pitch, 14 * pitch), np.uint8)
+    picture[pitch // 2 :: pitch] = picture[:, pitch // 2 :: pitch] = 255
+    edge = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]) * (np.array(picture.shape[::-1]) - 4.0 * pitch)
+    quality = block_quality(picture, picture, Contour(edge + 2.0 * pitch), float(pitch))
+    assert (quality.level, quality.blur_px > 0.0) == (255.0, True)
+    assert quality_faults(quality, LIMITS) == ()
 
 
 def test_overexposure_counts_on_the_block_and_not_beside_it() -> None:

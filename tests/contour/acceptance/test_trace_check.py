@@ -86,3 +86,14 @@ def test_a_cropped_rectifier_counts_pixels_from_the_parts_first_one() -> None:
     part = CroppedRectifier(Magnifier(), np.array([10.0, 20.0]))
     assert part.rectify(points).tolist() == [[26.0, 48.0], [31.0, 52.0]]
     assert part.unrectify(part.rectify(points)).tolist() == points.tolist()
+
+
+def test_a_table_at_full_scale_beside_dark_walls_is_no_overexposed_block() -> None:
+    picture = block("rectangle", "dark").picture
+    traced = trace(picture, TraceSettings())
+    bright = np.where(picture > np.quantile(picture, 0.2), np.uint8(255), picture)
+    assert traced.polarity == "dark"
+    assert block_quality(bright, bright, traced.contour, traced.pitch_px).clipped_share > 0.2
+    checked = check_trace(bright, traced, None)
+    assert checked.quality is not None
+    assert checked.quality.clipped_share == 0.0

@@ -97,12 +97,20 @@ def probe(light: Bytes, polarity: str) -> CellScale:
             break
     # Several small blocks in view fill little of a tile, and do not hang together.
     if best is None or (best.score < _LEAST_SCORE and not surely_comb(best.comb)):
-        seen = "no enclosed cells" if best is None else f"{best.count} enclosed cells, of mixed size or far apart"
+        seen = " and ".join(_shown(light, bright=bright) for bright in senses)
         raise NoBlockFound(
             f"no block found: the most textured part of the picture shows {seen}, "
             "expected a dozen or more of one size. Check that a block lies in view, the light, and the polarity"
         )
     return best
+
+
+def _shown(light: Bytes, *, bright: bool) -> str:
+    """What the most textured part shows where walls are bright, or dark, in words."""
+    tiles = _busiest_tiles(light)
+    found = _part_cells(tiles[0], [bright], _GUESSES) if tiles else None
+    cells = f"{found.count} enclosed cells of mixed size or far apart" if found else "no enclosed cells"
+    return f"{cells} between {'bright' if bright else 'dark'} walls"
 
 
 def _parts(light: Bytes) -> Iterator[tuple[Bytes, int]]:

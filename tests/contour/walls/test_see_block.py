@@ -222,3 +222,9 @@ def test_where_a_coloured_picture_shows_no_table_its_light_is_kept() -> None:
     walls[:, :6], walls[:, -6:] = 0, 0
     picture = np.dstack([walls, walls // 2, walls // 4])
     assert light_from_table(picture, walls, walls, 1) is None
+
+
+def test_where_no_cells_are_it_is_told_what_both_readings_showed() -> None:
+    table = np.random.default_rng(3).normal(90.0, 4.0, (300, 400))
+    with pytest.raises(NoBlockFound, match=r"cells.* between bright walls and .*cells.* between dark walls, expected"):
+        probe(np.clip(table, 0, 255).astype(np.uint8), "auto")

@@ -78,8 +78,8 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
     if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and even and not comb.plate:
         return (
             f"what lies between patches {comb.pitch_px:.0f} px apart is {100 * share:.0f} % as wide as that, cell "
-            f"walls are {100 * _WIDEST_WALL:g} % at most: a board, a print, or a perforated plate. Check that a block "
-            "lies in view, and set edge: cells for a perforated plate"
+            f"walls are {100 * _WIDEST_WALL:g} % at most: a board, a print, a perforated plate, or foam whose cells "
+            "are closed. Check that a block lies in view, and set edge: cells for a plate or foam"
         )
     if comb.solid < _CONVEX and comb.order < _LEAST_ORDER:
         return (

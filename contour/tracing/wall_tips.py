@@ -61,7 +61,7 @@ def wall_tips(
         return plate
     if plate is not None:
         seen = plate
-    elif may_be_closed(seen):
+    if may_be_closed(seen):
         closed, kind = _if_closed(picture, light, settings, on_stage, seen)
         # Where something hides the border no walls end either.
         if kind != "mixed" or not doubtful(seen.rings[0], look).any():

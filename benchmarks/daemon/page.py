@@ -1,9 +1,10 @@
 """What the operator's page takes: `python -m benchmarks.daemon.page [--rounds N] [--write]`.
 
-First paint and weight in Debian's Chromium; and what a viewer costs a job. A viewer asks for what the page asks for
-at the page's pace: the list, the drawing, the frame at both sizes, beside the events. There is a job a second; and, to
-tell the worst, one after the other without a pause: all of it falls into the next job. Rounds with and without a
-viewer alternate, and a job is compared with jobs of the same picture, for other load on the machine comes and goes.
+First paint and weight in Debian's Chromium; and what a viewer, and one of the live view, cost a job. A viewer asks for
+what the page asks for at the page's pace: the list, the drawing, the frame at both sizes, beside the events. There is a
+job a second; and, to tell the worst, one after the other without a pause: all of it falls into the next job. Rounds
+with and without a viewer alternate, and a job is compared with jobs of the same picture, for other load on the machine
+comes and goes.
 """
 
 from __future__ import annotations
@@ -35,9 +36,10 @@ from tests.support.processes.page_client import Client
 from tests.support.processes.processes import free_port, until
 from tests.support.real_parts import need_program
 
-PAINT_MS, WEIGHT_KB, COST_PERCENT = 300.0, 150.0, 2.0
+PAINT_MS, WEIGHT_KB, COST_PERCENT, LIVE_PERCENT = 300.0, 200.0, 2.0, 10.0
 LOADS = 9
 LOOKS_AT_ONCE, LOOK_S = 2.0, 0.5  # then one each LOOK_S, as static/page.js has it
+LIVE_PAUSE_S = 0.3  # as static/live.js has it
 PACE_S = 1.0  # from trigger to trigger; faster than any cell cuts
 JOBS_A_ROUND = 12  # three of each picture
 JOBS_BEFORE = 4  # which do not count: a viewer who has just come looks at all at once
@@ -123,6 +125,19 @@ class Viewer:
         events.close()
 
 
+class LiveViewer(Viewer):
+    """Asks for look after look and its picture, as the page's live view does."""
+
+    def _watch(self) -> None:
+        client, newest = Client(self._port), 0
+        while not self._closed:
+            look = client.get(f"/api/v1/live{f'?after={newest}' if newest else ''}").json["look"]
+            if look is not None:
+                newest = look["number"]
+                client.get(f"/api/v1/live/{newest}")
+            time.sleep(LIVE_PAUSE_S)
+
+
 @dataclass(frozen=True)
 class Cost:
     """Percent that a job takes longer with a viewer, how sure that is, and milliseconds of processor more a job."""
@@ -132,7 +147,7 @@ class Cost:
     processor_ms: float
 
 
-def viewers_cost(cell: Cell, port: int, rounds: int) -> Cost:
+def viewers_cost(cell: Cell, port: int, rounds: int, viewer: type[Viewer] = Viewer) -> Cost:
     """From jobs of the same picture, in rounds with a viewer and in those without beside them, each first in turn.
 
     The median of the ratios of every such two jobs; its standard error by drawing rounds anew.
@@ -140,7 +155,7 @@ def viewers_cost(cell: Cell, port: int, rounds: int) -> Cost:
     ratios, used = list[list[float]](), list[float]()
     for number in range(rounds):
         with_viewer = [number % 2 == 1, number % 2 == 0]
-        found = {watched: _round(cell, port if watched else None) for watched in with_viewer}
+        found = {watched: _round(cell, port, viewer if watched else None) for watched in with_viewer}
         (seen, seen_ms), (alone, alone_ms) = found[True], found[False]
         ratios.append([one / other for name in seen for one in seen[name] for other in alone.get(name, ())])
         used.append(seen_ms - alone_ms)
@@ -153,18 +168,18 @@ def _cost(ratios: list[list[float]]) -> float:
     return 100 * (median(ratio for of_round in ratios for ratio in of_round) - 1)
 
 
-def _round(cell: Cell, watched_at: int | None) -> tuple[dict[str, list[float]], float]:
+def _round(cell: Cell, port: int, viewer: type[Viewer] | None) -> tuple[dict[str, list[float]], float]:
     """Total times of jobs by picture, ms, and processor that the daemon took for one.
 
-    watched_at: the page's port, where somebody watches.
+    viewer: who watches at the page's port.
     """
-    viewer = None if watched_at is None else Viewer(watched_at)
+    watching = None if viewer is None else viewer(port)
     try:
         cell.goes_on(JOBS_BEFORE)
         return _jobs(cell)
     finally:
-        if viewer is not None:
-            viewer.close()
+        if watching is not None:
+            watching.close()
 
 
 def _jobs(cell: Cell) -> tuple[dict[str, list[float]], float]:
@@ -184,6 +199,7 @@ def figures(folder: Path, rounds: int) -> tuple[list[Figure], str]:
     """All of them, and what belongs to them in words."""
     with _jobs_each(folder / "paced", PACE_S) as (cell, port):
         paced = viewers_cost(cell, port, rounds)
+        live = viewers_cost(cell, port, rounds, LiveViewer)
         cell.controller.stop()
         time.sleep(2)
         loaded = loading(f"http://127.0.0.1:{port}/")
@@ -193,13 +209,15 @@ def figures(folder: Path, rounds: int) -> tuple[list[Figure], str]:
         Figure(f"first paint, empty cache, median of {LOADS}", median(loaded.paints), "ms", PAINT_MS),
         Figure("all that is loaded, without the frame", loaded.weight_kb, "kB", WEIGHT_KB),
         Figure("a job a second takes longer with a viewer by", paced.percent, "%", COST_PERCENT),
+        Figure("a job a second takes longer with one of the live view by", live.percent, "%", LIVE_PERCENT),
     ]
     told = (
         f"A page of one line, loaded in turns with it, painted after {median(loaded.bare_paints):.0f} ms; the load was"
         f" {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores at the end. The viewer's cost has a standard error of"
-        f" {paced.standard_error:.1f} %. Where jobs follow one another without a pause, five a second, it is"
-        f" {pressed.percent:.1f} ± {pressed.standard_error:.1f} %: then both cores are busy all the time, and of the"
-        f" processor the daemon takes {pressed.processor_ms:.0f} ms more for a job that is looked at."
+        f" {paced.standard_error:.1f} %, the live view's of {live.standard_error:.1f} %. Where jobs follow one another"
+        f" without a pause, five a second, it is {pressed.percent:.1f} ± {pressed.standard_error:.1f} %:"
+        " then both cores are busy all the time,"
+        f" and of the processor the daemon takes {pressed.processor_ms:.0f} ms more for a job that is looked at."
     )
     return shown, fill(told, PAGE_WIDTH)
 

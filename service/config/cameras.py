@@ -33,6 +33,11 @@ class FilesCamera(Model):
             raise ValueError(f"{key} is set and loop is true: files are taken once or again and again. Set loop: false")
         return self
 
+    @property
+    def has_spare_frames(self) -> bool:
+        """True where a frame that is only looked at is none that a job would have got."""
+        return self.loop
+
 
 class V4l2Camera(Model):
     """A camera of the Linux kernel's Video4Linux2."""
@@ -72,6 +77,11 @@ class V4l2Camera(Model):
         description="Time after opening in which no trigger is taken, s: calibration holds for a warm camera. After an "
         "interruption at most as long as that was.",
     )
+
+    @property
+    def has_spare_frames(self) -> bool:
+        """True: it sends frames all the time."""
+        return True
 
 
 class GenicamCamera(Model):
@@ -133,6 +143,11 @@ class GenicamCamera(Model):
             seen = "both serial and user_name are" if self.serial else "neither serial nor user_name is"
             raise ValueError(f"{seen} given, expected one: `combtrace cameras` lists them")
         return self
+
+    @property
+    def has_spare_frames(self) -> bool:
+        """True unless a line exposes each frame, which is a job's."""
+        return self.trigger != "line"
 
 
 Camera = Annotated[FilesCamera | V4l2Camera | GenicamCamera, Field(discriminator="kind")]

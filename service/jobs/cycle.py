@@ -78,6 +78,11 @@ class Cycle:
         self._plan = plan
 
     @property
+    def plan(self) -> Plan:
+        """What the next job is measured by."""
+        return self._plan
+
+    @property
     def measurer(self) -> Measurer:
         """What traces and converts now."""
         return self._plan.measurer

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from service.config.recipes import AnyRecipe
 
 MOST_PROCESSES = 4
+LAST = 10  # niceness: a job has nine times the weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +69,11 @@ class LiveView:
     exposes.
     """
 
-    def __init__(self, sight: Sight, *, processes: int | None = None) -> None:
+    def __init__(self, sight: Sight, *, processes: int | None = None, gives_way: bool = False) -> None:
+        """gives_way: measure at a low priority."""
         self._method = sight.recipe.method
         self.processes = processes or min(MOST_PROCESSES, (os.cpu_count() or 1) + 1)
-        self._measuring = ProcessPoolExecutor(self.processes, get_context("spawn"), _begin, (sight,))
+        self._measuring = ProcessPoolExecutor(self.processes, get_context("spawn"), _begin, (sight, gives_way))
         self._grabbing = ThreadPoolExecutor(1, "live-camera")
 
     def __enter__(self) -> Self:
@@ -135,9 +138,20 @@ def _wait_for(awaited: list[Future[Any]], at_most_s: float | None) -> None:
 _sights: list[Sight] = []  # of a measuring process: the one that it began with
 
 
-def _begin(sight: Sight) -> None:
+def _begin(sight: Sight, gives_way: bool) -> None:
+    if gives_way:
+        os.setpriority(os.PRIO_PROCESS, 0, max(LAST, os.getpriority(os.PRIO_PROCESS, 0)))
+    threading.Thread(target=_end_with_the_parent, daemon=True).start()
     cv2.setNumThreads(1)
     _sights.append(sight)
+
+
+def _end_with_the_parent() -> None:
+    """A parent that was killed tells nobody: its processes would wait for work for ever."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _seen(pixels: NDArray[np.uint8], camera: str) -> tuple[Measurement, PictureFigures]:

@@ -89,7 +89,7 @@ def document(evidence: Evidence, table_file: str | None) -> dict[str, Any]:
         "job": job_fields(evidence.job),
         "recipe": None if evidence.recipe is None else evidence.recipe.model_dump(mode="json"),
         "thickness_mm": evidence.thickness_mm,
-        "calibration": _calibration(measurer),
+        "calibration": calibration_fields(measurer),
         "work_area_mm": None if measurer.work_area_mm is None else measurer.work_area_mm.tolist(),
         "table": table_file,
         "frame": None if frame is None else _frame_fields(frame),
@@ -180,7 +180,8 @@ def _encoded(ending: str, pixels: NDArray[np.uint8] | NDArray[np.uint16], option
     return data.tobytes()
 
 
-def _calibration(measurer: Measurer) -> dict[str, Any] | None:
+def calibration_fields(measurer: Measurer) -> dict[str, Any] | None:
+    """The calibration that it measures by; None without one."""
     guard = measurer.guard
     if guard is None:
         return None

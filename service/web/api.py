@@ -29,6 +29,8 @@ from service.web.drawing import drawing
 from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept, tag_of
 from service.web.guard import BodyTooLarge
 from service.web.live import MOST_VIEWERS, PERIOD_S, EventStream, Live
+from service.web.looks.endpoints import LookEndpoints
+from service.web.looks.live_looks import LiveLooks
 from service.web.openapi import PREFIX, document
 from service.web.operations_table import MOST_JOBS, MOST_NOTES, OPERATIONS
 from service.web.requests import address_of, body, job_number, truth, whole_number
@@ -48,6 +50,7 @@ class Api:
         self._journal = daemon.sources.journal_path
         self._pictures = Pictures()
         self.live = Live(daemon)
+        self._looks = LiveLooks(daemon.sources.looks)
         if daemon.sources.archive is not None:
             daemon.sources.archive.on_stored = self._stored
         self._document = json.dumps(document(OPERATIONS, version), ensure_ascii=False).encode()
@@ -56,6 +59,7 @@ class Api:
     def close(self) -> None:
         """Let go of threads."""
         self.live.close()
+        self._looks.close()
         if self._daemon.sources.archive is not None:
             self._daemon.sources.archive.on_stored = lambda _evidence: None
         self._pictures.close()
@@ -85,6 +89,7 @@ class Api:
             "/reasons": self.reasons,
             "/audit": self.audit,
             "/openapi.json": self.openapi,
+            **LookEndpoints(self._looks).routes(),
         }
         posts = {"/trigger": self.trigger, "/halt": self.halt, "/resume": self.resume}
         return [

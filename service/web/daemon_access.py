@@ -17,6 +17,7 @@ from service.daemon.operations import Operations
 from service.daemon.storage_watch import StorageWatch
 from service.jobs.executor import Executor
 from service.jobs.health import Health
+from service.jobs.spare_camera import LookSources
 from service.jobs.trigger_queue import Queued
 from service.link.link import Link
 from service.measuring.calibration_guard import CalibrationGuard
@@ -47,6 +48,7 @@ class PageSources:
     archive_max_bytes: int
     recipes: Callable[[], tuple[tuple[int, str], ...]]  # number and name of each, as they are now
     guard: Callable[[], CalibrationGuard | None]
+    looks: LookSources
     camera: str
     controller: str
     link: Link | None = None

@@ -58,7 +58,7 @@ class Pictures:
     """Frames made small, in a thread of low priority; the last ones are kept. May be called from any thread."""
 
     def __init__(self) -> None:
-        self._pool = ThreadPoolExecutor(1, "page pictures", initializer=_go_last)
+        self._pool = ThreadPoolExecutor(1, "page pictures", initializer=go_last)
         self._kept: OrderedDict[tuple[str, str, int], bytes] = OrderedDict()
         self._bytes = 0
         self._newest: tuple[Path, str, NDArray[np.uint8]] | None = None  # the last that was prepared, as large as it is
@@ -81,13 +81,13 @@ class Pictures:
         """Make what the strip will ask for of a frame at hand, and keep that for a look at it: not to read it back."""
         tag = tag_of(frame)
         self._newest = frame, tag, pixels
-        self._keep(frame, tag, _made_small(pixels, WIDTHS_PX[:1]))
+        self._keep(frame, tag, made_small(pixels, WIDTHS_PX[:1]))
 
     def _made(self, frame: Path, tag: str) -> dict[int, bytes]:
         newest = self._newest
         if newest is not None and newest[:2] == (frame, tag):
-            return _made_small(newest[2])
-        return _made_small(_read(frame))
+            return made_small(newest[2])
+        return made_small(_read(frame))
 
     def _found(self, frame: Path, tag: str, width_px: int) -> bytes | None:
         key = str(frame), tag, width_px
@@ -112,7 +112,8 @@ def tag_of(path: Path) -> str:
     return f"{path.stat().st_mtime_ns:x}"
 
 
-def _go_last() -> None:
+def go_last() -> None:
+    """Have this thread take the processor after all that is for jobs."""
     os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
 
 
@@ -127,7 +128,7 @@ def _read(frame: Path) -> NDArray[np.uint8]:
     return np.asarray(pixels, dtype=np.uint8)
 
 
-def _made_small(pixels: NDArray[np.uint8], widths_px: tuple[int, ...] = WIDTHS_PX) -> dict[int, bytes]:
+def made_small(pixels: NDArray[np.uint8], widths_px: tuple[int, ...] = WIDTHS_PX) -> dict[int, bytes]:
     """The picture as JPEG by each width, no wider."""
     made = {}
     for width_px in sorted(widths_px, reverse=True):  # each from the one before: what follows is the smaller work

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from service.web import models
 from service.web.evidence_files import FILES, WIDTHS_PX
+from service.web.looks import endpoints as looks
 from service.web.openapi import Operation, Parameter
 
 MOST_JOBS = 200
@@ -57,6 +58,7 @@ OPERATIONS = (
     Operation(
         "GET", "/events", "The service's state, again each second and after each change", "text/event-stream", _SILENT
     ),
+    *looks.OPERATIONS,
     Operation("GET", "/reasons", "Why jobs are not accepted, in words", models.Reasons, {}),
     Operation(
         "GET",

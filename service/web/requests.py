@@ -32,7 +32,7 @@ def whole_number(request: Request, name: str, most: int, otherwise: int | None) 
     text = request.query_params.get(name)
     if text is None:
         return otherwise
-    if not (text.isascii() and text.isdecimal() and len(text) <= 10 and 1 <= int(text) <= most):
+    if not (text.isascii() and text.isdecimal() and len(text) <= 16 and 1 <= int(text) <= most):
         raise RequestRefused(400, f"{name} is {text[:20]!r}, expected a whole number from 1 to {most}")
     return int(text)
 

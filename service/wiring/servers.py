@@ -44,10 +44,20 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
     if config.page is None:
         return
     try:
+        from service.jobs.spare_camera import LookSources
         from service.web.daemon_access import PageSources
         from service.web.server import PageError, make_page
     except ModuleNotFoundError as error:
         raise WiringError(f"page: {error.name} is not installed. Install combtrace[page], or remove page") from error
+    looks = LookSources(
+        parts.camera,
+        parts.pool,
+        idle=lambda: parts.executor.idle,
+        works=lambda: parts.health.fault("camera") is None,
+        plan=lambda: cycle.plan,
+        timeout_s=config.camera.timeout_s,
+        spare=config.camera.has_spare_frames,
+    )
     sources = PageSources(
         parts.health,
         parts.executor,
@@ -57,6 +67,7 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
         config.archive.max_bytes,
         lambda: tuple((number, recipe.name) for number, recipe in sorted(cycle.recipes.items())),
         lambda: cycle.measurer.guard,
+        looks,
         camera=config.camera.kind,
         controller=controller_words(config),
         link=parts.link,

@@ -13,6 +13,7 @@ const EVIDENCE_PAUSE_MS = 1000;
 let jobs = [];
 let opened = null; // the job that is looked at; null = always the newest
 let isFrozen = false;
+let isHeld = false; // something else is shown large
 let onlyRefused = false;
 let before = null;
 let shownAs = "";
@@ -71,9 +72,18 @@ function isAwaited(one) {
   return awaited.tries < EVIDENCE_TRIES;
 }
 
+/** Something else is shown large, or no longer. */
+export function hold(held) {
+  isHeld = held;
+  turn += 1;
+  shownAs = "";
+  mark();
+}
+
 /** The job looked at, or the newest that has come to an end. */
 async function display() {
   turn += 1;
+  if (isHeld) return;
   const mine = turn;
   const one = opened === null ? jobs.find((entry) => entry.outcome) ?? jobs[0] : jobs.find((entry) => entry.job_id === opened) ?? (await fetched(opened));
   if (mine !== turn) return;
@@ -131,7 +141,7 @@ function item(one, as) {
 
 function mark() {
   const shown = Number(shownAs.split(" ")[0]);
-  say("seen-job", shown ? `– ${words("job_runs", { job: shown })}` : "");
+  say("seen-job", isHeld ? `– ${words("live_title")}` : shown ? `– ${words("job_runs", { job: shown })}` : "");
   for (const button of at("strip").querySelectorAll("button")) button.setAttribute("aria-current", Number(button.dataset.job) === shown);
   say("seen-note", isFrozen || opened !== null ? `– ${words("frozen")}` : "");
   at("freeze").setAttribute("aria-pressed", isFrozen || opened !== null);

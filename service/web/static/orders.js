@@ -43,10 +43,15 @@ function fillRecipes() {
   if (chosen) at("recipe").value = chosen;
 }
 
+/** True where a trigger would be taken in this state. */
+export function isReady(state) {
+  return CAN_MEASURE.includes(state.state) && !state.link?.not_ready;
+}
+
 /** What can be ordered now: what would be refused for the service's state, or for want of orders at all, cannot. */
 export function allow(state) {
   const cannot = areOff || state === null;
-  at("trigger").disabled = cannot || !CAN_MEASURE.includes(state.state) || Boolean(state.link?.not_ready);
+  at("trigger").disabled = cannot || !isReady(state);
   for (const id of ["halt", "resume", "recipe"]) at(id).disabled = cannot;
 }
 

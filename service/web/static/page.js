@@ -5,6 +5,7 @@ import { choose, chosen, keep, load, onLanguage, words } from "./words.js";
 import { listen } from "./service.js";
 import { paced } from "./pace.js";
 import * as film from "./film.js";
+import * as live from "./live.js";
 import * as now from "./now.js";
 import * as orders from "./orders.js";
 
@@ -53,7 +54,7 @@ function switchTheme() {
 }
 
 function help() {
-  const rows = [["M", "key_m"], ["F", "key_f"], ["R", "key_r"], ["← →", "key_arrows"], ["+ − 0", "key_zoom"], ["L", "key_l"], ["T", "key_t"], ["Esc", "key_esc"]];
+  const rows = [["M", "key_m"], ["V", "key_v"], ["F", "key_f"], ["R", "key_r"], ["← →", "key_arrows"], ["+ − 0", "key_zoom"], ["L", "key_l"], ["T", "key_t"], ["Esc", "key_esc"]];
   at("keys").replaceChildren(...rows.flatMap(([key, text]) => [make("dt", {}, key), make("dd", {}, words(text))]));
   say("version", words("service_version", { version: now.current()?.version ?? "–", host: location.host }));
   if (!at("help-dialog").open) at("help-dialog").showModal();
@@ -61,9 +62,17 @@ function help() {
 
 // By the key's place, so that they work under a Russian layout too.
 const KEYS = {
-  KeyM: orders.measure, KeyF: film.freeze, KeyR: film.toggleRefused, KeyL: switchLanguage, KeyT: switchTheme, Slash: help,
-  ArrowLeft: () => film.go(-1), ArrowRight: () => film.go(1), Escape: film.live,
+  KeyM: orders.measure, KeyV: live.toggle, KeyF: past(film.freeze), KeyR: past(film.toggleRefused), KeyL: switchLanguage, KeyT: switchTheme, Slash: help,
+  ArrowLeft: past(() => film.go(-1)), ArrowRight: past(() => film.go(1)), Escape: past(film.live),
 };
+
+/** The action, after the live view has ended. */
+function past(action) {
+  return () => {
+    live.end();
+    action();
+  };
+}
 
 document.addEventListener("keydown", (event) => {
   const busy = event.ctrlKey || event.metaKey || event.altKey || document.querySelector("dialog[open]");

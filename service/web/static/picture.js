@@ -66,8 +66,10 @@ function contour() {
 }
 
 function outline() {
+  const { width, height } = drawing;
+  const cross = draw("path", { class: "cross", d: `M${(width - 1) / 2} -0.5v${height}M-0.5 ${(height - 1) / 2}h${width}` });
   const told = drawing.hidden.length ? "told" : "";
-  const group = draw("g", { class: drawing.refused ? `refused ${told}` : "" });
+  const group = draw("g", { class: drawing.refused ? `refused ${told}` : "" }, ...(drawing.job_id ? [] : [cross])); // of no job: live
   for (const mark of drawing.sentinels) group.append(draw("path", { class: "sentinel", d: path(mark.corners) }));
   const rings = [drawing.exterior, ...drawing.holes].filter((ring) => ring.length);
   if (!rings.length) return group;

@@ -32,9 +32,10 @@ def test_every_word_that_is_asked_for_is_there() -> None:
     asked = set(re.findall(r'data-[ta]="(\w+)"', PAGE)) | {state.label for state in State}
     for script in SCRIPTS.values():
         asked |= set(re.findall(r'words\("(\w+)"', script))
-        asked |= set(re.findall(r'(?:line\(|\[)"(\w+)", (?:camera|link|report|job|size|sure|!)', script))
+        asked |= set(re.findall(r'(?:line\(|\[)"(\w+)", (?:camera|link|look|report|job|seen|size|sure|!)', script))
         asked |= set(re.findall(r'\["[^"]+", "(key_\w+)"\]', script))
         asked |= set(re.findall(r'\b\d{3}: "(\w+)"', script))
+        asked |= {f"live_{wait}" for wait in ("start", "job", "camera", "source", "now", "not_taken")}
         stages = re.search(r"STAGES = \[(.*?)\]", script)
         asked |= set(re.findall(r'"(\w+)"', stages[1])) if stages else set()
     assert len(asked) > 60

@@ -74,5 +74,6 @@ def _run(words: Sequence[str], out: Path, error: Path) -> None:
     for number, path in ((1, out), (2, error)):
         with path.open("ab") as file:
             os.dup2(file.fileno(), number)
+    multiprocessing.current_process().daemon = False  # a service may have processes of its own
     sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     sys.exit(main(words))

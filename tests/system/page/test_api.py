@@ -286,10 +286,10 @@ def test_the_openapi_document_tells_every_operation_and_no_other(served: Served)
         for method, operation in operations.items():
             if path.endswith("/events"):
                 continue  # does not end
-            concrete = path.replace("{job}", "999999").replace("{name}", "frame.png")
+            concrete = path.replace("{job}", "999999").replace("{look}", "1").replace("{name}", "frame.png")
             json_body = {"body": b"{}", "Content_Type": "application/json"} if method == "post" else {}
             reply = served.client.ask(method.upper(), concrete, Authorization="Basic x", **json_body)  # type: ignore[arg-type]
-            expected = 401 if "security" in operation else 404 if "{job}" in path else 200
+            expected = 401 if "security" in operation else 404 if "{job}" in path or "{look}" in path else 200
             assert (reply.status, str(expected) in operation["responses"]) == (expected, True), (method, path)
             assert served.client.ask(method.upper(), concrete + "/x").status in (404, 415)
     assert told["paths"]["/api/v1/trigger"]["post"]["security"] == [{"token": []}]

@@ -16,6 +16,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from service.details import russian
 from service.reasons import Language, Reason
 from service.web.daemon_access import DaemonAccess, DaemonSilent
 
@@ -115,7 +116,8 @@ class Pages:
         kind, word = KINDS[state["state"]], state["state"]
         if kind == "ready" and state["link"] is not None and state["link"]["not_ready"] is not None:
             kind, word = "waiting", "waiting"
-        return {**shown, "kind": kind, "state": texts[word], "since": html.escape(state["reason"] or "")}
+        since = _seen_as(state["reason"] or "", language)
+        return {**shown, "kind": kind, "state": texts[word], "since": html.escape(since)}
 
 
 def _last(job: dict[str, Any] | None, language: str, texts: dict[str, str]) -> dict[str, str]:
@@ -129,11 +131,15 @@ def _last(job: dict[str, Any] | None, language: str, texts: dict[str, str]) -> d
     return {"last_kind": kind, "last_word": texts[kind], "last_of": of, "last_why": html.escape(why)}
 
 
+def _seen_as(text: str, language: str) -> str:
+    return russian(text) if language == Language.RUSSIAN else text
+
+
 def _why(code: int, text: str, language: str) -> str:
     words = Reason(code).explained(Language(language))
     return (
         f"<li><strong>{html.escape(words.sentence)}</strong> {html.escape(words.next_action)}"
-        f"<small>{html.escape(text)}</small></li>"
+        f"<small>{html.escape(_seen_as(text, language))}</small></li>"
     )
 
 

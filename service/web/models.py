@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from service.details import russian
 
 Milliseconds = dict[str, float]
 
@@ -15,12 +18,33 @@ class Answer(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class Problem(Answer):
+class Told(Answer):
+    """An answer with sentences of what was seen, which are English."""
+
+    ru: dict[str, str] = Field(
+        default_factory=dict, description="Its sentences in Russian, by the English ones, as far as they are known."
+    )
+
+    @model_validator(mode="after")
+    def _in_russian(self) -> Self:
+        self.ru.update({text: told for text in self.sentences() if text and (told := russian(text)) != text})
+        return self
+
+    def sentences(self) -> Iterator[str | None]:
+        """All of them."""
+        raise NotImplementedError
+
+
+class Problem(Told):
     """What went wrong, as a sentence; where a reason of the table applies, its code and name."""
 
     error: str
     code: int | None = None
     name: str | None = None
+
+    def sentences(self) -> Iterator[str | None]:
+        """What went wrong."""
+        yield self.error
 
 
 class Fault(Answer):
@@ -109,7 +133,7 @@ class DiskState(Answer):
     archive_jobs: int
 
 
-class ServiceState(Answer):
+class ServiceState(Told):
     """The service now. States are OPC 40100-1's."""
 
     version: str
@@ -136,6 +160,14 @@ class ServiceState(Answer):
     calibration: CalibrationState | None
     disk: DiskState
 
+    def sentences(self) -> Iterator[str | None]:
+        """Why it is as it is, and how the last job ended."""
+        yield self.reason
+        yield from (fault.text for fault in self.faults.values())
+        yield from self.warnings.values()
+        yield None if self.last_job is None else self.last_job.detail
+        yield None if self.link is None else self.link.not_ready
+
 
 class TriggerOrigin(Answer):
     """Where a job came from."""
@@ -148,7 +180,7 @@ class TriggerOrigin(Answer):
     line: str | None
 
 
-class Job(Answer):
+class Job(Told):
     """A job as the journal holds it, and which of its files the archive keeps."""
 
     job_id: int
@@ -164,6 +196,10 @@ class Job(Answer):
     calibration: str | None
     transfer: dict[str, Any]
     files: list[str] = Field(description="Names for /api/v1/jobs/{job}/files/{name}; empty where nothing is kept.")
+
+    def sentences(self) -> Iterator[str | None]:
+        """How it ended."""
+        yield self.detail
 
 
 class Jobs(Answer):

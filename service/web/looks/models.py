@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
-from service.web.models import Answer, Drawing, RecipeName
+from service.web.models import Answer, Drawing, RecipeName, Told
 
 
 class LookFinding(Answer):
@@ -37,7 +38,7 @@ class LiveLook(Answer):
     drawing: Drawing | None
 
 
-class LiveAnswer(Answer):
+class LiveAnswer(Told):
     """The newest look, null where there is none that is newer than `after`; and what looking waits for."""
 
     waits_for: Literal["start", "job", "camera", "source"] | None = Field(
@@ -46,3 +47,8 @@ class LiveAnswer(Answer):
     )
     detail: str | None
     look: LiveLook | None
+
+    def sentences(self) -> Iterator[str | None]:
+        """What speaks against a job now, and what is wrong with the camera."""
+        yield self.detail
+        yield from () if self.look is None else (finding.text for finding in self.look.findings)

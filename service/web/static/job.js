@@ -1,7 +1,7 @@
 // One job with all its values: how it ended, why, what was measured, what it took, and its files.
 
 import { at, make, say } from "./dom.js";
-import { amount, moment, number, onLanguage, words } from "./words.js";
+import { amount, moment, number, onLanguage, seenAs, words } from "./words.js";
 import { ORIGINS, current, reasonOf } from "./now.js";
 import { list as listParts, show as showPart } from "./part.js";
 
@@ -35,7 +35,7 @@ function because() {
   const isTold = current()?.last_job?.job === job.job_id; // above, and larger
   const told = job.reason === null || isTold ? null : reasonOf(job.reason);
   const parts = told ? [make("strong", {}, told.sentence), ` ${told.next_action}`] : [];
-  if (job.detail) parts.push(make("small", {}, `${job.reason ?? ""} ${job.reason_name ?? ""} ${job.detail}`.trim()));
+  if (job.detail) parts.push(make("small", {}, `${job.reason ?? ""} ${job.reason_name ?? ""} ${seenAs(job.detail)}`.trim()));
   at("because").hidden = !parts.length;
   at("because").replaceChildren(...parts);
 }

@@ -1,7 +1,7 @@
 // The live view: what the camera sees now, and what a job would make of it, as long as somebody looks.
 
 import { at, make, say } from "./dom.js";
-import { amount, moment, number, onLanguage, words } from "./words.js";
+import { amount, moment, number, onLanguage, seenAs, words } from "./words.js";
 import { get } from "./service.js";
 import { current, reasonOf } from "./now.js";
 import { isReady } from "./orders.js";
@@ -94,7 +94,7 @@ function refresh() {
   say("live-word", look ? words(refused ? "live_refused" : "live_accepted") : "–");
   const told = refused ? reasonOf(refused.code) : null;
   at("live-because").hidden = !refused;
-  at("live-because").replaceChildren(make("strong", {}, told?.sentence ?? ""), ` ${told?.next_action ?? ""}`, make("small", {}, refused?.text ?? ""));
+  at("live-because").replaceChildren(make("strong", {}, told?.sentence ?? ""), ` ${told?.next_action ?? ""}`, make("small", {}, seenAs(refused?.text ?? "")));
   at("live-values").replaceChildren(...figures().flatMap(([key, value]) => [make("dt", {}, words(key)), make("dd", {}, value)]));
 }
 

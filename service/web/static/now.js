@@ -1,7 +1,7 @@
 // The service now: banner, counters, why it is not ready, and its parts at a glance.
 
 import { at, make, say, shape } from "./dom.js";
-import { bytes, chosen, duration, moment, number, onLanguage, words } from "./words.js";
+import { bytes, chosen, duration, moment, number, onLanguage, seenAs, words } from "./words.js";
 import { get } from "./service.js";
 
 const KINDS = {
@@ -62,7 +62,7 @@ function banner() {
   const notReady = state.link && state.link.not_ready;
   const kind = state.state === "Ready" && notReady ? "waiting" : KINDS[state.state];
   const told = state.code ? reasonOf(state.code)?.sentence : null;
-  const why = told ?? (kind === "halted" ? state.reason : null);
+  const why = told ?? (kind === "halted" ? seenAs(state.reason) : null);
   const job = state.job === null ? null : words("job_runs", { job: state.job });
   put(kind, words(kind === "waiting" ? "waiting" : state.state), [job, words("since", { time: duration(state.since_s) }), why].filter(Boolean).join(" · "));
 }
@@ -126,11 +126,11 @@ function showCounts(name) {
 }
 
 function whys() {
-  const entries = Object.entries(state.faults).map(([part, fault]) => why(reasonOf(fault.code), `${part}: ${fault.text}`));
+  const entries = Object.entries(state.faults).map(([part, fault]) => why(reasonOf(fault.code), `${words(part)}: ${seenAs(fault.text)}`));
   const faults = entries.length;
-  if (state.state === "Halted" && !faults) entries.push(why({ sentence: words("halted_why"), next_action: words("halted_do") }, state.reason));
-  if (!faults && state.state === "Ready" && state.link?.not_ready) entries.push(why({ sentence: words("waiting_why"), next_action: words("waiting_do") }, state.link.not_ready));
-  for (const [part, text] of Object.entries(state.warnings)) entries.push(why({ sentence: words("warning"), next_action: "" }, `${part}: ${text}`));
+  if (state.state === "Halted" && !faults) entries.push(why({ sentence: words("halted_why"), next_action: words("halted_do") }, seenAs(state.reason)));
+  if (!faults && state.state === "Ready" && state.link?.not_ready) entries.push(why({ sentence: words("waiting_why"), next_action: words("waiting_do") }, seenAs(state.link.not_ready)));
+  for (const [part, text] of Object.entries(state.warnings)) entries.push(why({ sentence: words("warning"), next_action: "" }, `${words(part)}: ${seenAs(text)}`));
   const list = at("whys");
   if (list.textContent !== entries.map((entry) => entry.textContent).join("")) list.replaceChildren(...entries);
   at("why").hidden = !entries.length;

@@ -1,7 +1,7 @@
 // Orders: measure, halt, resume. Each needs a token, which is asked for once and forgotten soon.
 
 import { at, make, say } from "./dom.js";
-import { onLanguage, words } from "./words.js";
+import { onLanguage, seenAs, words } from "./words.js";
 import { Refused, hasToken, order, remember } from "./service.js";
 import { reasonOf } from "./now.js";
 
@@ -97,7 +97,7 @@ async function carryOut() {
 function refusal(error) {
   const reason = error.code ? reasonOf(error.code) : null;
   const text = reason ? `${reason.sentence} ${reason.next_action}` : words(REFUSALS[error.status] ?? "cannot");
-  return `${text} (${error.message})`;
+  return `${text} (${seenAs(error.message)})`;
 }
 
 function tell(text, isBad) {

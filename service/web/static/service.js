@@ -1,5 +1,7 @@
 // The service, by its REST interface: what is asked, what comes by itself, and the token of whoever gives orders.
 
+import { learn } from "./words.js";
+
 const BASE = "/api/v1";
 const FORGOTTEN_MS = 600_000;
 const SILENT_MS = 3_500;
@@ -12,6 +14,7 @@ let forgetting = null;
 export class Refused extends Error {
   constructor(status, problem) {
     super(problem.error);
+    learn(problem);
     this.status = status;
     this.code = problem.code;
   }
@@ -20,7 +23,7 @@ export class Refused extends Error {
 export async function get(path) {
   const answer = await fetch(BASE + path, { cache: "no-store" });
   if (!answer.ok) throw new Refused(answer.status, await answer.json());
-  return answer.json();
+  return learn(await answer.json());
 }
 
 export function hasToken() {
@@ -62,7 +65,7 @@ export function listen(heard, lost) {
       clearTimeout(silence);
       silence = setTimeout(lose, SILENT_MS);
       isLost = false;
-      heard(JSON.parse(event.data));
+      heard(learn(JSON.parse(event.data)));
     };
     source.onerror = () => {
       lose();

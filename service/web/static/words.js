@@ -19,6 +19,21 @@ export function words(key, values = {}) {
   return text.replace(/\{(\w+)\}/g, (_, name) => values[name]);
 }
 
+const MOST_KNOWN = 2_000;
+const inRussian = new Map(); // sentences of what was seen, by the English ones
+
+/** Keep what an answer's own sentences, and those of its jobs, are in Russian. */
+export function learn(answer) {
+  if (inRussian.size > MOST_KNOWN) inRussian.clear();
+  for (const one of [answer, ...(answer.jobs ?? [])]) for (const [english, russian] of Object.entries(one.ru ?? {})) inRussian.set(english, russian);
+  return answer;
+}
+
+/** A sentence of what was seen, in the chosen language where that is known. */
+export function seenAs(text) {
+  return language === "ru" ? inRussian.get(text) ?? text : text;
+}
+
 export function onLanguage(listener) {
   listeners.push(listener);
 }

@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Route, expect
 
 from service.reasons import Reason
+from service.web import models
 from tests.support.processes.cell import SAMPLES
 from tests.support.processes.page_panel import FRAME, Panel, holding
 
@@ -307,3 +308,34 @@ def test_older_jobs_are_shown_and_where_there_are_none_nothing_changes(panel: Pa
     expect(page.locator("#outcome")).to_contain_text(f"job {jobs[0]}:")
     later = panel.ordered()
     expect(page.locator("#outcome")).to_have_text(f"job {later}: accepted")
+
+
+def test_why_a_block_was_refused_is_told_with_its_figures_in_the_readers_language(panel: Panel) -> None:
+    page = panel.page
+
+    def refused(route: Route) -> None:
+        answer = route.fetch()
+        seen = "The contour's area is 31 mm², the recipe expects 4000 to 90000 mm². "
+        seen += "Check that the block is the recipe's, and the lighting."
+        area = {"outcome": "refused", "reason": int(Reason.AREA_OUT_OF_LIMITS), "detail": seen}
+        told = models.Job.model_validate({**answer.json()["jobs"][0], "ru": {}, **area})
+        route.fulfill(response=answer, json={"jobs": [told.model_dump(mode="json")]})
+
+    panel.ordered()
+    page.route("**/api/v1/jobs?**", refused)
+    page.reload()
+    expect(page.locator("#because small")).to_contain_text("area is 31 mm², the recipe expects")
+    page.locator("#language").click()
+    expect(page.locator("#because small")).to_contain_text("Площадь контура 31 мм², по рецепту от 4000 до 90000 мм².")
+
+
+def test_a_halts_words_are_told_in_the_readers_language_before_any_script_runs(panel: Panel) -> None:
+    assert panel.client.order("/api/v1/halt", content={"reason": "blade"}).status == 200
+    try:
+        expect(panel.page.locator("#whys small")).to_have_text("halted: blade (anna from 127.0.0.1)")
+        panel.page.locator("#language").click()
+        expect(panel.page.locator("#whys small")).to_have_text("остановлено: blade (anna, адрес 127.0.0.1)")
+        made = panel.client.get("/", Cookie="language=ru").body.decode()
+        assert "остановлено: blade (anna, адрес 127.0.0.1)" in made
+    finally:
+        assert panel.client.order("/api/v1/resume").status == 200

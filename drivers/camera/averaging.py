@@ -25,6 +25,11 @@ class AveragingCamera:
         self._sequence = 0
 
     @property
+    def single(self) -> Camera:
+        """The camera behind it, which gives frames one by one."""
+        return self._camera
+
+    @property
     def opened(self) -> object | None:
         """What the camera behind it is and was set to, where it tells."""
         return getattr(self._camera, "opened", None)

@@ -117,6 +117,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "halt": (('combtrace halt --reason "blade is being changed"', "It holds until `combtrace resume`."),),
     "resume": (("combtrace resume", "End the halt."),),
     "confirm": (("combtrace confirm", "After the cause was looked at and mended."),),
+    "pin": (("combtrace pin anna", "A line for page.people_file, to be added to it; it asks for the PIN."),),
     "reset": (("combtrace reset", "Open controller, camera and ports anew."),),
     "install-service": (
         ("combtrace install-service --print unit", "Show it, install nothing."),

@@ -154,7 +154,9 @@ def _read(config: Config) -> Iterable[Path]:
     if isinstance(config.camera, FilesCamera):
         yield config.camera.path
     if config.page is not None:
-        yield from filter(None, (config.page.token_file, config.page.certificate, config.page.key))
+        yield from filter(
+            None, (config.page.token_file, config.page.people_file, config.page.certificate, config.page.key)
+        )
     yield from filter(None, (recipe.gcode.template for recipe in config.recipes))
     yield from (part.file for recipe in config.recipes for part in recipe.asked_parts)
 

@@ -102,6 +102,11 @@ class Page(Model):
     token_file: FilePath | None = Field(
         None, description="File of mode 0600, a line 'name token' a person; none = the page can only be looked at."
     )
+    people_file: FilePath | None = Field(
+        None,
+        description="File of mode 0600, a line of `combtrace pin NAME` a person, who give orders by a short PIN, one "
+        "person at a time; none = by tokens alone.",
+    )
     language: Literal["auto", "en", "ru"] = Field(
         "auto", description="What the page speaks until a person chooses; auto = as the browser asks, else English."
     )

@@ -25,6 +25,7 @@ PATH_KEYS = (
     ("archive", "path"),
     ("remnants", "path"),
     ("page", "token_file"),
+    ("page", "people_file"),
     ("page", "certificate"),
     ("page", "key"),
 )

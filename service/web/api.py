@@ -88,6 +88,7 @@ class Api:
             "/events": self.events,
             "/reasons": self.reasons,
             "/audit": self.audit,
+            "/people": self.people,
             "/openapi.json": self.openapi,
             **LookEndpoints(self._looks).routes(),
         }
@@ -182,9 +183,13 @@ class Api:
         """This interface."""
         return Response(self._document, media_type="application/json")
 
+    async def people(self, _request: Request) -> Response:
+        """Who may give orders by a PIN: to be chosen from, with gloves on."""
+        return _answer(models.PeopleNames(names=await self._commands.people()))
+
     async def audit(self, request: Request) -> Response:
         """Who asked for what; only for those who may ask too."""
-        await self._holder(request)
+        await self._holder(request, by_pin=False)
         limit = whole_number(request, "limit", MOST_NOTES, 100)
         return _answer(await asyncio.to_thread(self._notes, limit or 0))
 
@@ -198,7 +203,7 @@ class Api:
         """One job."""
         who, address = await self._holder(request), address_of(request)
         asked = await body(request, models.TriggerRequest)
-        job = await self._commands.trigger(who, address, asked.recipe, asked.thickness_mm)
+        job = await self._commands.trigger(who, address, asked)
         return _answer(models.Triggered(job=job), 202)
 
     async def halt(self, request: Request) -> Response:
@@ -210,11 +215,11 @@ class Api:
     async def resume(self, request: Request) -> Response:
         """The end of a halt."""
         who, address = await self._holder(request), address_of(request)
-        await body(request, models.Nothing)
-        return _answer(models.StateAfter(state=await self._commands.resume(who, address)))
+        asked = await body(request, models.ResumeRequest)
+        return _answer(models.StateAfter(state=await self._commands.resume(who, address, asked.take_over)))
 
-    async def _holder(self, request: Request) -> str:
-        return await self._commands.holder(request.headers.get("authorization"), address_of(request))
+    async def _holder(self, request: Request, *, by_pin: bool = True) -> str:
+        return await self._commands.holder(request.headers.get("authorization"), address_of(request), by_pin=by_pin)
 
 
 def with_problems(endpoint: Endpoint) -> Endpoint:
@@ -224,7 +229,7 @@ def with_problems(endpoint: Endpoint) -> Endpoint:
         try:
             return await endpoint(request)
         except RequestRefused as refusal:
-            return problem(refusal.status, str(refusal), refusal.reason, refusal.again_s)
+            return problem(refusal.status, str(refusal), refusal.reason, refusal.again_s, refusal.holder)
         except (DaemonSilent, JournalUnreadable) as error:
             return problem(503, str(error))
         except EvidenceError as error:
@@ -235,13 +240,22 @@ def with_problems(endpoint: Endpoint) -> Endpoint:
     return answered
 
 
-def problem(status: int, text: str, reason: Reason | None = None, again_s: float | None = None) -> Response:
+def problem(
+    status: int,
+    text: str,
+    reason: Reason | None = None,
+    again_s: float | None = None,
+    holder: str | None = None,
+) -> Response:
     """An error as every error is told."""
     headers = {"www-authenticate": "Bearer"} if status == 401 else {}
     if again_s is not None:
         headers["retry-after"] = str(math.ceil(again_s))
     said = models.Problem(
-        error=text, code=None if reason is None else int(reason), name=None if reason is None else reason.label
+        error=text,
+        code=None if reason is None else int(reason),
+        name=None if reason is None else reason.label,
+        holder=holder,
     )
     return _answer(said, status, headers)
 

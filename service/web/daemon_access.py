@@ -25,6 +25,7 @@ from service.records.archive_writer import ArchiveWriter
 from service.records.job import Job, TriggerStamp
 from service.records.journal import Journal
 from service.state import State
+from service.web.people.lease import Lease
 
 T = TypeVar("T")
 
@@ -64,6 +65,7 @@ class DaemonAccess:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._operations: Operations | None = None
         self._outcomes: Counter[tuple[str, str]] = Counter()
+        self.lease = Lease()
         self.on_change: Callable[[], None] = lambda: None  # told of every change in the daemon's loop; must not block
 
     def open(self, operations: Operations) -> None:
@@ -102,6 +104,7 @@ class DaemonAccess:
             "link": self._link(),
             "calibration": self._calibration(),
             "disk": self._disk(),
+            "lease": self.lease.told(),
         }
 
     def _link(self) -> dict[str, Any] | None:

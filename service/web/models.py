@@ -41,6 +41,7 @@ class Problem(Told):
     error: str
     code: int | None = None
     name: str | None = None
+    holder: str | None = Field(None, description="Who gives orders now, where that is why: say why you take over.")
 
     def sentences(self) -> Iterator[str | None]:
         """What went wrong."""
@@ -133,6 +134,14 @@ class DiskState(Answer):
     archive_jobs: int
 
 
+class LeaseState(Answer):
+    """Who gives orders from the page now, for so long, and for how much longer unless they give another."""
+
+    who: str
+    since_s: float
+    left_s: float
+
+
 class ServiceState(Told):
     """The service now. States are OPC 40100-1's."""
 
@@ -159,6 +168,7 @@ class ServiceState(Told):
     link: LinkState | None
     calibration: CalibrationState | None
     disk: DiskState
+    lease: LeaseState | None = Field(description="null where nobody does, or people need no word.")
 
     def sentences(self) -> Iterator[str | None]:
         """Why it is as it is, and how the last job ended."""
@@ -344,11 +354,15 @@ class RequestBody(Answer):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
+TakingOver = Annotated[str, Field(max_length=200, description="Why, where another person gives orders now.")]
+
+
 class TriggerRequest(RequestBody):
     """recipe 0 = the configured default, thickness_mm 0 = the recipe's."""
 
     recipe: Annotated[int, Field(ge=0, le=65_535)] = 0
     thickness_mm: Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)] = 0.0
+    take_over: TakingOver = ""
 
 
 class HaltRequest(RequestBody):
@@ -357,5 +371,13 @@ class HaltRequest(RequestBody):
     reason: Annotated[str, Field(max_length=200)] = ""
 
 
-class Nothing(RequestBody):
-    """An empty object."""
+class ResumeRequest(RequestBody):
+    """Nothing but perhaps that."""
+
+    take_over: TakingOver = ""
+
+
+class PeopleNames(Answer):
+    """Who may give orders by a PIN."""
+
+    names: list[str]

@@ -14,11 +14,11 @@ _SILENT = {503: "The service does not answer, or its journal cannot be read."}
 _PARAMETER = "A parameter is not as expected."
 _NO_JOB = {404: "There is no such job, or nothing is kept of it.", **_SILENT}
 _ORDER = {
-    401: "No token, or a wrong one.",
-    403: "No token file is configured, or another site's page asks.",
-    409: "Not at this moment: `error`, and where the table has it, `code` and `name` say why.",
+    401: "No token or PIN, or a wrong one.",
+    403: "Neither token file nor people file is configured, or another site's page asks.",
+    409: "Not at this moment: `error`, and where the table has it, `code` and `name` say why; `holder` has the word.",
     422: "The body is not as expected.",
-    429: "Too many wrong tokens, or too many commands: see Retry-After.",
+    429: "Too many wrong tokens or PINs, or too many commands: see Retry-After.",
     503: "The service does not answer, or the journal cannot keep who asked.",
 }
 _JOB = Parameter("job", {"type": "integer", "minimum": 1}, "Its number.", required=True)
@@ -60,6 +60,7 @@ OPERATIONS = (
     ),
     *looks.OPERATIONS,
     Operation("GET", "/reasons", "Why jobs are not accepted, in words", models.Reasons, {}),
+    Operation("GET", "/people", "Who may give orders by a PIN", models.PeopleNames, _SILENT),
     Operation(
         "GET",
         "/audit",
@@ -88,5 +89,5 @@ OPERATIONS = (
         request=models.HaltRequest,
         token=True,
     ),
-    Operation("POST", "/resume", "End a halt", models.StateAfter, _ORDER, request=models.Nothing, token=True),
+    Operation("POST", "/resume", "End a halt", models.StateAfter, _ORDER, request=models.ResumeRequest, token=True),
 )

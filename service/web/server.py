@@ -18,11 +18,12 @@ from starlette.responses import Response
 from service.config.config import Page as PageSettings
 from service.daemon.operations import Operations
 from service.web.api import Api, problem
-from service.web.commands import Commands
+from service.web.commands import Commands, Known
 from service.web.daemon_access import DaemonAccess, PageSources
 from service.web.guard import Guard
 from service.web.html import Pages
 from service.web.http_server import http_server, listening
+from service.web.people.pins import PeopleFile
 from service.web.tokens import TokenFile, TokenFileError
 
 log = logging.getLogger("combtrace.page")
@@ -40,16 +41,15 @@ class PageServer:
     def __init__(self, settings: PageSettings, sources: PageSources, version: str) -> None:
         """Raise PageError where the token file, the certificate or the address cannot be used."""
         self._settings = settings
-        tokens = None if settings.token_file is None else TokenFile(settings.token_file)
+        known = known_of(settings)
         try:
-            if tokens is not None:
-                tokens.read()
+            known.read()
         except TokenFileError as error:
             raise PageError(f"page: {error}") from error
         check_certificate(settings)
         self.daemon = DaemonAccess(sources)
-        self._pages = Pages(self.daemon, settings.language, orders=tokens is not None)
-        commands = Commands(self.daemon, sources.journal, tokens)
+        self._pages = Pages(self.daemon, settings.language, orders=known != Known())
+        commands = Commands(self.daemon, sources.journal, known)
         self._make_api: Callable[[], Api] = lambda: Api(self.daemon, commands, version)
         self._socket: socket.socket | None = _bound(settings.host, settings.port)
 
@@ -109,6 +109,14 @@ def _bound(host: str, port: int) -> socket.socket:
         raise PageError(
             f"page: {host}:{port} cannot be listened on: {error.strerror or error}. Set another page.host or page.port"
         ) from error
+
+
+def known_of(settings: PageSettings) -> Known:
+    """Who may give orders, by which file."""
+    return Known(
+        None if settings.token_file is None else TokenFile(settings.token_file),
+        None if settings.people_file is None else PeopleFile(settings.people_file),
+    )
 
 
 def check_certificate(settings: PageSettings) -> None:

@@ -17,7 +17,9 @@ from pathlib import Path
 MODE = 0o600
 LEAST_TOKEN = 20  # characters: `openssl rand -base64 24` gives 32
 LARGEST_FILE = 100_000
-LINE = re.compile(r"([A-Za-z0-9_.@-]{1,40})[ \t]+(\S+)")
+NAME = r"[A-Za-z0-9_.@-]{1,40}"
+LINE = re.compile(rf"({NAME})[ \t]+(\S+)")
+WHAT = "a line 'name token' a person"
 
 GUESSES, GUESSES_WITHIN_S = 5, 60.0
 COMMANDS, COMMANDS_WITHIN_S = 30, 60.0
@@ -25,7 +27,7 @@ MOST_ADDRESSES = 1000
 
 
 class TokenFileError(Exception):
-    """The token file cannot be used: seen, expected, next step."""
+    """A file of tokens or PINs cannot be used: seen, expected, next step."""
 
 
 @dataclass(frozen=True)
@@ -44,37 +46,8 @@ class TokenFile:
         return found
 
     def read(self) -> list[tuple[str, bytes]]:
-        """Each person's name and the digest of the token; raise TokenFileError."""
-        try:
-            handle = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
-        except OSError as error:
-            raise TokenFileError(
-                f"{self.path}: cannot be read: {error.strerror}. Make it, a line 'name token' a person, mode 0600"
-            ) from error
-        try:
-            self._check(os.fstat(handle))
-            return self._parsed(os.read(handle, LARGEST_FILE))
-        finally:
-            os.close(handle)
-
-    def _check(self, found: os.stat_result) -> None:
-        mode = stat.S_IMODE(found.st_mode)
-        if not stat.S_ISREG(found.st_mode):
-            raise TokenFileError(f"{self.path}: is no file. Make it, a line 'name token' a person, mode 0600")
-        if mode != MODE:
-            raise TokenFileError(f"{self.path}: has mode {mode:04o}, expected 0600. chmod 600, and make new tokens")
-        if found.st_uid != os.geteuid():
-            raise TokenFileError(
-                f"{self.path}: belongs to user {found.st_uid}, expected {os.geteuid()}, as whom the service runs. chown"
-            )
-
-    def _parsed(self, data: bytes) -> list[tuple[str, bytes]]:
-        """Lines `name token`; empty ones and those that begin with # do not count. No message shows a token."""
-        try:
-            lines = data.decode("ascii").splitlines()
-        except UnicodeDecodeError as error:
-            what = f"byte {error.start + 1} is no ASCII"
-            raise TokenFileError(f"{self.path}: {what}, expected lines 'name token'") from error
+        """Each person's name and the digest of the token; raise TokenFileError. No message shows a token."""
+        lines = private_text(self.path, WHAT).splitlines()
         holders: list[tuple[str, bytes]] = []
         for number, line in enumerate(lines, 1):
             if not line.strip() or line.lstrip().startswith("#"):
@@ -93,6 +66,30 @@ class TokenFile:
         if not holders:
             raise TokenFileError(f"{self.path}: holds no token, expected a line 'name token' a person")
         return holders
+
+
+def private_text(path: Path, what: str) -> str:
+    """What a file says that only its owner may read; raise TokenFileError. what: is to be in it."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
+    except OSError as error:
+        raise TokenFileError(f"{path}: cannot be read: {error.strerror}. Make it, {what}, mode 0600") from error
+    try:
+        found = os.fstat(handle)
+        mode = stat.S_IMODE(found.st_mode)
+        if not stat.S_ISREG(found.st_mode):
+            raise TokenFileError(f"{path}: is no file. Make it, {what}, mode 0600")
+        if mode != MODE:
+            raise TokenFileError(f"{path}: has mode {mode:04o}, expected 0600. chmod 600, and make new ones")
+        if found.st_uid != os.geteuid():
+            raise TokenFileError(
+                f"{path}: belongs to user {found.st_uid}, expected {os.geteuid()}, as whom the service runs. chown"
+            )
+        return os.read(handle, LARGEST_FILE).decode("ascii")
+    except UnicodeDecodeError as error:
+        raise TokenFileError(f"{path}: byte {error.start + 1} is no ASCII, expected {what}") from error
+    finally:
+        os.close(handle)
 
 
 def _digest(token: str) -> bytes:

@@ -28,6 +28,11 @@ def make_camera(config: Config) -> Camera:
     return camera if config.camera.average == 1 else AveragingCamera(camera, config.camera.average)
 
 
+def single_frames(camera: Camera) -> Camera:
+    """The camera that gives its frames one by one: who lays a block moves, and averages refuse what moves."""
+    return camera.single if isinstance(camera, AveragingCamera) else camera
+
+
 def _single_frames(config: Config) -> Camera:
     settings = config.camera
     if isinstance(settings, FilesCamera):

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from service.config.config import Config
 from service.daemon.daemon import Parts
 from service.jobs.cycle import Cycle
-from service.wiring.devices import controller_words
+from service.wiring.devices import controller_words, single_frames
 from service.wiring.errors import WiringError
 
 
@@ -50,7 +50,7 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
     except ModuleNotFoundError as error:
         raise WiringError(f"page: {error.name} is not installed. Install combtrace[page], or remove page") from error
     looks = LookSources(
-        parts.camera,
+        single_frames(parts.camera),
         parts.pool,
         idle=lambda: parts.executor.idle,
         works=lambda: parts.health.fault("camera") is None,

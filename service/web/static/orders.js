@@ -1,8 +1,8 @@
-// Orders: measure, halt, resume. Each needs a token, which is asked for once and forgotten soon.
+// Orders: measure, halt, resume. Each needs a token or a PIN, which is asked for once and forgotten soon.
 
 import { at, make, say } from "./dom.js";
 import { onLanguage, seenAs, words } from "./words.js";
-import { Refused, hasToken, order, remember } from "./service.js";
+import { Refused, get, isKnown, order, remember } from "./service.js";
 import { reasonOf } from "./now.js";
 
 let recipes = "";
@@ -30,6 +30,8 @@ export function show(state) {
   if (focused === "resume" && !isHalted) at("halt").focus();
   if (measured !== null && state.settled_job >= measured) ended(state.last_job);
   say("told", told());
+  at("lease").hidden = !state.lease;
+  say("lease", state.lease ? words("lease_of", { who: state.lease.who }) : "");
   fillRecipes();
 }
 
@@ -65,15 +67,36 @@ function ended(last) {
 export function ask(button, path, body, done) {
   if (isUnderWay || at(button).disabled) return; // a key finds it as the button does
   pending = { path, body, done };
-  if (hasToken()) carryOut();
+  if (isKnown()) carryOut();
   else openDialog("");
 }
 
-function openDialog(text) {
+async function openDialog(text) {
   say("token-told", text);
   at("token").value = "";
   if (!at("token-dialog").open) at("token-dialog").showModal();
   at("token").focus();
+  try {
+    fillPeople((await get("/people")).names);
+  } catch {
+    fillPeople([]); // then by a token
+  }
+}
+
+/** Who has a PIN, to be touched; the last entry is for those who have a token. */
+function fillPeople(names) {
+  const chosen = at("person").value;
+  at("person").replaceChildren(...names.map((name) => make("option", { value: name }, name)), make("option", { value: "" }, words("with_token")));
+  if (names.includes(chosen)) at("person").value = chosen;
+  at("by-person").hidden = !names.length;
+  askedFor();
+}
+
+function askedFor() {
+  const isPin = at("person").value !== "";
+  at("token").inputMode = isPin ? "numeric" : "text";
+  say("token-what", words(isPin ? "pin" : "token"));
+  say("token-text", words(isPin ? "pin_text" : "token_text"));
 }
 
 async function carryOut() {
@@ -88,13 +111,22 @@ async function carryOut() {
   } catch (error) {
     if (!(error instanceof Refused)) tell(() => words("transfer_unknown"), true);
     else tell(() => refusal(error), true);
-    if (error.status === 401) openDialog(words("wrong_token"));
+    if (error.status === 401) openDialog(words(at("person").value ? "wrong_pin" : "wrong_token"));
+    if (error.holder) openTakeOver(error.holder);
   } finally {
     isUnderWay = false;
   }
 }
 
+function openTakeOver(who) {
+  say("lease-told", words("lease_of", { who }));
+  at("take-over").value = "";
+  at("lease-dialog").showModal();
+  at("take-over").focus();
+}
+
 function refusal(error) {
+  if (error.holder) return words("lease_of", { who: error.holder });
   const reason = error.code ? reasonOf(error.code) : null;
   const text = reason ? `${reason.sentence} ${reason.next_action}` : words(REFUSALS[error.status] ?? "cannot");
   return `${text} (${seenAs(error.message)})`;
@@ -121,10 +153,21 @@ at("token-dialog").querySelector("form").addEventListener("submit", () => {
   const given = at("token").value.trim();
   at("token").value = "";
   if (!given) return;
-  remember(given);
+  remember(at("person").value ? `Pin ${at("person").value}:${given}` : `Bearer ${given}`);
+  carryOut();
+});
+at("person").addEventListener("change", () => {
+  askedFor();
+  at("token").focus();
+});
+at("lease-cancel").addEventListener("click", () => at("lease-dialog").close());
+at("lease-dialog").querySelector("form").addEventListener("submit", () => {
+  pending.body = { ...pending.body, take_over: at("take-over").value.trim() };
   carryOut();
 });
 onLanguage(() => {
   say("told", told());
+  askedFor();
+  if (heard?.lease) say("lease", words("lease_of", { who: heard.lease.who }));
   if (heard) fillRecipes();
 });

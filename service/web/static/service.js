@@ -1,4 +1,4 @@
-// The service, by its REST interface: what is asked, what comes by itself, and the token of whoever gives orders.
+// The service, by its REST interface: what is asked, what comes by itself, and the token or PIN of whoever gives orders.
 
 import { learn } from "./words.js";
 
@@ -8,7 +8,7 @@ const SILENT_MS = 3_500;
 const AGAIN_MS = 2_000;
 const ORDER_MS = 15_000; // the service answers within 10 s, if at all
 
-let token = null;
+let proof = null; // of who gives orders: what goes into Authorization
 let forgetting = null;
 
 export class Refused extends Error {
@@ -17,6 +17,7 @@ export class Refused extends Error {
     learn(problem);
     this.status = status;
     this.code = problem.code;
+    this.holder = problem.holder;
   }
 }
 
@@ -26,27 +27,27 @@ export async function get(path) {
   return learn(await answer.json());
 }
 
-export function hasToken() {
-  return token !== null;
+export function isKnown() {
+  return proof !== null;
 }
 
 export function remember(value) {
-  token = value;
+  proof = value;
   clearTimeout(forgetting);
   forgetting = setTimeout(forget, FORGOTTEN_MS);
 }
 
 export function forget() {
-  token = null;
+  proof = null;
 }
 
 export async function order(path, body) {
-  const headers = { "Content-Type": "application/json", Authorization: `Bearer ${token}` };
+  const headers = { "Content-Type": "application/json", Authorization: proof };
   const answer = await fetch(BASE + path, { method: "POST", headers, body: JSON.stringify(body), signal: AbortSignal.timeout(ORDER_MS) });
   const told = await answer.json();
   if (answer.status === 401) forget();
   if (!answer.ok) throw new Refused(answer.status, told);
-  remember(token);
+  remember(proof);
   return told;
 }
 

@@ -37,6 +37,8 @@ FAULTS = """() => {
   }
   return wrong;
 }"""
+CUT = """() => [...document.querySelectorAll("#live-values dd")]
+  .filter((one) => one.scrollWidth > one.clientWidth || !one.clientWidth).map((one) => `cut off: ${one.textContent}`)"""
 # A capital letter's height, as the font draws it.
 CAPITALS = """(id) => {
   const style = getComputedStyle(document.getElementById(id));
@@ -126,6 +128,37 @@ def test_axe_core_finds_nothing_serious(played: Page, told: dict[str, dict[str, 
             found[name, width] = serious
     played.evaluate("document.documentElement.dataset.theme = 'auto'")
     assert found == {}
+
+
+DIALOGS = {"token-dialog": "#trigger", "help-dialog": "#help", "lease-dialog": ""}
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_live_view_and_dialogs_are_whole_and_axe_core_finds_nothing_serious(
+    cell: tuple[Cell, Client], browser: Browser, width: int, language: str
+) -> None:
+    context = browser.new_context(
+        locale=language, bypass_csp=True, color_scheme="dark", viewport={"width": width, "height": WIDTHS[width]}
+    )
+    page = context.new_page()
+    page.goto(cell[1].url)
+    page.wait_for_selector("#trigger:enabled")
+    page.evaluate((node_modules() / "axe-core" / "axe.min.js").read_text())
+    page.locator("#live").click()
+    page.wait_for_selector('#live-verdict[data-kind="accepted"]', timeout=60_000)
+    wrong = {"live": page.evaluate(FAULTS) + page.evaluate(AXE) + page.evaluate(CUT)}
+    page.evaluate("document.getElementById('by-person').hidden = false")
+    for dialog, opener in DIALOGS.items():
+        if opener:
+            page.locator(opener).click()
+        else:
+            page.evaluate("(id) => document.getElementById(id).showModal()", dialog)
+        page.wait_for_selector(f"#{dialog}[open]")
+        wrong[dialog] = page.evaluate(FAULTS) + page.evaluate(AXE)
+        page.keyboard.press("Escape")
+    context.close()
+    assert {name: faults for name, faults in wrong.items() if faults} == {}
 
 
 def test_in_a_kiosk_there_is_the_picture_the_result_the_state_and_two_orders(

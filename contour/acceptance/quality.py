@@ -119,13 +119,18 @@ def quality_faults(quality: Quality, limits: QualityLimits) -> tuple[str, ...]:
             f"walls stand out of their cells by {quality.contrast:.1f} grey levels, at least {limits.min_contrast:g} "
             "are needed. Check the light, the exposure and the lens"
         )
-    most = max(float(np.hypot(limits.max_blur_pitches * quality.pitch_px, _LENS_BLUR_PX)), limits.max_blur_px)
+    most = most_blur_px(quality.pitch_px, limits)
     if quality.blur_px > most:
         faults.append(
             f"walls are blurred by {quality.blur_px:.1f} px where cells are {quality.pitch_px:.0f} px apart, at most "
             f"{most:.1f} px is allowed. Check the focus, clean the lens, keep block and camera still"
         )
     return tuple(faults)
+
+
+def most_blur_px(pitch_px: float, limits: QualityLimits) -> float:
+    """The blur up to which walls of cells this far apart are sharp enough."""
+    return max(float(np.hypot(limits.max_blur_pitches * pitch_px, _LENS_BLUR_PX)), limits.max_blur_px)
 
 
 def lost_in_noise(quality: Quality, limits: QualityLimits) -> str | None:

@@ -17,6 +17,7 @@ from drivers.camera import Camera
 from service.daemon.control import ControlServer
 from service.daemon.control_triggers import ControlTriggers
 from service.daemon.lock import Held, LockError
+from service.daemon.missed_watch import MissedWatch
 from service.daemon.opening import DiskRefuses, Opening
 from service.daemon.operations import CONTROL_PART, Halt, Operations
 from service.daemon.reload import Reloader
@@ -81,6 +82,7 @@ class Parts:
     watchdog: Watchdog = field(default_factory=lambda: Watchdog(Notifier({})))
     archive: ArchiveWriter | None = None
     storage: StorageWatch | None = None
+    missed: MissedWatch | None = None
     reloader: Reloader | None = None
     metrics: Closeable | None = None
     page: Page | None = None
@@ -194,6 +196,8 @@ class Daemon:
             watched += [name] if name.startswith("serial") else []
         if parts.storage is not None:
             add("storage", parts.storage.run)
+        if parts.missed is not None:
+            add("missed triggers", parts.missed.run)
         if parts.reloader is not None:
             add("reload", parts.reloader.run)
         if parts.archive is not None:

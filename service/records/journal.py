@@ -6,6 +6,7 @@ import hashlib
 import json
 import sqlite3
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -83,6 +84,10 @@ class Journal:
         """Write and commit something that changes nothing; raise JournalError where that does not work."""
         with self._file.transaction() as db:
             db.execute("UPDATE meta SET value = value WHERE key = 'owner'")
+
+    def step(self) -> AbstractContextManager[sqlite3.Connection]:
+        """One durable step of another room's, in tables of its own."""
+        return self._file.transaction()
 
     def take(self, trigger: TriggerStamp, *, above: int = 0) -> Job:
         """A new job, durable on return; its id is above all in the journal and above `above`."""

@@ -3,11 +3,12 @@
 Version 2 added what a job was carried out with (its recipe's whole settings, the calibration's hash) and its transfer.
 Version 3 added who asked for what from the operator's page. Version 4 added on which serial line a job was
 acknowledged, whether its end is still to be told there, and at which controller, how laid out there, it was sent.
+Version 5 added what shifts are told by: jobs by time, checks against a master, triggers that were not taken.
 """
 
 from __future__ import annotations
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 
 AUDIT = """
 CREATE TABLE audit (
@@ -26,6 +27,29 @@ ALTER TABLE jobs ADD COLUMN target TEXT;
 ALTER TABLE jobs ADD COLUMN line TEXT;
 ALTER TABLE jobs ADD COLUMN owed INTEGER NOT NULL DEFAULT 0;
 CREATE INDEX jobs_owed ON jobs (job_id) WHERE owed = 1;
+"""
+
+SHIFTS = """
+CREATE INDEX jobs_by_time ON jobs (taken_at);
+CREATE TABLE checks (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    at TEXT NOT NULL,
+    kind TEXT NOT NULL CHECK (kind IN ('verify', 'repeat')),
+    calibration TEXT NOT NULL,
+    pictures INTEGER NOT NULL,
+    mean_mm REAL NOT NULL,
+    p95_mm REAL NOT NULL,
+    worst_mm REAL NOT NULL,
+    limit_mm REAL NOT NULL,
+    verdict TEXT NOT NULL CHECK (verdict IN ('pass', 'fail'))
+) STRICT;
+CREATE TABLE missed (
+    at TEXT NOT NULL,
+    kind TEXT NOT NULL,
+    reason TEXT NOT NULL,
+    count INTEGER NOT NULL,
+    PRIMARY KEY (at, kind, reason)
+) STRICT, WITHOUT ROWID;
 """
 
 TABLES = f"""
@@ -53,7 +77,7 @@ CREATE TABLE jobs (
 ) STRICT;
 CREATE INDEX jobs_unsettled ON jobs (job_id) WHERE outcome IS NULL;
 CREATE INDEX jobs_by_controller ON jobs (job_id) WHERE trigger_counter IS NOT NULL;
-{AUDIT}{LINE_AND_TARGET}"""
+{AUDIT}{LINE_AND_TARGET}{SHIFTS}"""
 
 # Each from the version that is its key to the next.
 MIGRATIONS = {
@@ -65,6 +89,7 @@ ALTER TABLE jobs ADD COLUMN transfer TEXT;
 """,
     2: AUDIT,
     3: LINE_AND_TARGET,
+    4: SHIFTS,
 }
 
 COLUMNS_OF_1 = (

@@ -18,6 +18,7 @@ from service.config.controllers import NoController
 from service.config.triggers import ControllerTrigger
 from service.daemon.daemon import Parts
 from service.daemon.lock import LockError
+from service.daemon.missed_watch import MissedWatch
 from service.daemon.opening import DiskRefuses, Opening, stand_in
 from service.daemon.reload import Reloader
 from service.daemon.storage_watch import StorageLimits, StorageWatch
@@ -99,6 +100,7 @@ def build(
         parts.archive = archive
         limits = StorageLimits(config.journal.min_free_bytes, config.journal.max_jobs)
         parts.storage = StorageWatch(journal, config.journal.path, health, archive, limits)
+        parts.missed = None if refused else MissedWatch(journal, executor.counts)
         parts.warm_up_s = getattr(config.camera, "warm_up_s", 0.0)
         if stand_ins is None:
             parts.rehearse = rehearse

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
-from service.cli.options.measuring import Measuring, add_measuring_arguments, note_trend
+from service.cli.options.measuring import Measuring, add_measuring_arguments, note_check
 
 if TYPE_CHECKING:
     from contour.geometry.rings import Contour
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         args.tolerance_mm,
         "pass" if passed else "fail",
     )
-    note_trend(args.trend, line)
+    note_check(args, measuring.config, line)
     print(f"{'pass' if passed else 'FAIL'}      worst {worst:.3f} mm, {args.tolerance_mm:g} mm are allowed")
     return EXIT_OK if passed else EXIT_REFUSED
 

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, UserError
-from service.cli.options.measuring import Measuring, add_measuring_arguments, note_trend
+from service.cli.options.measuring import Measuring, add_measuring_arguments, note_check
 from service.cli.pictures.given_pictures import add_pictures_argument, pictures_of
 
 HELP = "measure a master part: deviation in mm, pass or fail"
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
             args.tolerance_mm,
             "pass" if passed else "fail",
         )
-        note_trend(args.trend, line)
+        note_check(args, measuring.config, line)
         verdict = "pass" if passed else "FAIL"
         print(f"{verdict}      worst deviation {worst:.3f} mm, {args.tolerance_mm:g} mm are allowed")
     return EXIT_OK if passed else EXIT_REFUSED

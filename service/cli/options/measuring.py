@@ -108,6 +108,18 @@ class Measuring:
         return cls(config, measurer, recipe, thickness_of(args, recipe), guard.record.digest[:15])
 
 
+def note_check(args: argparse.Namespace, config: Config, line: TrendLine) -> None:
+    """Keep a check in the journal that a given configuration names, and in the trend file; raise UserError."""
+    from service.trends.kept import NotKept, keep_check
+
+    if args.config is not None:
+        try:
+            keep_check(config.journal.path, line)
+        except NotKept as error:
+            print(f"journal   the check is not kept: {error}", file=sys.stderr)
+    note_trend(args.trend, line)
+
+
 def note_trend(path: Path | None, line: TrendLine) -> None:
     """Add a line to the trend file, tell how it compares with the last, and draw them all; raise UserError."""
     from service.atomic_file import write_whole

@@ -136,7 +136,7 @@ def test_a_journal_of_another_version_is_refused_by_its_number(tmp_path: Path) -
     path = tmp_path / "journal.sqlite"
     Journal(path).close()
     changed(path, "PRAGMA user_version = 99")
-    with pytest.raises(JournalError, match="schema version 99, expected 1 to 4"):
+    with pytest.raises(JournalError, match="schema version 99, expected 1 to 5"):
         Journal(path)
 
 

@@ -26,6 +26,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ),
         ("combtrace fit block.png --part part.svg --config config.yaml --overlay laid.png", "Draw it, to look at."),
     ),
+    "report": (
+        ("combtrace report", "How the last eight hours were, as shift.html."),
+        ("combtrace report --from 2026-11-21T06:00 --to 2026-11-21T14:00 --language ru", "A shift, in Russian."),
+        ("combtrace report --from 7d --recipe 2 --output week.html", "A week of one recipe."),
+    ),
     "remnants": (
         ("combtrace remnants", "What is left of blocks that were cut."),
         ("combtrace remnants --fits part.dxf --margin-mm 3", "Into which of it a part fits, the smallest first."),

@@ -25,16 +25,10 @@ MODULES = (  # of this package, in the order of `--help`
     *("controller.simulate_controller", "controller.simulate_service"),
     *("pictures.cameras", "pictures.grab", "pictures.focus", "pictures.live"),
     *("calibration.board", "calibration.calibrate", "calibration.align", "calibration.verify", "calibration.repeat"),
-    *("pictures.teach_table", "controller.probe", "records.jobs", "records.replay", "records.remnants"),
-    *(
-        "daemon.status",
-        "daemon.halt",
-        "daemon.resume",
-        "daemon.confirm",
-        "daemon.reset",
-        "daemon.pin",
-        "daemon.install_service",
-    ),
+    *("pictures.teach_table", "controller.probe"),
+    *("records.jobs", "records.replay", "records.report", "records.remnants"),
+    *("daemon.status", "daemon.halt", "daemon.resume", "daemon.confirm", "daemon.reset", "daemon.pin"),
+    "daemon.install_service",
     *("completion", "schema", "reasons", "controller.register_map"),
 )
 COMMANDS = {module.rpartition(".")[2].replace("_", "-"): f"service.cli.{module}" for module in MODULES}

@@ -72,8 +72,7 @@ class Pages:
 
     async def page(self, request: Request) -> Response:
         """The page as things are now."""
-        language = _one_of(request.cookies.get("language"), LANGUAGES, self._language_of(request))
-        theme = _one_of(request.cookies.get("theme"), THEMES, "auto")
+        language, theme = self.reader(request)
         try:
             state: dict[str, Any] | None = await self._daemon.state()
         except DaemonSilent:
@@ -88,6 +87,15 @@ class Pages:
         for name, value in shown.items():
             text = text.replace(f"{{{{{name}}}}}", value)
         return Response(text, media_type="text/html")
+
+    def reader(self, request: Request) -> tuple[str, str]:
+        """In which language and theme somebody reads."""
+        language = _one_of(request.cookies.get("language"), LANGUAGES, self._language_of(request))
+        return language, _one_of(request.cookies.get("theme"), THEMES, "auto")
+
+    def recipes(self) -> tuple[tuple[int, str], ...]:
+        """Number and name of each."""
+        return self._daemon.sources.recipes()
 
     def _language_of(self, request: Request) -> str:
         """Of somebody who has not chosen."""

@@ -6,6 +6,7 @@ from service.web import models
 from service.web.evidence_files import FILES, WIDTHS_PX
 from service.web.looks import endpoints as looks
 from service.web.openapi import Operation, Parameter
+from service.web.trends.models import Trends
 
 MOST_JOBS = 200
 MOST_NOTES = 1000
@@ -59,6 +60,19 @@ OPERATIONS = (
         "GET", "/events", "The service's state, again each second and after each change", "text/event-stream", _SILENT
     ),
     *looks.OPERATIONS,
+    Operation(
+        "GET",
+        "/trends",
+        "How jobs fared over a time, in at most 200 buckets",
+        Trends,
+        {400: _PARAMETER, **_SILENT},
+        (
+            Parameter("from", {"type": "string", "format": "date-time"}, "Jobs taken then or later."),
+            Parameter("to", {"type": "string", "format": "date-time"}, "Jobs taken before; now where left out."),
+            Parameter("hours", {"type": "integer", "minimum": 1, "default": 168}, "Without `from`: so long before."),
+            Parameter("recipe", {"type": "integer", "minimum": 1, "maximum": 65_535}, "Jobs of this recipe only."),
+        ),
+    ),
     Operation("GET", "/reasons", "Why jobs are not accepted, in words", models.Reasons, {}),
     Operation("GET", "/people", "Who may give orders by a PIN", models.PeopleNames, _SILENT),
     Operation(

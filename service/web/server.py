@@ -25,6 +25,7 @@ from service.web.html import Pages
 from service.web.http_server import http_server, listening
 from service.web.people.pins import PeopleFile
 from service.web.tokens import TokenFile, TokenFileError
+from service.web.trends.endpoints import TrendEndpoints
 
 log = logging.getLogger("combtrace.page")
 
@@ -60,8 +61,9 @@ class PageServer:
             self._socket = _bound(self._settings.host, self._settings.port)
         listener, self._socket = self._socket, None
         api = self._make_api()
+        trends = TrendEndpoints(self.daemon.sources.journal_path, self._pages)
         settings = self._settings
-        guarded = Guard(application(api, self._pages), settings.names)
+        guarded = Guard(application(api, self._pages, trends), settings.names)
         server = http_server(guarded, settings.certificate, settings.key)
         thread = ThreadPoolExecutor(1, "page")
         serving = asyncio.get_running_loop().run_in_executor(thread, _serve, server, listener)
@@ -71,6 +73,7 @@ class PageServer:
         finally:
             server.should_exit = True
             api.close()
+            trends.close()
             await asyncio.wait([serving], timeout=THREAD_ENDS_S)
             thread.shutdown(wait=False)
         raise PageError("the page's server ended, expected it to run for ever")
@@ -82,7 +85,7 @@ class PageServer:
         return f"http{'s' if self._settings.certificate else ''}://{host}:{self._settings.port}/"
 
 
-def application(api: Api, pages: Pages) -> Starlette:
+def application(api: Api, pages: Pages, trends: TrendEndpoints) -> Starlette:
     """All that is served; what is not there is told as every error is."""
 
     async def unknown(_request: Request, _error: Exception) -> Response:
@@ -91,7 +94,8 @@ def application(api: Api, pages: Pages) -> Starlette:
     async def wrong_method(_request: Request, _error: Exception) -> Response:
         return problem(405, "not by this method. See /api/v1/openapi.json")
 
-    return Starlette(routes=[*pages.routes(), *api.routes()], exception_handlers={404: unknown, 405: wrong_method})
+    routes = [*pages.routes(), *api.routes(), *trends.routes()]
+    return Starlette(routes=routes, exception_handlers={404: unknown, 405: wrong_method})
 
 
 def _serve(server: uvicorn.Server, listener: socket.socket) -> None:

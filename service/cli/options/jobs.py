@@ -21,9 +21,7 @@ UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days", "w": "weeks"
 
 def add_filter_arguments(parser: argparse.ArgumentParser) -> None:
     """Since when, how they ended, why."""
-    parser.add_argument(
-        "--since", type=_moment, metavar="WHEN", help="2026-11-21, 2026-11-21T06:00, or 30m, 8h, 2d ago"
-    )
+    parser.add_argument("--since", type=moment, metavar="WHEN", help="2026-11-21, 2026-11-21T06:00, or 30m, 8h, 2d ago")
     parser.add_argument("--outcome", choices=("accepted", "written", "refused", "failed"))
     parser.add_argument("--reason", metavar="REASON", help="code or name, as `combtrace reasons` tells them")
 
@@ -66,7 +64,7 @@ def filter_of(args: argparse.Namespace) -> JobFilter:
     return JobFilter(args.since, None if args.outcome is None else Outcome(args.outcome), reason)
 
 
-def _moment(text: str) -> datetime:
+def moment(text: str) -> datetime:
     """A time, or a span before now."""
     ago = AGO.fullmatch(text)
     if ago:

@@ -38,8 +38,8 @@ def compiled(name: str, folder: Path = HERE) -> Path:
 
 
 @functools.cache
-def node_modules() -> Path:
-    """The folder of npm packages, `NPM_PACKAGES` in it; installed once a run."""
+def node_modules(packages: tuple[str, ...] = NPM_PACKAGES) -> Path:
+    """The folder of npm packages with these in it; installed once a run."""
     npm = need_program("npm", NODE_INSTALL)
     folder = _folder()
     command = [
@@ -52,9 +52,9 @@ def node_modules() -> Path:
         "--no-audit",
         "--no-fund",
     ]
-    done = subprocess.run([*command, *NPM_PACKAGES], capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run([*command, *packages], capture_output=True, text=True, timeout=120, check=False)
     if done.returncode:
-        missing(f"npm cannot install {' and '.join(NPM_PACKAGES)}: {done.stderr.strip()[-300:]}")
+        missing(f"npm cannot install {' and '.join(packages)}: {done.stderr.strip()[-300:]}")
     return folder / "node_modules"
 
 

@@ -12,6 +12,7 @@ import hashlib
 import html
 import os
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -74,42 +75,41 @@ class TrendEndpoints:
 
     async def figures(self, request: Request) -> Response:
         """The figures."""
-        found = await self._history(request)
-        text = await asyncio.to_thread(lambda: answer(found).model_dump_json())
+        text = await self._made(request, lambda found: answer(found).model_dump_json())
         return Response(text, media_type="application/json")
 
     async def page(self, request: Request) -> Response:
         """The page of trends."""
         language, theme = self._pages.reader(request)
-        found = await self._history(request)
         links = self._links(Language(language), request)
-        text = await asyncio.to_thread(trends_page, Language(language), theme, found, links)
+        text = await self._made(request, lambda found: trends_page(Language(language), theme, found, links))
         return Response(text, media_type="text/html")
 
     async def report(self, request: Request) -> Response:
         """The shift's report."""
         language, _theme = self._pages.reader(request)
-        found = await self._history(request)
-        text = await asyncio.to_thread(shift_report, Language(language), found)
+        text = await self._made(request, lambda found: shift_report(Language(language), found))
         return Response(text, media_type="text/html", headers={"content-security-policy": REPORT_POLICY})
 
     async def style(self, _request: Request) -> Response:
         """How the page looks."""
         return Response(STYLE, media_type="text/css")
 
-    async def _history(self, request: Request) -> History:
+    async def _made(self, request: Request, make: Callable[[History], str]) -> str:
+        """What is made of the history that is asked for, both in the thread."""
         span, recipe = span_of(request), whole_number(request, "recipe", LARGEST_RECIPE, None)
         if self._waiting >= MOST_WAITING:
             raise RequestRefused(503, f"{MOST_WAITING} are being answered already", again_s=AGAIN_S)
+
+        def made() -> str:
+            with reading(self._journal) as journal:
+                return make(history(journal, span, recipe))
+
         self._waiting += 1
         try:
-            return await asyncio.get_running_loop().run_in_executor(self._thread, self._added_up, span, recipe)
+            return await asyncio.get_running_loop().run_in_executor(self._thread, made)
         finally:
             self._waiting -= 1
-
-    def _added_up(self, span: Span, recipe: int | None) -> History:
-        with reading(self._journal) as journal:
-            return history(journal, span, recipe)
 
     def _links(self, language: Language, request: Request) -> str:
         hours = whole_number(request, "hours", MOST_HOURS, USUAL_HOURS)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from playwright.sync_api import Browser, expect, sync_playwright
@@ -15,13 +16,18 @@ from playwright.sync_api import Browser, expect, sync_playwright
 from service.cli.main import main
 from service.daemon.missed_watch import PERIOD_S
 from service.web.trends.models import Trends
+from tests.support.interop.programs import node_modules
 from tests.support.processes.cell import ON_SAMPLES, SAMPLES, Cell
 from tests.support.processes.page_client import Client, token_file
-from tests.support.processes.page_panel import chromium, clean_page
+from tests.support.processes.page_panel import EXPECTED_NOISE, chromium, clean_page
 from tests.support.processes.processes import free_port, until
 
 RECIPE = "{number: 1, name: sheet, max_uncertainty_mm: 5, min_area_mm2: 100, max_area_mm2: 4000000}"
 LOOSE = "{number: 2, name: giant, min_area_mm2: 3000000, max_area_mm2: 4000000}"
+
+AXE = """axe.run(document).then(found => found.violations
+    .filter(one => ["serious", "critical"].includes(one.impact))
+    .map(one => `${one.id}: ${one.nodes[0].html.slice(0, 200)}`))"""
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +120,7 @@ def test_the_page_links_to_trends_which_are_drawn_in_both_languages(
     served: tuple[Cell, Client], browser: Browser, width: int, theme: str
 ) -> None:
     url = served[1].url
-    with clean_page(browser, url, locale="en-GB", color_scheme=theme) as page:
+    with clean_page(browser, url, EXPECTED_NOISE, locale="en-GB", color_scheme=theme) as page:
         page.set_viewport_size({"width": width, "height": 1000})
         page.get_by_role("link", name="Trends").click()
         page.get_by_role("link", name="1 sheet").click()
@@ -132,6 +138,20 @@ def test_the_page_links_to_trends_which_are_drawn_in_both_languages(
         expect(page.get_by_role("heading", level=1)).to_have_text("Ход показателей")
         page.get_by_role("link", name="Отчёт, последние 8 ч").click()
         expect(page.get_by_role("heading", level=1)).to_have_text("Отчёт за смену")
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("path", ["trends?recipe=1", "trends/report"])
+def test_axe_core_finds_nothing_serious(
+    served: tuple[Cell, Client], browser: Browser, path: str, theme: Literal["light", "dark"]
+) -> None:
+    axe = (node_modules() / "axe-core" / "axe.min.js").read_text()
+    for width in (390, 1920):
+        with clean_page(browser, served[1].url, EXPECTED_NOISE, color_scheme=theme) as page:
+            page.goto(f"{served[1].url}{path}")
+            page.set_viewport_size({"width": width, "height": 900})
+            page.evaluate(axe)
+            assert page.evaluate(AXE) == []
 
 
 def test_the_report_of_the_page_is_whole_in_itself_printable_and_names_nobody(

@@ -137,11 +137,12 @@ def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
     found = []
     for foot in np.flatnonzero(rises).tolist():
         top = np.roll(np.arange(len(corners)), -foot - 1)
-        end = int(np.argmax(np.abs(turn[top[1:]]) > least)) + 1
+        turned_by = np.cumsum(turn[top[1:]])  # a corner may be a round one
+        end = int(np.argmax(np.abs(turned_by) > least)) + 1
         # At its foot: slanting sides are as wide as they are long there.
         sides = [foot, top[end]] if long[top[end]] < _STEP_HIGH[1] else [foot]
         wide = long[top[:end]].sum() + (long[sides] * np.cos(turn[[top[0], top[end]]][: len(sides)])).sum()
-        if turn[top[end]] > least and wide < _STEP_LONG:
+        if turned_by[end - 1] > least and wide < _STEP_LONG:
             x, y = corners[top[0]].tolist()
             found.append(NarrowFeature(float(high[foot]), float(wide), (x, y), True))
     return found

@@ -191,6 +191,17 @@ def test_a_low_step_that_ends_in_a_corner_soon_is_a_strip(
     assert shapely.Point(one.place_px).distance(corner) < 0.5 * PITCH
 
 
+@pytest.mark.parametrize("turn_deg", [0.0, 25.0])
+def test_and_so_is_one_that_ends_in_a_round_corner(turn_deg: float) -> None:
+    """As an outline goes around a label: it leans where it rises, and turns by steps at its end."""
+    p = PITCH
+    step = [(700, 100), (700, 500 - 1 * p), (700 - 0.6 * p, 500 + 0.4 * p), (700 - 1.9 * p, 500 + 1.5 * p)]
+    foot = [(700 - 4.8 * p, 500 + 2.2 * p), (700 - 6.0 * p, 500), (100, 500), (100, 100)]
+    one = found(shapely.Polygon([*step, *foot]), turn_deg)
+    assert one is not None
+    assert one.outwards
+
+
 @pytest.mark.parametrize(("high", "long"), [(1.5, 14.0), (5.5, 8.0)])
 def test_a_long_step_and_the_end_of_an_arm_are_the_blocks_own(high: float, long: float) -> None:
     assert found(BLOCK | shapely.box(700 - long * PITCH, 499, 700, 500 + high * PITCH)) is None

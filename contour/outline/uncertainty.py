@@ -10,7 +10,7 @@ variance that is a sum of squares:
 - gap: where no witness lies for more than a pitch, the outline is a guess that grows with the gap, if slowly: most gaps
   lie in straight edges;
 - misfit: neighbours in a row that lie off on one side, farther than scatter has them, say that the outline has left
-  the cut;
+  the cut; and a corner of which ends on both sides lie inside may be a round one;
 - outside: a wall end beyond the outline is material that the outline leaves out, even if it is a single one.
 
 The bound is the length within which these normal laws together put 95 % of the outline. All terms are lengths in the
@@ -27,6 +27,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from contour.geometry.arrays import Float64s, Indices, medians
+from contour.geometry.ring_lengths import RingLengths
 from contour.outline.fit import FittedRing
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
@@ -48,6 +49,9 @@ _BEYOND = 1.1
 
 _NORMAL = 1.96
 """Standard deviations within which 95 % of what is normal lies."""
+
+_OBTUSE, _INSIDE_PITCHES = (math.radians(20.0), math.radians(75.0)), 0.03
+"""A corner between these turns may as well be round, where witnesses lie so far inside of it."""
 
 _HALVINGS = 24
 _REACH = np.linspace(0.0, 6.0, 601)
@@ -160,7 +164,8 @@ def ring_stretches(
     length = np.maximum(np.diff(position, append=position[0] + around), 0.0)
     leverage = _leverage(evidence, fitted, np.mod(position + 0.5 * length, around), around)
     residual = np.clip(fitted.residual, -_CAP_PITCHES * pitch_px, _CAP_PITCHES * pitch_px)
-    together = _largest_between(np.abs(_middle_of_five(residual)), on_line)
+    blunt = _blunt_corners(evidence, fitted, on_line, pitch_px)
+    together = np.maximum(_largest_between(np.abs(_middle_of_five(residual)), on_line), blunt)
     left_out = ~fitted.inlier & (evidence.kind != WitnessKind.OUTERMOST)
     return Stretches(
         length=length,
@@ -214,6 +219,32 @@ def _leverage(evidence: RingEvidence, fitted: FittedRing, place: Float64s, aroun
     order = np.argsort(at, kind="stable")
     ratio = fitted.vertex_sigma_px / max(fitted.spread_px, 1e-6)
     return np.asarray(np.interp(place, at[order], ratio[order], period=around), np.float64)
+
+
+def _blunt_corners(evidence: RingEvidence, fitted: FittedRing, on_line: Indices, pitch_px: float) -> Float64s:
+    """How far each stretch's corner lies from the arc that may run there instead, pixels, shape (S,); 0 without one.
+
+    Between the witnesses on both sides of an obtuse corner others may lie inside of it and be left out as broken walls:
+    they are those of a round corner. An arc that leaves both lines at a distance a from a corner that turns by t passes
+    it by a tan(t / 4).
+    """
+    found = np.zeros(len(on_line))
+    ring = fitted.ring
+    lengths = RingLengths.of(ring)
+    edges = np.roll(ring, -1, axis=0) - ring
+    heading = edges[:, 0] + 1j * edges[:, 1]
+    turn = np.angle(heading / np.roll(heading, 1))
+    feet = lengths.feet(evidence.points)
+    inside = ~fitted.inlier & (fitted.residual < -_INSIDE_PITCHES * pitch_px)
+    for corner in np.flatnonzero((np.abs(turn) > _OBTUSE[0]) & (np.abs(turn) < _OBTUSE[1])):
+        ahead = (feet - lengths.starts[corner]) % lengths.length
+        after, before = on_line[ahead[on_line].argmin()], on_line[ahead[on_line].argmax()]
+        reach = ahead[after], lengths.length - ahead[before]
+        if np.any(inside & ((ahead < reach[0]) | (lengths.length - ahead < reach[1]))):
+            passed = 0.5 * sum(reach) * math.tan(abs(turn[corner]) / 4.0)
+            stretch = int(np.searchsorted(on_line, before))
+            found[stretch] = max(found[stretch], min(passed, _CAP_PITCHES * pitch_px))
+    return found
 
 
 def _middle_of_five(residual: Float64s) -> Float64s:

@@ -17,7 +17,7 @@ import numpy as np
 
 from contour.acceptance.block_level import exclusive_levels
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median, quantile
-from contour.geometry.rings import Contour, Ring
+from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.opencv import pieces_and_areas
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
@@ -36,6 +36,10 @@ _BLUR_PITCHES = 0.5
 # In the middle of holes it is 1.1 times the usual, of faded walls 1.5 (row noise) to 11; and 0.08 of what it is in comb
 # there, 0.17 or more here.
 _FAR_INSIDE_PITCHES, _FAINT, _FAINT_OVER, _FAINTEST = 3.0, 1.6, 0.95, 0.12
+# A corner is cut off where both turns are more than the first, and together less than the second; and the edges on both
+# sides so long. A piece so wide lies there, so near the tip; the contour is followed so closely.
+_BEVEL, _SIDE_PITCHES, _EVEN_PITCHES = (np.radians(15.0), np.radians(125.0)), 3.0, 0.3
+_LEAST_PIECE, _TIP_PITCHES = 0.8, 2.0
 _FRACTION_BITS = 4
 _POINTS_A_PITCH = 3.0
 
@@ -71,7 +75,7 @@ def disagreement(
 
     Width is that of the largest disc that fits into the difference; a spike or a notch has little, but its tip lies far
     from the busy region's border. Busy parts that the contour does not reach do not count: several blocks are another
-    finding.
+    finding. They do in a corner that the contour cuts off: something dark parts them from the block.
     """
     shrink = max(1, int(pitch_px / _PITCH_PX))
     small = whole_averaged(picture, shrink)
@@ -83,6 +87,7 @@ def disagreement(
         there = cv2.resize(flat, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
         filled = cv2.dilate(there, _disc(_BLUR_PITCHES * small_pitch_px * 2)) > 0
         busy = np.asarray(np.where(filled, ours, busy), np.uint8)
+    cut_off = _but(busy & _cut_corners(contour.exterior, pitch_px, busy.shape[:2], shrink), ours)
     if loose is not None:
         beside = cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
         busy = _but(busy, _but(np.asarray(beside * np.uint8(255), np.uint8), ours))
@@ -103,6 +108,7 @@ def disagreement(
     farthest = [
         (*_widest(_but(ours, busy)), True),
         (*_widest(_but(theirs, around)), False),
+        (*_beyond(_opened(cut_off, _disc(_LEAST_PIECE * small_pitch_px)), ours), False),
         (*_farthest(outside, points, 0.0), True),
         (*_farthest(inside, points, _BLUR_PITCHES * small_pitch_px), False),
     ]
@@ -196,6 +202,35 @@ def _widest(difference: Bytes) -> tuple[float, tuple[float, float]]:
     depth = _distances(difference)
     y, x = np.unravel_index(int(depth.argmax()), depth.shape)
     return 2.0 * float(depth[y, x]), (float(x), float(y))
+
+
+def _beyond(pieces: Bytes, ours: Bytes) -> tuple[float, tuple[float, float]]:
+    """How far the farthest place of pieces lies from ours, in pixels, and that place (x, y)."""
+    away = np.where(pieces > 0, cv2.distanceTransform(_inverted(ours), cv2.DIST_L2, 3), 0.0)
+    y, x = np.unravel_index(int(away.argmax()), away.shape)
+    return float(away[y, x]), (float(x), float(y))
+
+
+def _cut_corners(exterior: Ring, pitch_px: float, shape: tuple[int, int], shrink: int) -> Bytes:
+    """The tips of corners that edges bevel, where the edges on their sides meet: chips beside a bevel lie anywhere."""
+    even = cv2.approxPolyDP(exterior.astype(np.float32)[:, None], _EVEN_PITCHES * pitch_px, True)[:, 0]
+    edges = np.roll(even, -1, axis=0) - even
+    heading, long = edges[:, 0] + 1j * edges[:, 1], np.hypot(*edges.T) / pitch_px
+    turn = np.angle(np.roll(heading, -1) / heading) * np.sign(signed_area(even))
+    mask = np.zeros(shape, np.uint8)
+    for k in range(len(even)):
+        first, last = (k - 1) % len(even), (k + 1) % len(even)
+        turns = turn[first], turn[k]
+        if min(turns) < _BEVEL[0] or sum(turns) > _BEVEL[1] or min(long[first], long[last]) < _SIDE_PITCHES:
+            continue
+        # By the law of sines, from the first end of the bevel along the edge before it.
+        reach = long[k] * pitch_px * np.sin(turns[1]) / np.sin(sum(turns))
+        corner = even[k] + reach * edges[first] / (long[first] * pitch_px)
+        legs = np.array([even[k], even[last]]) - corner
+        legs *= np.minimum(1.0, _TIP_PITCHES * pitch_px / np.hypot(*legs.T))[:, None]
+        beyond = _fixed_point(samples_of(np.array([corner, *(corner + legs)]), shrink))
+        cv2.fillPoly(mask, [beyond], 255, cv2.LINE_8, _FRACTION_BITS)
+    return mask
 
 
 def _reduced_points(contour: Contour, spacing_px: float, shrink: int) -> Float64s:

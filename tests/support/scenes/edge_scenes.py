@@ -97,6 +97,9 @@ THINGS: dict[str, tuple[Thing, ...]] = {
     **{name: (thing,) for name, (_, thing) in COVERED.items()},
     "tape on a corner": (Cover(patch(0.5 * LONG, 0.0, 30.0, 30.0), 0.9),),
     "tape along an edge": (Cover(patch(0.0, 3.0, 1.2 * LONG, 30.0), 0.9),),
+    "cable across a corner": (
+        Cover(thick_line([at(0.5 * LONG - 95.0, 40.0), at(0.5 * LONG + 45.0, -100.0)], 20.0), 0.1, rounding_mm=10.0),
+    ),
     "compound": (Filling(patch(10.0, -5.0, 70.0, 40.0), 0.4, walls=0.0),),
     "compound at a corner": (Filling(patch(0.5 * LONG, 0.0, 60.0, 60.0), 0.6, walls=0.0),),
     "soft shadow": (Shade(patch(20.0, 10.0, 60.0, 30.0), 0.5, 6.0),),

@@ -35,19 +35,19 @@ _LEAST_CONTRAST = 6.0
 
 
 def cut_material(
-    picture: Bytes, clear: RingEvidence, fitted: Ring, distrusted: Float64s, look: TableLook
+    picture: Bytes, clear: RingEvidence, fitted: Ring, distrusted: Float64s, look: TableLook, *, dark: bool = False
 ) -> EdgePoints:
     """The ends of what fills cells up to the edge, in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
     `clear`: the ring's witnesses that lie at nothing foreign; `fitted`: the outline through them, pixels. `distrusted`:
-    ends of walls at something foreign, (N, 2).
+    ends of walls at something foreign, (N, 2). `dark`: what is darker than the table counts, too.
     """
     ring = _with_things(clear, distrusted, look)
     at_thing = look.foreign_at(ring) < _EDGE_PITCHES * look.pitch_px + look.step
     if at_thing.all() or not at_thing.any():
         return EdgePoints()
     border = ring, _normals(ring, max(1, round(0.5 * look.pitch_px / look.step)))
-    found = [_cut(picture, (clear, fitted), border, run, look) for run in runs_of(at_thing)]
+    found = [_cut(picture, (clear, fitted), border, run, look, dark) for run in runs_of(at_thing)]
     return EdgePoints(
         np.concatenate([one.points for one in found]),
         np.concatenate([one.position for one in found]),
@@ -56,7 +56,12 @@ def cut_material(
 
 
 def _cut(
-    picture: Bytes, seen: tuple[RingEvidence, Ring], border: tuple[Ring, Float64s], run: Indices, look: TableLook
+    picture: Bytes,
+    seen: tuple[RingEvidence, Ring],
+    border: tuple[Ring, Float64s],
+    run: Indices,
+    look: TableLook,
+    dark: bool,
 ) -> EdgePoints:
     """The run of a border where it is cut material, flush with the edges on its two sides, which go on straight or as
     the outline does that was fitted to what is `seen` of them; none of it where not.
@@ -73,7 +78,7 @@ def _cut(
     curved = (1.0 if clear.is_hole else -1.0) * depth_inside(fitted, ends)
     straight = out_of_flanks(clear, (first, last), ends, pitch_px)
     # What is darker than the table may as well be a shadow beside the block.
-    lit = look.lighter_at(place - _EDGE_PITCHES * pitch_px * normal)
+    lit = dark | look.lighter_at(place - _EDGE_PITCHES * pitch_px * normal)
     cuts = [
         sure & beyond & lit & (out < _FLUSH_PITCHES * pitch_px) & (out > -_SUNK_PITCHES * pitch_px)
         for out in (straight, curved)

@@ -35,6 +35,8 @@ _SPECK_PITCHES = 1.0
 _CELL_ROOM, _GAP = 0.62, 0.2
 # Within this of a thing a shadow is that thing's own, and no more to be trusted.
 _CAST_PITCHES = 2.5
+# A shadow has no room for a disc of this radius.
+_WIDEST_SHADE = 3.5
 _RIM = 1.5
 _THIN = 1.5
 _NOWHERE_PX = 1e6
@@ -96,8 +98,9 @@ class TableLook:
 
     @cached_property
     def lit(self) -> Bools:
-        """Where something foreign is no shadow."""
-        return _opened(self.things & ~self.shade, _THIN)
+        """Where something foreign is no shadow: those with sharp borders are no wider than blocks are high."""
+        wide = _opened(self.things & self.shade, _WIDEST_SHADE * self.pitch_px / self.step)
+        return wide | _opened(self.things & ~self.shade, _THIN)
 
     @cached_property
     def hiding(self) -> Bytes:
@@ -156,7 +159,7 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     busy = _busy(slope, block, samples)
     quiet = (busy < _QUIET) & ~table
     loose = None if seen.loose is None else _loose(seen.loose, (whole == 0) & light.alike, samples)
-    told = table_part if loose is None else table_part | loose
+    told = table_part if loose is None else table_part | (loose & ~quiet)  # what parts it from the block may hide some
     foreign = _opened((flat | quiet) & ~told, _CELL_ROOM * samples)
     foreign = _long(foreign, _LONG_PITCHES * samples)
     beside_block = _long(_opened((block == 0) & ~(table | told), _BAND * samples + 0.5), _LONG_PITCHES * samples)

@@ -12,7 +12,7 @@ from contour.edge.flanks import out_of_flanks
 from contour.edge.ring_places import runs_of, turns_deg
 from contour.edge.table_look import TableLook, beside
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.arrays import Bools, Bytes, Float64s, Indices
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
@@ -72,7 +72,7 @@ def fit_visible(
     """The ring fitted to those witnesses that do not lie at the border of something that is neither table nor comb, and
     to the ends of filled cells where these continue the edge. Raises NoBlockFound as `fit` does.
     """
-    near = _unshaded(doubtful(evidence, look), evidence, look, fit)
+    near = _unshaded(doubtful(evidence, look), evidence, picture, look, fit)
     if not near.any():
         return _plain(evidence, fit(evidence))
     if np.count_nonzero(~near) < _FEWEST:
@@ -127,8 +127,10 @@ def _between(lengths: RingLengths, points: Float64s) -> tuple[float, float]:
     return first, (last - first) % lengths.length
 
 
-def _unshaded(near: Bools, evidence: RingEvidence, look: TableLook, fit: Fit) -> Bools:
-    """The witnesses of `near` that lie at no shadow along an edge, shape (N,)."""
+def _unshaded(near: Bools, evidence: RingEvidence, picture: Bytes, look: TableLook, fit: Fit) -> Bools:
+    """The witnesses of `near` that lie at no shadow along an edge, shape (N,). What ends on the line of the edge on its
+    two sides is none: a shadow does not, but dark compound in cells does.
+    """
     if not near.any():
         return near
     shaded = look.in_shade(evidence.points) & (look.foreign_at(evidence.points) < beside(look))
@@ -136,9 +138,20 @@ def _unshaded(near: Bools, evidence: RingEvidence, look: TableLook, fit: Fit) ->
         return near
     ring, kept = fit(evidence).ring, near.copy()
     for run in runs_of(_without_gaps(shaded)):
-        if len(run) == len(near) or _is_own_edge(evidence.points[run], ring, look.pitch_px):
+        if len(run) == len(near) or (
+            _is_own_edge(evidence.points[run], ring, look.pitch_px) and not _flush(run, evidence, picture, look, fit)
+        ):
             kept[run] &= ~shaded[run]
     return kept
+
+
+def _flush(run: Indices, evidence: RingEvidence, picture: Bytes, look: TableLook, fit: Fit) -> bool:
+    """Whether what is dark along a run of witnesses ends on the line of the edge on both sides of the run."""
+    dropped = np.isin(np.arange(len(evidence.points)), run)
+    if np.count_nonzero(~dropped) < _FEWEST:
+        return False
+    clear = _without(evidence, dropped, look)
+    return len(cut_material(picture, clear, fit(clear).ring, evidence.points[run], look, dark=True).points) > 0
 
 
 def _without_gaps(chosen: Bools) -> Bools:
@@ -162,9 +175,10 @@ def _is_own_edge(points: Float64s, ring: Ring, pitch_px: float) -> bool:
     out, into = (np.maximum(way * turns_deg(path), 0.0) for way in (1.0, -1.0))
     ends = round(_SHADOW_PITCHES)
     for k in np.flatnonzero(into[ends:-ends]) + ends:
-        around = slice(k - ends, k), slice(k, k + ends + 1)
-        if into[k - ends : k + ends + 1].sum() > _DENT_DEG and min(out[part].sum() for part in around) > _OUT_DEG:
-            return False
+        less, more = sorted(out[part].sum() for part in (slice(k - ends, k), slice(k, k + ends + 1)))
+        turned = into[k - ends : k + ends + 1].sum()
+        if (turned > _DENT_DEG and less > _OUT_DEG) or (turned > 2.0 * _DENT_DEG and more > _OUT_DEG):
+            return False  # the second where a thing lies in a corner that points into the block
     return True
 
 

@@ -39,10 +39,14 @@ def picture(area: NDArray[np.float64], level: int = FILL, colour: bool = False) 
 
 
 def found(
-    area: NDArray[np.float64], image: NDArray[np.uint8], there: TableLook, gap: tuple[float, float] = GAP
+    area: NDArray[np.float64],
+    image: NDArray[np.uint8],
+    there: TableLook,
+    gap: tuple[float, float] = GAP,
+    dark: bool = False,
 ) -> EdgePoints:
     clear = replace(witnesses(BLOCK, seed=1, gaps=(gap,)), coarse=densified(BLOCK, 5.0))
-    return cut_material(image, clear, BLOCK, area[:2], there)
+    return cut_material(image, clear, BLOCK, area[:2], there, dark=dark)
 
 
 @pytest.mark.parametrize("colour", [False, True])
@@ -95,9 +99,11 @@ def test_what_sticks_out_is_none(out: float) -> None:
     assert not len(found(area, picture(area), look(BLOCK, area)).points)
 
 
-def test_what_is_darker_than_the_table_is_none() -> None:
+def test_what_is_darker_than_the_table_is_none_unless_that_is_asked() -> None:
     area = thing(*GAP)
-    assert not len(found(area, picture(area, 10), look(BLOCK, area, lighter=False)).points)
+    dark = look(BLOCK, area, lighter=False)
+    assert not len(found(area, picture(area, 10), dark).points)
+    assert len(found(area, picture(area, 10), dark, dark=True).points)
 
 
 def test_nor_is_what_the_table_does_not_follow() -> None:

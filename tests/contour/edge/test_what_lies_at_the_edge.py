@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 from contour.geometry.ring_lengths import RingLengths
+from contour.synthetic import render
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from tests.support.scenes.edge_scenes import COVERED, LONG, PITCH, at, edge_scene
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 CLEAR = (
     "",
@@ -91,6 +95,25 @@ def test_over_an_edge_from_corner_to_corner_nothing_is_bridged() -> None:
     scene = edge_scene("tape along an edge")
     assert {stretch.state for stretch in scene.hidden} == {"covered"}
     assert sum(stretch.to_px - stretch.from_px for stretch in scene.hidden) > 8 * PITCH
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("jpeg", 996_504), ("tape", 991_003)])
+def test_dark_things_cover_what_they_part_from_the_block_or_hide_in_a_corner(kind: str, seed: int) -> None:
+    """Behind a cable lies comb that touches none of the block's: it is told from it, and what lies between is not. A
+    tape hides a corner that points into the block.
+    """
+    rendered = render(shop_floor_scene(kind, seed).scene)
+    traced = trace(rendered.picture, TraceSettings())
+    assert traced.evidence is not None
+    assert "covered" in {stretch.state for stretch in traced.evidence}
+
+
+def test_comb_in_a_corner_that_the_outline_cuts_off_is_a_part_left_out() -> None:
+    """The cable is as dark as the table."""
+    left_out = edge_scene("cable across a corner").checked().disagreement
+    assert left_out is not None
+    assert left_out.pitches > 3.0
+    assert not left_out.claimed
 
 
 def test_compound_flush_with_the_cut_is_seen_and_the_outline_runs_along_it() -> None:

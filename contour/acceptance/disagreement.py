@@ -213,7 +213,8 @@ def _beyond(pieces: Bytes, ours: Bytes) -> tuple[float, tuple[float, float]]:
 
 def _cut_corners(exterior: Ring, pitch_px: float, shape: tuple[int, int], shrink: int) -> Bytes:
     """The tips of corners that edges bevel, where the edges on their sides meet: chips beside a bevel lie anywhere."""
-    even = cv2.approxPolyDP(exterior.astype(np.float32)[:, None], _EVEN_PITCHES * pitch_px, True)[:, 0]
+    closed = exterior.astype(np.float32)[:, None]
+    even = np.asarray(cv2.approxPolyDP(closed, _EVEN_PITCHES * pitch_px, True)[:, 0], np.float64)
     edges = np.roll(even, -1, axis=0) - even
     heading, long = edges[:, 0] + 1j * edges[:, 1], np.hypot(*edges.T) / pitch_px
     turn = np.angle(np.roll(heading, -1) / heading) * np.sign(signed_area(even))

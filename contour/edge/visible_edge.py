@@ -33,6 +33,7 @@ _OUT_PITCHES = 0.35
 # A shadow along less of the edge than this may be a dark thing over a corner; and a dent that a thing leaves turns in
 # by more than this, and out before and after, no farther from there.
 _SHADOW_PITCHES, _DENT_DEG, _OUT_DEG = 8.0, 60.0, 30.0
+_LEAVES_PITCHES = 0.5
 # At half a pitch a round outline of five pitches across turns by less.
 _CORNER_DEG = 15.0
 
@@ -146,12 +147,17 @@ def _unshaded(near: Bools, evidence: RingEvidence, picture: Bytes, look: TableLo
 
 
 def _flush(run: Indices, evidence: RingEvidence, picture: Bytes, look: TableLook, fit: Fit) -> bool:
-    """Whether what is dark along a run of witnesses ends on the line of the edge on both sides of the run."""
+    """Whether the outline leaves the line of the edge on both sides of a run of witnesses, and what is dark there ends
+    on that line.
+    """
     dropped = np.isin(np.arange(len(evidence.points)), run)
     if np.count_nonzero(~dropped) < _FEWEST:
         return False
-    clear = _without(evidence, dropped, look)
-    return len(cut_material(picture, clear, fit(clear).ring, evidence.points[run], look, dark=True).points) > 0
+    clear, points = _without(evidence, dropped, look), evidence.points[run]
+    ring = fit(clear).ring
+    if np.count_nonzero(np.abs(depth_inside(ring, points)) > _LEAVES_PITCHES * look.pitch_px) < _FEW:
+        return False
+    return len(cut_material(picture, clear, ring, points, look, dark=True).points) > 0
 
 
 def _without_gaps(chosen: Bools) -> Bools:

@@ -17,7 +17,7 @@ from service.web.daemon_access import DaemonAccess, DaemonSilent
 from service.web.models import TriggerRequest
 from service.web.people.lease import LEAST_WORD
 from service.web.people.pins import FREE_TRIES, FREE_TRIES_OF_ADDRESS, PeopleFile, Tries
-from service.web.tokens import (
+from service.web.people.tokens import (
     COMMANDS,
     COMMANDS_WITHIN_S,
     GUESSES,

@@ -6,7 +6,7 @@ from service.web import models
 from service.web.evidence_files import FILES, WIDTHS_PX
 from service.web.looks import endpoints as looks
 from service.web.openapi import Operation, Parameter
-from service.web.trends.models import Trends
+from service.web.trend_models import Trends
 
 MOST_JOBS = 200
 MOST_NOTES = 1000

@@ -24,7 +24,7 @@ from service.web.guard import Guard
 from service.web.html import Pages
 from service.web.http_server import http_server, listening
 from service.web.people.pins import PeopleFile
-from service.web.tokens import TokenFile, TokenFileError
+from service.web.people.tokens import TokenFile, TokenFileError
 from service.web.trends.endpoints import TrendEndpoints
 
 log = logging.getLogger("combtrace.page")

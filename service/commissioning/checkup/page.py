@@ -12,8 +12,8 @@ from service.config.config import Page
 def check_page(settings: Page) -> Iterator[CheckResult]:
     """What it is made of, its tokens, its certificate, and who could listen on the line."""
     try:
+        from service.web.people.tokens import TokenFileError
         from service.web.server import PageError, check_certificate, known_of
-        from service.web.tokens import TokenFileError
     except ModuleNotFoundError as error:
         yield fault("page", f"{error.name} is not installed", "Install combtrace[page], or remove page")
         return

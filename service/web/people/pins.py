@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.web.tokens import NAME, TokenFileError, private_text
+from service.web.people.tokens import NAME, TokenFileError, private_text
 
 PIN = re.compile(r"[0-9]{4,12}")
 LINE = re.compile(rf"({NAME})[ \t]+scrypt\$([0-9]+)\$([A-Za-z0-9+/=]+)\$([A-Za-z0-9+/=]+)")

@@ -6,7 +6,7 @@ from service.measuring.trend_file import COLUMNS
 from service.trends.history import Bucket, History
 from service.trends.kept import stamp
 from service.trends.limits import limits_of
-from service.web.trends import models
+from service.web import trend_models as models
 
 
 def answer(history: History) -> models.Trends:

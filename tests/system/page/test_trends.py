@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, expect, sync_playwright
 
 from service.cli.main import main
 from service.daemon.missed_watch import PERIOD_S
-from service.web.trends.models import Trends
+from service.web.trend_models import Trends
 from tests.support.interop.programs import node_modules
 from tests.support.processes.cell import ON_SAMPLES, SAMPLES, Cell
 from tests.support.processes.page_client import Client, token_file

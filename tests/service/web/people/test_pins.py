@@ -18,7 +18,7 @@ from service.web.people.pins import (
     Tries,
     line_of,
 )
-from service.web.tokens import TokenFileError
+from service.web.people.tokens import TokenFileError
 
 ANNA = line_of("anna", "4711")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from service.web.tokens import Rate, TokenFile, TokenFileError, network_of
+from service.web.people.tokens import Rate, TokenFile, TokenFileError, network_of
 
 GOOD = "anna 0123456789abcdefghij\n# gone: oleg\n\noleg\tABCDEFGHIJ0123456789\n"
 

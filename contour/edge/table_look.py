@@ -35,7 +35,7 @@ _SPECK_PITCHES = 1.0
 _CELL_ROOM, _GAP = 0.62, 0.2
 # Within this of a thing a shadow is that thing's own, and no more to be trusted.
 _CAST_PITCHES = 2.5
-# A shadow has no room for a disc of this radius.
+# Shadows with sharp borders are no wider than blocks are high: beside the block they have no room for such a disc.
 _WIDEST_SHADE = 3.5
 _RIM = 1.5
 _THIN = 1.5
@@ -64,7 +64,7 @@ class TableLook:
     lighter: Bools
     """Where the picture is lighter than the table."""
     shade: Bools
-    """Where it is darker in all channels, as a shadow makes a table."""
+    """Where it is darker in all channels, as a shadow makes a table, and beside the block no wider than one is."""
     away: Float32s
     """Distance of each sample from what is foreign, pixels."""
     light: Bytes
@@ -78,6 +78,12 @@ class TableLook:
         """Distance of points (N, 2), pixels, from the nearest foreign thing, shape (N,), pixels."""
         grid = samples_of(points, self.step)
         return sample_at(self.away, grid[:, 0], grid[:, 1])
+
+    def room_at(self, points: Float64s) -> Float64s:
+        """How far points (N, 2), pixels, lie within things, from what is none, shape (N,), pixels."""
+        grid = samples_of(points, self.step)
+        room = cv2.distanceTransform(self.things.astype(np.uint8), cv2.DIST_L2, 3).astype(np.float32)
+        return sample_at(room, grid[:, 0], grid[:, 1]) * self.step
 
     def table_at(self, points: Float64s) -> Bools:
         """Which points (N, 2), pixels, lie on the table, shape (N,)."""
@@ -98,9 +104,8 @@ class TableLook:
 
     @cached_property
     def lit(self) -> Bools:
-        """Where something foreign is no shadow: those with sharp borders are no wider than blocks are high."""
-        wide = _opened(self.things & self.shade, _WIDEST_SHADE * self.pitch_px / self.step)
-        return wide | _opened(self.things & ~self.shade, _THIN)
+        """Where something foreign is no shadow."""
+        return _opened(self.things & ~self.shade, _THIN)
 
     @cached_property
     def hiding(self) -> Bytes:
@@ -165,7 +170,8 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     beside_block = _long(_opened((block == 0) & ~(table | told), _BAND * samples + 0.5), _LONG_PITCHES * samples)
     every = foreign | beside_block
     mean = small if small.ndim == 2 else small.mean(axis=2).astype(np.uint8)
-    maps = light.lighter, light.shade, _away(every, step), mean, loose
+    shade = light.shade & ~_opened(every & light.shade & (block == 0), _WIDEST_SHADE * samples)
+    maps = light.lighter, shade, _away(every, step), mean, loose
     look = TableLook(table, every, every, step, pitch_px, *maps)
     if plain:
         return look

@@ -34,6 +34,8 @@ _OUT_PITCHES = 0.35
 # by more than this, and out before and after, no farther from there.
 _SHADOW_PITCHES, _DENT_DEG, _OUT_DEG = 8.0, 60.0, 30.0
 _LEAVES_PITCHES = 0.5
+# What fills cells there is so wide, so far beyond the ends of walls.
+_THING_PITCHES, _THING_ROOM = 1.0, 0.8
 # At half a pitch a round outline of five pitches across turns by less.
 _CORNER_DEG = 15.0
 
@@ -147,17 +149,19 @@ def _unshaded(near: Bools, evidence: RingEvidence, picture: Bytes, look: TableLo
 
 
 def _flush(run: Indices, evidence: RingEvidence, picture: Bytes, look: TableLook, fit: Fit) -> bool:
-    """Whether the outline leaves the line of the edge on both sides of a run of witnesses, and what is dark there ends
-    on that line.
+    """Whether the outline goes into the block from the lines of the edge on both sides of a run of witnesses, and what
+    is dark there ends on these lines.
     """
     dropped = np.isin(np.arange(len(evidence.points)), run)
-    if np.count_nonzero(~dropped) < _FEWEST:
-        return False
     clear, points = _without(evidence, dropped, look), evidence.points[run]
-    ring = fit(clear).ring
-    if np.count_nonzero(np.abs(depth_inside(ring, points)) > _LEAVES_PITCHES * look.pitch_px) < _FEW:
+    stops = float(evidence.position[run[0]]), float(evidence.position[run[-1]])
+    out = out_of_flanks(clear, stops, points, look.pitch_px)
+    if out is None or np.count_nonzero(out < -_LEAVES_PITCHES * look.pitch_px) < _FEW:
         return False
-    return len(cut_material(picture, clear, ring, points, look, dark=True).points) > 0
+    beyond = points + _THING_PITCHES * look.pitch_px * evidence.normal[run]
+    if np.count_nonzero(look.room_at(beyond) > _THING_ROOM * look.pitch_px) < _FEW:
+        return False  # cells of a dark block whose walls fade
+    return len(cut_material(picture, clear, fit(clear).ring, points, look, dark=True).points) > 0
 
 
 def _without_gaps(chosen: Bools) -> Bools:

@@ -125,9 +125,11 @@ def test_a_label_is_a_thing_where_its_border_is_sharp_and_none_where_it_fades() 
 def test_a_sharp_shadow_on_the_table_may_be_one_and_a_lighter_thing_is_none() -> None:
     place = middle_of_an_edge() - [0.0, 35.0]
 
-    def shaded(picture: Picture) -> Picture:
-        return painted(picture, square(place, 60.0), int(0.5 * np.median(picture[:40])))
+    def shaded(picture: Picture, size: float = 60.0) -> Picture:
+        return painted(picture, square(place, size), int(0.5 * np.median(picture[:40])))
 
+    wide = look_at(lambda picture: shaded(picture, 9.0 * PITCH))
+    assert not wide.in_shade(place[None]).any(), "no shadow with sharp borders is as wide"
     dark, light = look_at(shaded), look_at(lambda picture: painted(picture, square(place, 60.0), 150))
     assert dark.in_shade(place[None]).all()
     assert not dark.hiding.any()

@@ -53,6 +53,9 @@ _NORMAL = 1.96
 _OBTUSE, _INSIDE_PITCHES = (math.radians(20.0), math.radians(75.0)), 0.03
 """A corner between these turns may as well be round, where witnesses lie so far inside of it."""
 
+_SHARP, _DEEP_PITCHES = math.radians(100.0), 0.2
+"""And so may a right one, where they lie as far inside as this."""
+
 _HALVINGS = 24
 _REACH = np.linspace(0.0, 6.0, 601)
 _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
@@ -235,12 +238,14 @@ def _blunt_corners(evidence: RingEvidence, fitted: FittedRing, on_line: Indices,
     heading = edges[:, 0] + 1j * edges[:, 1]
     turn = np.angle(heading / np.roll(heading, 1))
     feet = lengths.feet(evidence.points)
-    inside = ~fitted.inlier & (fitted.residual < -_INSIDE_PITCHES * pitch_px)
-    for corner in np.flatnonzero((np.abs(turn) > _OBTUSE[0]) & (np.abs(turn) < _OBTUSE[1])):
+    inside = np.where(fitted.inlier, 0.0, -fitted.residual)
+    for corner in np.flatnonzero((np.abs(turn) > _OBTUSE[0]) & (np.abs(turn) < _SHARP)):
         ahead = (feet - lengths.starts[corner]) % lengths.length
         after, before = on_line[ahead[on_line].argmin()], on_line[ahead[on_line].argmax()]
         reach = ahead[after], lengths.length - ahead[before]
-        if np.any(inside & ((ahead < reach[0]) | (lengths.length - ahead < reach[1]))):
+        between = (ahead < reach[0]) | (lengths.length - ahead < reach[1])
+        least = _INSIDE_PITCHES if abs(turn[corner]) < _OBTUSE[1] else _DEEP_PITCHES
+        if np.any(between & (inside > least * pitch_px)):
             passed = 0.5 * sum(reach) * math.tan(abs(turn[corner]) / 4.0)
             stretch = int(np.searchsorted(on_line, before))
             found[stretch] = max(found[stretch], min(passed, _CAP_PITCHES * pitch_px))

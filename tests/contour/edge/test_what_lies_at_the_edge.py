@@ -108,6 +108,13 @@ def test_dark_things_cover_what_they_part_from_the_block_or_hide_in_a_corner(kin
     assert "covered" in {stretch.state for stretch in traced.evidence}
 
 
+def test_a_coarse_outline_that_is_only_to_be_shown_is_said_to_reach_the_frame() -> None:
+    """A hand brings the coarse block to the picture's border, and the outline ends some pixels before it."""
+    traced = trace(render(shop_floor_scene("hand_or_cable", 1_003_002).scene).picture, TraceSettings())
+    assert traced.uncertainty_px is None
+    assert traced.reaches_frame
+
+
 def test_comb_in_a_corner_that_the_outline_cuts_off_is_a_part_left_out() -> None:
     """The cable is as dark as the table."""
     left_out = edge_scene("cable across a corner").checked().disagreement

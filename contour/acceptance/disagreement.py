@@ -18,7 +18,7 @@ import numpy as np
 from contour.acceptance.block_level import exclusive_levels
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median, quantile
 from contour.geometry.rings import Contour, Ring, signed_area
-from contour.image.opencv import pieces_and_areas
+from contour.image.opencv import fewer_vertices, pieces_and_areas
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
 _PITCH_PX = 6
@@ -87,7 +87,8 @@ def disagreement(
         there = cv2.resize(flat, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
         filled = cv2.dilate(there, _disc(_BLUR_PITCHES * small_pitch_px * 2)) > 0
         busy = np.asarray(np.where(filled, ours, busy), np.uint8)
-    cut_off = _but(busy & _cut_corners(contour.exterior, pitch_px, busy.shape[:2], shrink), ours)
+    tips = [samples_of(tip, shrink) for tip in _cut_tips(contour.exterior, pitch_px)]
+    in_tips = _beyond(busy, ours, tips, small_pitch_px)
     if loose is not None:
         beside = cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
         busy = _but(busy, _but(np.asarray(beside * np.uint8(255), np.uint8), ours))
@@ -108,7 +109,7 @@ def disagreement(
     farthest = [
         (*_widest(_but(ours, busy)), True),
         (*_widest(_but(theirs, around)), False),
-        (*_beyond(_opened(cut_off, _disc(_LEAST_PIECE * small_pitch_px)), ours), False),
+        (*in_tips, False),
         (*_farthest(outside, points, 0.0), True),
         (*_farthest(inside, points, _BLUR_PITCHES * small_pitch_px), False),
     ]
@@ -204,21 +205,28 @@ def _widest(difference: Bytes) -> tuple[float, tuple[float, float]]:
     return 2.0 * float(depth[y, x]), (float(x), float(y))
 
 
-def _beyond(pieces: Bytes, ours: Bytes) -> tuple[float, tuple[float, float]]:
-    """How far the farthest place of pieces lies from ours, in pixels, and that place (x, y)."""
+def _beyond(busy: Bytes, ours: Bytes, tips: list[Ring], small_pitch_px: float) -> tuple[float, tuple[float, float]]:
+    """How far the farthest busy place in the tips lies from ours, in pixels, and that place (x, y)."""
+    if not tips:
+        return 0.0, (0.0, 0.0)
+    within = np.zeros(busy.shape, np.uint8)
+    for tip in tips:
+        cv2.fillPoly(within, [_fixed_point(tip)], 255, cv2.LINE_8, _FRACTION_BITS)
+    pieces = _opened(_but(busy & within, ours), _disc(_LEAST_PIECE * small_pitch_px))
     away = np.where(pieces > 0, cv2.distanceTransform(_inverted(ours), cv2.DIST_L2, 3), 0.0)
     y, x = np.unravel_index(int(away.argmax()), away.shape)
     return float(away[y, x]), (float(x), float(y))
 
 
-def _cut_corners(exterior: Ring, pitch_px: float, shape: tuple[int, int], shrink: int) -> Bytes:
-    """The tips of corners that edges bevel, where the edges on their sides meet: chips beside a bevel lie anywhere."""
-    closed = exterior.astype(np.float32)[:, None]
-    even = np.asarray(cv2.approxPolyDP(closed, _EVEN_PITCHES * pitch_px, True)[:, 0], np.float64)
+def _cut_tips(exterior: Ring, pitch_px: float) -> list[Ring]:
+    """The tips of corners that edges bevel, where the edges on their sides meet, triangles (3, 2) in pixels: chips
+    beside a bevel lie anywhere.
+    """
+    even = fewer_vertices(exterior, _EVEN_PITCHES * pitch_px)
     edges = np.roll(even, -1, axis=0) - even
     heading, long = edges[:, 0] + 1j * edges[:, 1], np.hypot(*edges.T) / pitch_px
     turn = np.angle(np.roll(heading, -1) / heading) * np.sign(signed_area(even))
-    mask = np.zeros(shape, np.uint8)
+    tips = []
     for k in range(len(even)):
         first, last = (k - 1) % len(even), (k + 1) % len(even)
         turns = turn[first], turn[k]
@@ -229,9 +237,8 @@ def _cut_corners(exterior: Ring, pitch_px: float, shape: tuple[int, int], shrink
         corner = even[k] + reach * edges[first] / (long[first] * pitch_px)
         legs = np.array([even[k], even[last]]) - corner
         legs *= np.minimum(1.0, _TIP_PITCHES * pitch_px / np.hypot(*legs.T))[:, None]
-        beyond = _fixed_point(samples_of(np.array([corner, *(corner + legs)]), shrink))
-        cv2.fillPoly(mask, [beyond], 255, cv2.LINE_8, _FRACTION_BITS)
-    return mask
+        tips.append(np.array([corner, *(corner + legs)]))
+    return tips
 
 
 def _reduced_points(contour: Contour, spacing_px: float, shrink: int) -> Float64s:

@@ -15,6 +15,7 @@ import numpy as np
 from contour.geometry.arrays import Bytes, Float64s, Indices
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring
+from contour.image.opencv import fewer_vertices
 
 # All in cell pitches. Narrower than this at its foot, farther out than that.
 _WIDTH, _DEPTH = 5.0, 0.75
@@ -117,7 +118,7 @@ def _narrow_parts(
 
 def _steps(ring: Ring, pitch_px: float) -> list[NarrowFeature]:
     """Low steps out of an edge that end in a corner soon."""
-    even = cv2.approxPolyDP(ring.astype(np.float32)[:, None], _EVEN * pitch_px, True)[:, 0].astype(np.float64)
+    even = fewer_vertices(ring, _EVEN * pitch_px)
     # Either way around; a contour in pixels has the block on its left as seen with y down: it turns left at corners.
     mirrored = np.stack([-even[::-1, 0], even[::-1, 1]], axis=1)
     return _steps_along(even, pitch_px) + [

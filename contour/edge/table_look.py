@@ -170,7 +170,8 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     beside_block = _long(_opened((block == 0) & ~(table | told), _BAND * samples + 0.5), _LONG_PITCHES * samples)
     every = foreign | beside_block
     mean = small if small.ndim == 2 else small.mean(axis=2).astype(np.uint8)
-    shade = light.shade & ~_opened(every & light.shade & (block == 0), _WIDEST_SHADE * samples)
+    shade = light.shade
+    shade &= ~_opened(every & shade & (block == 0), _WIDEST_SHADE * samples)
     maps = light.lighter, shade, _away(every, step), mean, loose
     look = TableLook(table, every, every, step, pitch_px, *maps)
     if plain:

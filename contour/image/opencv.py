@@ -170,6 +170,23 @@ def region_boxes_and_areas(mask: Bytes) -> tuple[Int32s, Int32s]:
     return table[:, :4], table[:, cv2.CC_STAT_AREA]
 
 
+def closed_by_disc(mask: Bytes, radius: float) -> Bytes:
+    """A mask of 0 and 1, (H, W), closed with a disc, by two distance transforms; nothing lies beyond its border."""
+    pad = int(radius) + 2
+    wide = cv2.copyMakeBorder(mask, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
+    grown = (cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5) <= radius).astype(np.uint8)
+    shrunk = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > radius).astype(np.uint8)
+    return np.asarray(shrunk[pad:-pad, pad:-pad] | mask, np.uint8)
+
+
+def fewer_vertices(ring: Float64s, off: float) -> Float64s:
+    """Vertices of a closed ring, (N, 2), between which the others lie within `off` of straight lines, (K, 2), in single
+    precision (Douglas, Peucker 1973).
+    """
+    kept = cv2.approxPolyDP(ring.astype(np.float32)[:, None], off, True)
+    return np.asarray(kept[:, 0], np.float64)
+
+
 def bgr(picture: Bytes) -> Bytes:
     """A BGR copy of a grey or BGR picture."""
     return cast(Bytes, cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)) if picture.ndim == 2 else picture.copy()

@@ -237,9 +237,12 @@ def _blunt_corners(evidence: RingEvidence, fitted: FittedRing, on_line: Indices,
     edges = np.roll(ring, -1, axis=0) - ring
     heading = edges[:, 0] + 1j * edges[:, 1]
     turn = np.angle(heading / np.roll(heading, 1))
+    corners = np.flatnonzero((np.abs(turn) > _OBTUSE[0]) & (np.abs(turn) < _SHARP))
+    if not len(corners):
+        return found
     feet = lengths.feet(evidence.points)
     inside = np.where(fitted.inlier, 0.0, -fitted.residual)
-    for corner in np.flatnonzero((np.abs(turn) > _OBTUSE[0]) & (np.abs(turn) < _SHARP)):
+    for corner in corners.tolist():
         ahead = (feet - lengths.starts[corner]) % lengths.length
         after, before = on_line[ahead[on_line].argmin()], on_line[ahead[on_line].argmax()]
         reach = ahead[after], lengths.length - ahead[before]

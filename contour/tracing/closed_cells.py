@@ -15,7 +15,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, median
 from contour.geometry.rings import Contour, Ring
-from contour.image.opencv import pieces_and_areas
+from contour.image.opencv import fewer_vertices, pieces_and_areas
 from contour.image.pixel_sampling import sample_at
 from contour.image.side_by_side import side_by_side
 from contour.tracing.leaking_cells import leaking_cells
@@ -282,8 +282,7 @@ def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s, cuts: Float64s
     widths = 2.0 * levels[behind[:, 1], behind[:, 0]] / np.maximum(steepest, 1.0)
     # One run along a cut is straight from its first point to its last.
     moved = moved[seen | np.roll(seen, 1) | np.roll(seen, -1)]
-    simple = cv2.approxPolyDP(moved.astype(np.float32)[:, None, :], _SIMPLE_PX, True)[:, 0, :]
-    return np.asarray(simple, np.float64), widths
+    return fewer_vertices(moved, _SIMPLE_PX), widths
 
 
 def _on_cuts(points: Float64s, cuts: Float64s) -> tuple[Float64s, Bools]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s, median
 from contour.geometry.rings import Ring
+from contour.image.opencv import closed_by_disc
 from contour.tracing.closed_cells import MaterialEdge, closed_along
 from contour.tracing.cut_lines import straight_cuts
 from contour.tracing.trace import Edge
@@ -105,9 +106,8 @@ def _bays(region: Bytes, least: float, pitch_px: float) -> tuple[Float64s, Float
     """
     radius = _BAY_PITCHES * pitch_px
     pad = int(radius) + 2
-    wide = cv2.copyMakeBorder(region, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
-    grown = (cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5) <= radius).astype(np.uint8)
-    closed = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > radius).astype(np.uint8)
+    wide = np.pad(region, pad)
+    closed = closed_by_disc(wide, radius)
     bays = ((closed > 0) & (wide == 0)).astype(np.uint8)
     outside = ((closed == 0) & (wide == 0)).astype(np.uint8)
     by_outside = cv2.dilate(outside, np.ones((3, 3), np.uint8))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -53,16 +54,17 @@ def wall_tips(
             f"binarize is {settings.binarize!r}, but wall-tips finds its own threshold; use flat, or another method"
         )
     light = wall_light(picture)
+    solid = _Solid(picture, light, settings.polarity, on_stage)
     if settings.edge == "cells":
-        return _closed_cells(picture, light, settings, on_stage)
+        return solid.closed()
     seen, look = looked_at(picture, light, settings, on_stage)
-    plate = _plate(picture, light, settings, on_stage, seen)
+    plate = _plate(solid, seen) if settings.edge == "auto" else None
     if isinstance(plate, Trace):
         return plate
     if plate is not None:
         seen = plate
     if may_be_closed(seen):
-        closed, kind = _if_closed(picture, light, settings, on_stage, seen)
+        closed, kind = _if_closed(solid, seen)
         # Where something hides the border no walls end either.
         if kind != "mixed" or not doubtful(seen.rings[0], look).any():
             check_promise(settings.edge, kind, traced=closed is not None)
@@ -76,7 +78,7 @@ def wall_tips(
         if settings.edge == "cut":
             raise
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
-        closed, _ = _if_closed(picture, light, settings, on_stage, seen)
+        closed, _ = _if_closed(solid, seen)
         if closed is None:
             raise
         return closed
@@ -176,35 +178,79 @@ def _trace(seen: BlockEvidence, contour: Contour, light: Bytes, *, uncertainty_p
     )
 
 
-def _if_closed(
-    picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage, seen: BlockEvidence
-) -> tuple[Trace | None, Edge]:
+@dataclass(frozen=True, eq=False)
+class _Solid:
+    """A picture's material with the cells that it closes; each part is looked for once, when it is first asked for."""
+
+    picture: Bytes
+    light: Bytes
+    polarity: str
+    on_stage: OnStage
+
+    @cached_property
+    def cells(self) -> CellScale:
+        """Raises NoBlockFound."""
+        return probe(self.light, self.polarity)
+
+    @cached_property
+    def walls(self) -> Bytes:
+        """The mask of the walls, (H, W); raises NoBlockFound."""
+        cells = self.cells
+        return wall_mask(self.light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
+
+    @cached_property
+    def edge(self) -> MaterialEdge:
+        """Raises NoBlockFound."""
+        return material_edge(self.picture, self.cells.pitch_px, self.walls)
+
+    def closed(self) -> Trace:
+        """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
+        _ = self.walls
+        self.on_stage("mask")
+        check_closed(self.edge.contour.exterior, self.cells.pitch_px, self.cells.wall_px)
+        return self.around(self.edge)
+
+    def around(self, outline: MaterialEdge) -> Trace:
+        """The trace of such an outline."""
+        others = pieces_beside(self.walls, outline.contour.exterior, self.cells.pitch_px)
+        self.on_stage("trace")
+        return Trace(
+            "wall-tips",
+            "bright" if self.cells.bright else "dark",
+            self.cells.pitch_px,
+            outline.contour,
+            self.light,
+            uncertainty_px=outline.bound_px,
+            others=others,
+            edge="cells",
+        )
+
+
+def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
     """The boundary of a block with closed border cells, some of them opened by straight cuts; None where it was cut
     otherwise or nothing tells it from the table. And which kind of border it is.
     """
-    cells, walls = _cells_and_walls(light, settings)
+    cells, _ = solid.cells, solid.walls
     try:
-        material = material_edge(picture, cells.pitch_px, walls)
+        material = solid.edge
     except NoBlockFound:
         return None, "cut"
     kind = edge_kind(material, seen)
     found = {"cells": material, "mixed": with_cuts(material, seen) if kind == "mixed" else None, "cut": None}[kind]
     if found is None:
         return None, kind
-    return replace(_around(found, light, cells, walls, on_stage), comb=cells.comb, edge=kind), kind
+    return replace(solid.around(found), comb=cells.comb, edge=kind), kind
 
 
-def _plate(
-    picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage, seen: BlockEvidence
-) -> Trace | BlockEvidence | None:
+def _plate(solid: _Solid, seen: BlockEvidence) -> Trace | BlockEvidence | None:
     """The outline of a perforated sheet; what is seen of it, as of a sheet, where it was cut along more than one line;
     None where it is none.
     """
-    if settings.edge != "auto" or not like_plate(seen.comb):
+    if not like_plate(seen.comb):
         return None
-    cells, walls = _cells_and_walls(light, settings)
+    cells, _ = solid.cells, solid.walls
     try:
-        found = plate_edge(material_edge(picture, cells.pitch_px, walls), cells.pitch_px)
+        found = plate_edge(solid.edge, cells.pitch_px)
     except NoBlockFound:
         return None
     if found is None:
@@ -213,36 +259,7 @@ def _plate(
     outline, edge = found
     if outline is None:
         return replace(seen, comb=comb)
-    return replace(_around(outline, light, cells, walls, on_stage), comb=comb, edge=edge)
-
-
-def _closed_cells(picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage) -> Trace:
-    """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
-    cells, walls = _cells_and_walls(light, settings)
-    on_stage("mask")
-    material = material_edge(picture, cells.pitch_px, walls)
-    check_closed(material.contour.exterior, cells.pitch_px, cells.wall_px)
-    return _around(material, light, cells, walls, on_stage)
-
-
-def _cells_and_walls(light: Bytes, settings: TraceSettings) -> tuple[CellScale, Bytes]:
-    cells = probe(light, settings.polarity)
-    return cells, wall_mask(light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
-
-
-def _around(material: MaterialEdge, light: Bytes, cells: CellScale, walls: Bytes, on_stage: OnStage) -> Trace:
-    others = pieces_beside(walls, material.contour.exterior, cells.pitch_px)
-    on_stage("trace")
-    return Trace(
-        "wall-tips",
-        "bright" if cells.bright else "dark",
-        cells.pitch_px,
-        material.contour,
-        light,
-        uncertainty_px=material.bound_px,
-        others=others,
-        edge="cells",
-    )
+    return replace(solid.around(outline), comb=comb, edge=edge)
 
 
 def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:

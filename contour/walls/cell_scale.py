@@ -13,7 +13,7 @@ from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.opencv import pieces_and_areas
 from contour.image.side_by_side import side_by_side
-from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb, triangle_order
+from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
 from contour.walls.wall_mask import wall_mask
 
 _TILE_PX = 512
@@ -217,8 +217,7 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None
         # The darker part of what is free, for a lighter table may lie in it too (of the lighter part for dark walls).
         quantile(light[mask == 0][::7], 0.3 if bright else 0.7),
         lambda: (
-            lattice_order(places[regular], size),
-            triangle_order(places[regular]),
+            *lattice_order(places[regular], size),
             solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
         ),
     )

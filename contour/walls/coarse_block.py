@@ -7,7 +7,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Int32s, median
-from contour.image.opencv import pieces_and_areas
+from contour.image.opencv import closed_by_disc, pieces_and_areas
 from contour.image.pixel_grid import averaged
 from contour.walls.coarse_rings import PAD, CoarseBlock, sides, with_rings
 
@@ -53,7 +53,7 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
     pieces = np.asarray(labels, np.int32), np.asarray(stats, np.int32)
     kept = _main_piece(pieces, samples)
-    filled, kept = _linked(pieces, kept, _close(kept, _CLOSING_PITCHES * samples), samples)
+    filled, kept = _linked(pieces, kept, closed_by_disc(kept, _CLOSING_PITCHES * samples), samples)
     filled = without_threads(_largest(filled | kept), samples)
     kept &= filled
     shade = _padded(averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
@@ -91,15 +91,6 @@ def _main_piece(pieces: Pieces, samples: float) -> Bytes:
     touching = np.bincount(beside, minlength=len(area)) >= _CONTACTS
     kept = large & touching
     return np.asarray((main | kept[labels]).astype(np.uint8), np.uint8)
-
-
-def _close(walls: Bytes, radius: float) -> Bytes:
-    """Closing with a disc, by two distance transforms."""
-    pad = int(radius) + 2
-    wide = cv2.copyMakeBorder(walls, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
-    grown = (cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5) <= radius).astype(np.uint8)
-    shrunk = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > radius).astype(np.uint8)
-    return np.asarray(shrunk[pad:-pad, pad:-pad] | walls, np.uint8)
 
 
 def _linked(pieces: Pieces, kept: Bytes, filled: Bytes, samples: float) -> tuple[Bytes, Bytes]:

@@ -103,28 +103,20 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
     return None
 
 
-def lattice_order(places: Float64s, pitch_px: float) -> float:
+def lattice_order(places: Float64s, pitch_px: float) -> tuple[float, float]:
     """Share of cells with neighbours all around, 0 to 1; centroids of cells (N, 2), pixels: four or more about a pitch
-    away, or three nearer ones and then six, as triangles have.
+    away, or three nearer ones and then six, as triangles have. And the share of those alone that are like triangles.
     """
-    square = _squared_distances(places) / pitch_px**2
+    near = np.abs(places[_spread(len(places))][:, None, :] - places[None, :, :])
+    distances = near[:, :, 0] ** 2 + near[:, :, 1] ** 2
+    square = distances / pitch_px**2
 
     def between(low: float, high: float) -> Indices:
         return np.asarray(((square > low**2) & (square < high**2)).sum(axis=1), np.intp)
 
     around = between(*_NEIGHBOUR_PITCHES) >= _NEIGHBOURS
-    return max(float(np.mean(around)), triangle_order(places))
-
-
-def triangle_order(places: Float64s) -> float:
-    """Share of cells with the neighbours that triangles have, 0 to 1; centroids of cells (N, 2), pixels."""
-    return float(np.mean(_among_triangles(_squared_distances(places))))
-
-
-def _squared_distances(places: Float64s) -> Float64s:
-    """From some of the places to all of them, (M, N)."""
-    near = np.abs(places[_spread(len(places))][:, None, :] - places[None, :, :])
-    return np.asarray(near[:, :, 0] ** 2 + near[:, :, 1] ** 2, np.float64)
+    triangles = float(np.mean(_among_triangles(distances)))
+    return max(float(np.mean(around)), triangles), triangles
 
 
 def _among_triangles(square: Float64s) -> Bools:

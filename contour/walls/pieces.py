@@ -9,6 +9,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Int32s, Int64s
 from contour.geometry.rings import Ring
+from contour.image.opencv import closed_by_disc
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 from contour.walls.coarse_rings import CoarseBlock
 
@@ -156,6 +157,4 @@ def _filled(walls: Bools, samples: float) -> Bools | None:
     cells[[0, labels[0, 0]]] = False
     if np.count_nonzero(cells) < _FEWEST_CELLS:
         return None
-    grown = (cv2.distanceTransform(free, cv2.DIST_L2, 5) <= _CLOSING_PITCHES * samples).astype(np.uint8)
-    filled = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > _CLOSING_PITCHES * samples) | (free == 0)
-    return np.asarray(filled[pad:-pad, pad:-pad])
+    return closed_by_disc(walls.astype(np.uint8), _CLOSING_PITCHES * samples) > 0

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import random
 import sqlite3
 import statistics
@@ -22,13 +21,13 @@ from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
+from service.low_priority import go_last
 from service.reasons import Language, Outcome
 from service.records.job import Progress, Terms, TriggerStamp
 from service.records.journal import Journal
 from service.records.journal_reader import reading
 from service.trends.documents import trends_page
 from service.trends.history import Span, history
-from service.web.trends.endpoints import NICENESS
 
 SPANS_DAYS = (1, 7, 30, 365)
 YEAR = timedelta(days=365)
@@ -94,7 +93,7 @@ def beside(path: Path, end: datetime) -> tuple[list[float], list[float]]:
     stop, go = threading.Event(), threading.Event()
 
     def look() -> None:
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+        go_last()
         while not stop.is_set():
             go.wait()
             with reading(path) as journal:

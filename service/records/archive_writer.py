@@ -8,7 +8,6 @@ restart came in between, and pictures and exports are made. What does not fit th
 from __future__ import annotations
 
 import logging
-import os
 import queue
 import threading
 from collections.abc import Callable, Collection, Iterator
@@ -22,6 +21,7 @@ import cv2
 
 from contour.errors import PictureError
 from service.export.recipe_exports import exports_of
+from service.low_priority import go_last
 from service.malloc import give_back
 from service.measuring.table_file import TableRecord, table_bytes
 from service.records.archive import DRAFT, PLAIN_FRAME, Archive, ArchiveError
@@ -44,7 +44,6 @@ from service.records.journal_file import JournalError
 log = logging.getLogger("combtrace.archive")
 
 DEPTH = 4  # frames that may wait: a burst of jobs; each may be tens of megabytes
-NICENESS = 10  # the next job goes before the last one's picture
 CLOSE_BOUND_S = 10.0
 GIVEN_BACK_EVERY = (
     200  # jobs; frames and their copies are the largest that a job leaves behind in the allocator's heaps
@@ -145,7 +144,7 @@ class ArchiveWriter:
         self._thread.join(bound_s)
 
     def _run(self) -> None:
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+        go_last()
         self._tell(self._complete_drafts)
         while True:
             evidence = self._queue.get()

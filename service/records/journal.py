@@ -17,7 +17,7 @@ from drivers.controller.mailbox.pages import Page
 from service.link.job_numbers import LARGEST_JOB
 from service.reasons import Outcome, Reason
 from service.records.job import Job, Progress, Terms, TriggerStamp
-from service.records.journal_file import LARGEST_OWNER, JournalDamaged, JournalError, JournalFile
+from service.records.journal_file import LARGEST_OWNER, JournalDamaged, JournalError, JournalFile, stamp
 from service.records.journal_restart import GoneOn, go_on_above, last_pair, restore
 from service.records.journal_schema import COLUMNS, UNSETTLED
 
@@ -251,7 +251,7 @@ class Journal:
         return tuple(job_of(row) for row in rows)
 
     def _stamp(self) -> str:
-        return self._now().isoformat(timespec="milliseconds")
+        return stamp(self._now())
 
 
 def _texts(known: Progress) -> tuple[str, str | None]:

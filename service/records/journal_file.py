@@ -11,6 +11,7 @@ import sqlite3
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 
 from service.records.journal_schema import SCHEMA_VERSION, TABLES, migration
@@ -30,6 +31,11 @@ class JournalFull(JournalError):
 
 class JournalDamaged(JournalError):
     """The file is there, may be read and written, and is no sound journal."""
+
+
+def stamp(time: datetime) -> str:
+    """As the journal writes times: they sort as text."""
+    return time.astimezone(UTC).isoformat(timespec="milliseconds")
 
 
 def readable_text(stored: bytes) -> str:

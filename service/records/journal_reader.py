@@ -7,7 +7,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 from service.reasons import Outcome, Reason
 from service.records.job import Job
 from service.records.journal import job_of
-from service.records.journal_file import JournalDamaged, readable_text
+from service.records.journal_file import JournalDamaged, readable_text, stamp
 from service.records.journal_schema import SCHEMA_VERSION, columns
 
 BUSY_S = 5.0
@@ -55,7 +55,7 @@ class JobFilter:
         """As SQL, with its values."""
         wanted: list[tuple[str, tuple[Any, ...]]] = []
         if self.since is not None:  # the journal's times are UTC in one form, so they sort as text
-            wanted.append(("taken_at >= ?", (self.since.astimezone(UTC).isoformat(timespec="milliseconds"),)))
+            wanted.append(("taken_at >= ?", (stamp(self.since),)))
         if self.outcome is not None:
             wanted.append(("outcome = ?", (str(self.outcome),)))
         if self.reason is not None:

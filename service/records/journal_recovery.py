@@ -18,7 +18,7 @@ from typing import Any
 from service.link.job_numbers import LARGEST_JOB
 from service.reasons import Reason
 from service.records.journal import Journal
-from service.records.journal_file import JournalDamaged, JournalError, readable_text
+from service.records.journal_file import JournalDamaged, JournalError, readable_text, stamp
 from service.records.journal_restart import RESTORED
 from service.records.journal_schema import UNSETTLED
 
@@ -164,7 +164,7 @@ def _sound(row: tuple[Any, ...]) -> tuple[Any, ...]:
     try:
         datetime.fromisoformat(str(columns[1]))
     except ValueError:
-        columns[1] = datetime.fromtimestamp(0, UTC).isoformat(timespec="milliseconds")
+        columns[1] = stamp(datetime.fromtimestamp(0, UTC))
     try:
         target = target if isinstance(json.loads(target or "{}"), dict) else None
     except ValueError:

@@ -15,8 +15,8 @@ from typing import Any
 
 from service.measuring.trend_file import COLUMNS, TrendLine
 from service.reasons import Outcome
+from service.records.journal_file import stamp
 from service.records.journal_reader import JournalReader
-from service.trends.kept import stamp
 
 QUANTITIES = {
     "uncertainty_mm": "$.uncertainty_mm",

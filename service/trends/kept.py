@@ -6,11 +6,12 @@ import sqlite3
 from collections import Counter
 from collections.abc import Mapping
 from contextlib import closing
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 
 from service.measuring.trend_file import COLUMNS, TrendLine
 from service.records.journal import Journal
+from service.records.journal_file import stamp
 from service.records.journal_schema import SCHEMA_VERSION
 
 TAKEN = "taken"
@@ -23,11 +24,6 @@ BUSY_S = 5.0
 
 class NotKept(Exception):
     """A check is not in the journal: why, and what to do."""
-
-
-def stamp(time: datetime) -> str:
-    """As the journal writes times: they sort as text."""
-    return time.astimezone(UTC).isoformat(timespec="milliseconds")
 
 
 def keep_check(path: Path, line: TrendLine) -> None:

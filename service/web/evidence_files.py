@@ -6,7 +6,6 @@ No part of a path comes from a request: a job is a number, and a file one of FIL
 from __future__ import annotations
 
 import asyncio
-import os
 import threading
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.export.forms import ENDINGS
+from service.low_priority import go_last
 from service.records.archive import folder_of
 from service.records.evidence import FRAME, OVERLAY
 from service.records.job import Job
@@ -30,7 +30,6 @@ FILES = {
 }
 WIDTHS_PX = (320, 1600)
 JPEG_QUALITY = 82
-NICENESS = 10  # a job goes before a look at one
 MOST_KEPT_BYTES = 16_000_000
 
 
@@ -110,11 +109,6 @@ class Pictures:
 def tag_of(path: Path) -> str:
     """What changes when the file does."""
     return f"{path.stat().st_mtime_ns:x}"
-
-
-def go_last() -> None:
-    """Have this thread take the processor after all that is for jobs."""
-    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
 
 
 def _read(frame: Path) -> NDArray[np.uint8]:

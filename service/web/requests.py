@@ -21,10 +21,16 @@ def address_of(request: Request) -> str:
 
 def job_number(request: Request) -> int:
     """The job of its path; raise RequestRefused."""
-    text = request.path_params["job"]
-    if not (text.isascii() and text.isdecimal() and len(text) <= 10 and 0 < int(text) <= LARGEST_JOB):
+    number = whole(request.path_params["job"], LARGEST_JOB, digits=10)
+    if number is None:
         raise RequestRefused(404, "a job is a number from 1 on")
-    return int(text)
+    return number
+
+
+def whole(text: str, most: int, digits: int = 16) -> int | None:
+    """The whole number from 1 to `most` that a text of so many digits at most is, None where it is none."""
+    fits = text.isascii() and text.isdecimal() and len(text) <= digits and 1 <= int(text) <= most
+    return int(text) if fits else None
 
 
 def whole_number(request: Request, name: str, most: int, otherwise: int | None) -> int | None:
@@ -32,9 +38,10 @@ def whole_number(request: Request, name: str, most: int, otherwise: int | None) 
     text = request.query_params.get(name)
     if text is None:
         return otherwise
-    if not (text.isascii() and text.isdecimal() and len(text) <= 16 and 1 <= int(text) <= most):
+    number = whole(text, most)
+    if number is None:
         raise RequestRefused(400, f"{name} is {text[:20]!r}, expected a whole number from 1 to {most}")
-    return int(text)
+    return number
 
 
 def truth(request: Request, name: str) -> bool:

@@ -11,7 +11,7 @@ from service.web.commands import RequestRefused
 from service.web.looks.live_looks import LiveLooks
 from service.web.looks.models import LiveAnswer
 from service.web.openapi import Operation, Parameter
-from service.web.requests import whole_number
+from service.web.requests import whole, whole_number
 
 LARGEST_LOOK = 2**53 - 1
 
@@ -52,9 +52,7 @@ class LookEndpoints:
 
     async def picture(self, request: Request) -> Response:
         """A look's frame."""
-        text = request.path_params["look"]
-        number = int(text) if text.isascii() and text.isdecimal() and len(text) <= 16 else 0
-        found = self._looks.picture(number)
+        found = self._looks.picture(whole(request.path_params["look"], LARGEST_LOOK) or 0)
         if found is None:
             raise RequestRefused(404, "that look is not kept. Ask /api/v1/live for the newest")
         # A look's number never comes again, so that the page may load it first and draw it then.

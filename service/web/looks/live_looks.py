@@ -16,10 +16,12 @@ from contour.image.picture_figures import PictureFigures
 from service.jobs.cycle_terms import Plan
 from service.jobs.live_view import LiveView, Look, Sight
 from service.jobs.spare_camera import LookSources, NobodyLooks, SpareCamera
+from service.low_priority import go_last
 from service.records.archived_job import ArchivedJob
 from service.records.evidence import calibration_fields, measurement_fields
+from service.records.journal_file import stamp
 from service.web.drawing import drawing
-from service.web.evidence_files import go_last, made_small
+from service.web.evidence_files import made_small
 from service.web.looks.models import LiveAnswer, LiveLook, LookFigures, LookFinding
 from service.web.models import Drawing, RecipeName
 
@@ -119,7 +121,7 @@ class LiveLooks:
         number = max(self._number + 1, time.time_ns() // 1_000_000)  # none of before a restart comes again
         shown = LiveLook(
             number=number,
-            at=datetime.now(UTC).isoformat(timespec="milliseconds"),
+            at=stamp(datetime.now(UTC)),
             recipe=RecipeName(number=recipe.number, name=recipe.name),
             findings=[
                 LookFinding(code=int(reason), name=reason.label, text=text)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.web.people.tokens import NAME, TokenFileError, private_text
+from service.web.people.tokens import NAME, TokenFileError, private_lines
 
 PIN = re.compile(r"[0-9]{4,12}")
 LINE = re.compile(rf"({NAME})[ \t]+scrypt\$([0-9]+)\$([A-Za-z0-9+/=]+)\$([A-Za-z0-9+/=]+)")
@@ -81,10 +81,8 @@ class PeopleFile:
     def read(self) -> list[Person]:
         """Everybody; raise TokenFileError."""
         people: list[Person] = []
-        for number, line in enumerate(private_text(self.path, WHAT).splitlines(), 1):
-            if not line.strip() or line.lstrip().startswith("#"):
-                continue
-            entry = LINE.fullmatch(line.strip())
+        for number, line in private_lines(self.path, WHAT):
+            entry = LINE.fullmatch(line)
             if entry is None:
                 raise TokenFileError(f"{self.path}: line {number} is not {WHAT}")
             people.append(self._person(entry, number))

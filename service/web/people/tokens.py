@@ -47,12 +47,9 @@ class TokenFile:
 
     def read(self) -> list[tuple[str, bytes]]:
         """Each person's name and the digest of the token; raise TokenFileError. No message shows a token."""
-        lines = private_text(self.path, WHAT).splitlines()
         holders: list[tuple[str, bytes]] = []
-        for number, line in enumerate(lines, 1):
-            if not line.strip() or line.lstrip().startswith("#"):
-                continue
-            entry = LINE.fullmatch(line.strip())
+        for number, line in private_lines(self.path, WHAT):
+            entry = LINE.fullmatch(line)
             if entry is None:
                 raise TokenFileError(f"{self.path}: line {number} is not 'name token', the name of A-Z a-z 0-9 _ . @ -")
             if len(entry[2]) < LEAST_TOKEN:
@@ -68,8 +65,15 @@ class TokenFile:
         return holders
 
 
-def private_text(path: Path, what: str) -> str:
-    """What a file says that only its owner may read; raise TokenFileError. what: is to be in it."""
+def private_lines(path: Path, what: str) -> list[tuple[int, str]]:
+    """Lines, numbered from 1, of a file that only its owner may read, without empty ones and those that begin with #;
+    raise TokenFileError. what: is to be in it.
+    """
+    lines = ((number, line.strip()) for number, line in enumerate(_private_text(path, what).splitlines(), 1))
+    return [(number, line) for number, line in lines if line and not line.startswith("#")]
+
+
+def _private_text(path: Path, what: str) -> str:
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK)
     except OSError as error:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from service.measuring.trend_file import COLUMNS
+from service.records.journal_file import stamp
 from service.trends.history import Bucket, History
-from service.trends.kept import stamp
 from service.trends.limits import limits_of
 from service.web import trend_models as models
 

@@ -10,8 +10,6 @@ import asyncio
 import base64
 import hashlib
 import html
-import os
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
@@ -22,6 +20,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from service.low_priority import go_last
 from service.reasons import Language
 from service.records.journal_reader import reading
 from service.trends.documents import STYLE, shift_report, trends_page
@@ -34,7 +33,6 @@ from service.web.openapi import PREFIX
 from service.web.requests import whole_number
 from service.web.trends.answer import answer
 
-NICENESS = 10
 MOST_WAITING = 4
 AGAIN_S = 5.0
 LARGEST_RECIPE = 65_535
@@ -56,7 +54,7 @@ class TrendEndpoints:
     def __init__(self, journal: Path, pages: Pages) -> None:
         self._journal = journal
         self._pages = pages
-        self._thread = ThreadPoolExecutor(1, "trends", initializer=_go_last)
+        self._thread = ThreadPoolExecutor(1, "trends", initializer=go_last)
         self._waiting = 0
 
     def close(self) -> None:
@@ -153,7 +151,3 @@ def _moment(request: Request, name: str) -> datetime | None:
     except (ValueError, OverflowError) as error:
         told = f"{name} is {text[:40]!r}, expected a time such as 2026-11-21T06:00 or 2026-11-21T06:00Z"
         raise RequestRefused(400, told) from error
-
-
-def _go_last() -> None:
-    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -31,6 +32,16 @@ def kept_sections(page: Path = PAGE) -> list[str]:
     """All such sections of the page as they stand, marks included."""
     old = page.read_text(encoding="utf-8") if page.exists() else ""
     return [found.group(0) for found in _pattern(r"[\w-]+").finditer(old)]
+
+
+def options_of_seeds(name: str, description: str | None, *, seeds: int, first: int) -> argparse.ArgumentParser:
+    """What the commands have in common that write a section from pictures of seeds in a row."""
+    parser = argparse.ArgumentParser(prog=f"python -m {name}", description=description)
+    parser.add_argument("--seeds", type=int, default=seeds, metavar="N", help="pictures of each kind")
+    parser.add_argument("--first", type=int, default=first, metavar="SEED", help="the first seed")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")
+    parser.add_argument("--write", action="store_true", help="write the section of docs/reports/accuracy.md")
+    return parser
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections import Counter
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from benchmarks.page_section import put_section, table
+from benchmarks.page_section import options_of_seeds, put_section, table
 from contour.geometry.agreement import agreement
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
@@ -88,11 +87,7 @@ def _row(name: str, some: Sequence[Verdict]) -> list[str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when no wrong outline was accepted, else 1."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy.edge_kinds", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=9, metavar="N", help="pictures of each kind of cells and border")
-    parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="the first seed")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")
-    parser.add_argument("--write", action="store_true", help="write the section of docs/reports/accuracy.md")
+    parser = options_of_seeds("benchmarks.accuracy.edge_kinds", __doc__, seeds=9, first=FIRST)
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.seeds)
     jobs = [(cells, border, seed) for border in BORDERS for cells in CELLS for seed in seeds]

@@ -8,7 +8,6 @@ from four pictures, and the usual kinds are those in which it is no plain dark o
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -20,7 +19,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks.page_section import put_section, table
+from benchmarks.page_section import options_of_seeds, put_section, table
 from contour.errors import PictureError
 from contour.geometry.agreement import distances_to, places_along, rectified_edges
 from contour.geometry.arrays import Bools, Float64s
@@ -215,17 +214,13 @@ def run(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when no wrong outline was accepted, else 1."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy.shop_floor", description=__doc__)
+    parser = options_of_seeds("benchmarks.accuracy.shop_floor", __doc__, seeds=20, first=FIRST)
     parser.add_argument(
         "--kinds", help="comma-separated; all but guards if not given (with --taught: tables not plain)"
     )
-    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="pictures of each kind")
-    parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="the first seed")
     parser.add_argument("--alone", action="store_true", help="never two kinds at once")
     parser.add_argument("--taught", action="store_true", help="teach the empty table before each picture")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")
     parser.add_argument("--list", action="store_true", help="a line for each picture as well")
-    parser.add_argument("--write", action="store_true", help="write the section of docs/reports/accuracy.md")
     parser.add_argument("--save", type=Path, metavar="DIR", help="overlays of wrong outlines go here")
     options = parser.parse_args(arguments)
     usual = STRUCTURED if options.taught else tuple(KINDS)

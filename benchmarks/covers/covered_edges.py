@@ -6,7 +6,6 @@ them: once by a recipe that bridges nothing, and once by one that bridges whatev
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -17,7 +16,7 @@ import cv2
 import numpy as np
 
 from benchmarks.accuracy.shop_floor import WRONG_PITCHES, true_places
-from benchmarks.page_section import put_section, table
+from benchmarks.page_section import options_of_seeds, put_section, table
 from contour.geometry.agreement import distances_to, places_along, rectified_edges
 from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.ring_lengths import RingLengths
@@ -144,12 +143,8 @@ def _row(name: str, some: Sequence[CoveredEdge]) -> list[str]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when every cover is refused and no bridged outline is wrong, else 1."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.covers.covered_edges", description=__doc__)
-    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="pictures of each kind")
-    parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="the first seed")
-    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")
+    parser = options_of_seeds("benchmarks.covers.covered_edges", __doc__, seeds=20, first=FIRST)
     parser.add_argument("--list", action="store_true", help="a line for each picture as well")
-    parser.add_argument("--write", action="store_true", help="write the section of docs/reports/accuracy.md")
     options = parser.parse_args(arguments)
     seeds = range(options.first, options.first + options.seeds)
     jobs = [(kind, seed) for kind in COVERS for seed in seeds]

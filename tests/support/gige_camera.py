@@ -100,21 +100,20 @@ class GigeCamera:
 
     def tell(self, word):
         """`edge`: the line's edge. `loss R`: lose a share of packets. `width W`: send frames that nobody asked for."""
-        self._process.stdin.write(f"{word}\n")
-        self._process.stdin.flush()
-        assert self._process.stdout.readline() == "done\n"
+        assert self._asked(word) == "done\n"
 
     def made(self):
         """How many frames it has exposed since it was switched on."""
-        self._process.stdin.write("made\n")
-        self._process.stdin.flush()
-        return int(self._process.stdout.readline())
+        return int(self._asked("made"))
 
     def at(self, place):
         """What the register at this place holds."""
-        self._process.stdin.write(f"at {place}\n")
+        return int(self._asked(f"at {place}"))
+
+    def _asked(self, line):
+        self._process.stdin.write(f"{line}\n")
         self._process.stdin.flush()
-        return int(self._process.stdout.readline())
+        return self._process.stdout.readline()
 
     def kill(self):
         """Pull its plug."""

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from service.web.people.pins import line_of
+
 TOKEN = "anna-has-this-token-0123"
 OTHER_TOKEN = "oleg-has-this-token-4567"
 
@@ -65,3 +67,12 @@ def token_file(folder: Path) -> Path:
     path.write_text(f"# who may give orders\nanna {TOKEN}\noleg {OTHER_TOKEN}\n")
     path.chmod(0o600)
     return path
+
+
+def people_file(folder: Path, pins: dict[str, str]) -> bool:
+    """A file with each person's line, by name and PIN; False where there is nobody, and no file."""
+    if pins:
+        path = folder / "people"
+        path.touch(0o600)
+        path.write_text("".join(f"{line_of(name, pin)}\n" for name, pin in pins.items()))
+    return bool(pins)

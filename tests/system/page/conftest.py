@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, sync_playwright
 
 from tests.support.processes.cell import Cell
-from tests.support.processes.page_client import Client, token_file
+from tests.support.processes.page_client import Client, people_file, token_file
 from tests.support.processes.page_panel import EXPECTED_NOISE, Panel, chromium, clean_page
 from tests.support.processes.processes import free_port
 
@@ -20,11 +20,18 @@ def camera() -> str:
 
 
 @pytest.fixture(scope="module")
-def cell(tmp_path_factory: pytest.TempPathFactory, camera: str) -> Iterator[tuple[Cell, Client]]:
+def pins() -> dict[str, str]:
+    """PINs of people, by name: none, where a file of tests has no people of its own."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory, camera: str, pins: dict[str, str]) -> Iterator[tuple[Cell, Client]]:
     """A daemon that is starting, and measures when its page asks; and who asks past a browser."""
     folder, port = tmp_path_factory.mktemp("page"), free_port()
     token_file(folder)
-    more = f"page: {{port: {port}, token_file: tokens}}\n"
+    people = ", people_file: people" if people_file(folder, pins) else ""
+    more = f"page: {{port: {port}, token_file: tokens{people}}}\n"
     started = Cell(folder, triggers="[]", camera=camera, trigger_every_s=None, more=more)
     try:
         yield started, Client(port)

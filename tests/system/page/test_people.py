@@ -3,44 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, expect, sync_playwright
+from playwright.sync_api import Browser, expect
 
-from service.web.people.pins import FREE_TRIES, FREE_TRIES_OF_ADDRESS, line_of
+from service.web.people.pins import FREE_TRIES, FREE_TRIES_OF_ADDRESS
 from tests.support.processes.cell import Cell
-from tests.support.processes.page_client import TOKEN, Client, Reply, token_file
-from tests.support.processes.page_panel import EXPECTED_NOISE, chromium, clean_page
-from tests.support.processes.processes import free_port
+from tests.support.processes.page_client import TOKEN, Client, Reply, people_file
+from tests.support.processes.page_panel import EXPECTED_NOISE, clean_page
 
 PINS = {"anna": "4711", "oleg": "081500", "ivan": "12345678"}
 
 
 @pytest.fixture(scope="module")
-def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Cell, Client]]:
-    """A daemon whose page takes orders by token and by PIN."""
-    folder, port = tmp_path_factory.mktemp("people"), free_port()
-    token_file(folder)
-    people_file(folder, PINS)
-    more = f"page: {{port: {port}, token_file: tokens, people_file: people}}\n"
-    started = Cell(folder, triggers="[]", trigger_every_s=None, more=more)
-    try:
-        yield started, Client(port)
-    finally:
-        started.stop()
-
-
-@pytest.fixture(scope="module")
-def browser(cell: tuple[Cell, Client]) -> Iterator[Browser]:
-    """Chromium."""
-    with sync_playwright() as playwright:
-        started = chromium(playwright)
-        cell[0].ready()
-        yield started
-        started.close()
+def pins() -> dict[str, str]:
+    """The page takes orders by token and by these."""
+    return PINS
 
 
 @pytest.fixture
@@ -48,12 +27,6 @@ def client(cell: tuple[Cell, Client]) -> Client:
     """Who asks past a browser."""
     cell[0].ready()
     return cell[1]
-
-
-def people_file(folder: Path, pins: dict[str, str]) -> None:
-    path = folder / "people"
-    path.touch(0o600)
-    path.write_text("".join(f"{line_of(name, pin)}\n" for name, pin in pins.items()))
 
 
 def ordered(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 import time
 from collections import deque
 from collections.abc import Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import get_context, parent_process
+from multiprocessing import get_context, resource_tracker
+from multiprocessing.connection import Connection
+from queue import SimpleQueue
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,9 +20,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.errors import PictureError
+from contour.errors import ParameterError, PictureError
 from contour.image.picture_figures import PictureFigures, picture_figures
 from drivers.camera import Camera, Frame, FrameUnusable, SceneMoved
+from service.low_priority import NICENESS
 from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
 from service.reasons import Reason
@@ -29,7 +32,10 @@ if TYPE_CHECKING:
     from service.config.recipes import AnyRecipe
 
 MOST_PROCESSES = 4
-LAST = 10  # niceness: a job has nine times the weight
+
+
+class MeasuringEnded(Exception):
+    """A process that measures has ended by itself, or was killed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +79,11 @@ class LiveView:
         """gives_way: measure at a low priority."""
         self._method = sight.recipe.method
         self.processes = processes or min(MOST_PROCESSES, (os.cpu_count() or 1) + 1)
-        self._measuring = ProcessPoolExecutor(self.processes, get_context("spawn"), _begin, (sight, gives_way))
+        self._sees = [_Process(sight, gives_way) for _ in range(self.processes)]
+        self._free: SimpleQueue[_Process] = SimpleQueue()
+        for process in self._sees:
+            self._free.put(process)
+        self._measuring = ThreadPoolExecutor(self.processes, "live-measuring")
         self._grabbing = ThreadPoolExecutor(1, "live-camera")
 
     def __enter__(self) -> Self:
@@ -83,12 +93,14 @@ class LiveView:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._grabbing.shutdown()
+        for process in self._sees:
+            process.end()
         self._measuring.shutdown(cancel_futures=True)
 
     def looks(self, camera: Camera, timeout_s: float, most_hz: float) -> Iterator[Look]:
         """Looks without end, in the order of their frames, at most so many frames a second.
 
-        Raises CameraTimeout, CameraUnavailable, ParameterError, BrokenProcessPool.
+        Raises CameraTimeout, CameraUnavailable, ParameterError, MeasuringEnded.
         """
         ahead: deque[tuple[Frame, Future[Any]]] = deque()
         grabbed: Future[Any] | None = None
@@ -108,19 +120,18 @@ class LiveView:
                 except FrameUnusable as error:
                     yield self._unusable(error)
                 else:
-                    ahead.append((frame, self._measured(frame)))
+                    ahead.append((frame, self._measuring.submit(self._seen, frame)))
                 grabbed = None
             while ahead and ahead[0][1].done():
                 frame, seen = ahead.popleft()
                 yield Look(frame, *seen.result())
 
-    def _measured(self, frame: Frame) -> Future[Any]:
-        # A terminal sends Ctrl-C to all processes, and it is for the one that shows: a new one keeps what is blocked.
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    def _seen(self, frame: Frame) -> tuple[Measurement, PictureFigures]:
+        process = self._free.get()
         try:
-            return self._measuring.submit(_seen, frame.pixels, frame.camera)
+            return process.seen(frame)
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+            self._free.put(process)
 
     def _unusable(self, error: FrameUnusable) -> Look:
         reason = Reason.SCENE_MOVED if isinstance(error, SceneMoved) else Reason.NO_FRAME
@@ -135,24 +146,52 @@ def _wait_for(awaited: list[Future[Any]], at_most_s: float | None) -> None:
         time.sleep(at_most_s or 0.0)
 
 
-_sights: list[Sight] = []  # of a measuring process: the one that it began with
+class _Process:
+    """A process of its own that measures one frame at a time. An executor's pool would wait for ever for a frame that
+    is on its way to a process that was killed (Python before 3.11.5).
+    """
+
+    def __init__(self, sight: Sight, gives_way: bool) -> None:
+        spawn = get_context("spawn")
+        self._here, there = spawn.Pipe()
+        self._process = spawn.Process(target=_measure, args=(there, sight, gives_way), daemon=True)
+        # A terminal sends Ctrl-C to all processes, and it is for the one that shows: a new one keeps what is blocked,
+        # but for the first one a tracker is started, which blocks nothing any more.
+        resource_tracker.ensure_running()
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            self._process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+            there.close()
+
+    def seen(self, frame: Frame) -> tuple[Measurement, PictureFigures]:
+        """What it makes of a frame; raise ParameterError, MeasuringEnded."""
+        try:
+            self._here.send((frame.pixels, frame.camera))
+            seen: tuple[Measurement, PictureFigures] | ParameterError = self._here.recv()
+        except (OSError, EOFError) as error:
+            raise MeasuringEnded("a process that measures has ended; is there memory enough?") from error
+        if isinstance(seen, ParameterError):
+            raise seen
+        return seen
+
+    def end(self) -> None:
+        """It keeps nothing that could be lost; who waits for what it sees is told."""
+        self._process.kill()
+        self._process.join()
 
 
-def _begin(sight: Sight, gives_way: bool) -> None:
+def _measure(there: Connection, sight: Sight, gives_way: bool) -> None:
+    """Answer frame after frame, until nobody is left who asks."""
     if gives_way:
-        os.setpriority(os.PRIO_PROCESS, 0, max(LAST, os.getpriority(os.PRIO_PROCESS, 0)))
-    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+        os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
     cv2.setNumThreads(1)
-    _sights.append(sight)
-
-
-def _end_with_the_parent() -> None:
-    """A parent that was killed tells nobody: its processes would wait for work for ever."""
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
-
-
-def _seen(pixels: NDArray[np.uint8], camera: str) -> tuple[Measurement, PictureFigures]:
-    return _sights[0].of(pixels, camera)
+    with suppress(OSError, EOFError):
+        while True:
+            pixels, camera = there.recv()
+            try:
+                seen: object = sight.of(pixels, camera)
+            except ParameterError as error:
+                seen = error
+            there.send(seen)

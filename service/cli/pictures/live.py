@@ -58,10 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show line upon line, or one line anew on a terminal, until Ctrl-C."""
-    from concurrent.futures.process import BrokenProcessPool
-
     from contour.errors import ParameterError
-    from service.jobs.live_view import LiveView, Sight
+    from service.jobs.live_view import LiveView, MeasuringEnded, Sight
 
     if args.config is None and args.device is None and not args.simulated and args.pictures is None:
         args.config = Path("config.yaml")
@@ -78,8 +76,8 @@ def run(args: argparse.Namespace) -> int:
         pass
     except ParameterError as error:
         raise UserError(str(error)) from error
-    except BrokenProcessPool as error:
-        raise UserError("a process that measures has ended; is there memory enough?", EXIT_FAILED) from error
+    except MeasuringEnded as error:
+        raise UserError(str(error), EXIT_FAILED) from error
     finally:
         shown.end()
     return EXIT_OK

@@ -7,14 +7,13 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from concurrent.futures.process import BrokenProcessPool
 from datetime import UTC, datetime
 from pathlib import Path
 
 from contour.errors import ParameterError
 from contour.image.picture_figures import PictureFigures
 from service.jobs.cycle_terms import Plan
-from service.jobs.live_view import LiveView, Look, Sight
+from service.jobs.live_view import LiveView, Look, MeasuringEnded, Sight
 from service.jobs.spare_camera import LookSources, NobodyLooks, SpareCamera
 from service.low_priority import go_last
 from service.records.archived_job import ArchivedJob
@@ -93,7 +92,7 @@ class LiveLooks:
                 self._look(self._sources.plan())
         except NobodyLooks:
             pass
-        except (BrokenProcessPool, ParameterError) as error:
+        except (MeasuringEnded, ParameterError) as error:
             log.warning("live view: %s", error)
             time.sleep(AGAIN_S)
         except Exception:  # the one owner of its defects: they must not come back with every question

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections import deque
 from collections.abc import Iterator
 from itertools import islice
+from multiprocessing import active_children
+from threading import Timer
 
 import numpy as np
 import pytest
@@ -12,7 +17,7 @@ from contour.image.picture_figures import picture_figures
 from drivers.camera import CameraUnavailable, FrameUnusable, SceneMoved
 from drivers.camera.simulated import SimulatedCamera
 from service.config.plain_recipe import PlainRecipe
-from service.jobs.live_view import LiveView, Sight
+from service.jobs.live_view import LiveView, MeasuringEnded, Sight
 from service.jobs.rehearsal import drawn_comb
 from service.measuring.measure import Measurer
 from service.reasons import Reason
@@ -83,3 +88,15 @@ def test_a_camera_that_has_gone_ends_it(view: LiveView) -> None:
     camera.close()
     with pytest.raises(CameraUnavailable, match="not open"):
         list(looks)
+
+
+def test_a_process_that_is_killed_while_it_reads_a_frame_is_told_and_not_waited_for() -> None:
+    before = set(active_children())
+    with LiveView(Sight(Measurer(None), PlainRecipe(), 0.0), processes=1) as view:
+        looks = view.looks(opened(lambda _: np.full((1200, 1600), 25, np.uint8)), 1.0, FAST_HZ)
+        next(looks)
+        (measures,) = set(active_children()) - before
+        os.kill(measures.pid, signal.SIGSTOP)
+        Timer(1.0, os.kill, (measures.pid, signal.SIGKILL)).start()  # by then more was sent than a pipe holds
+        with pytest.raises(MeasuringEnded):
+            deque(looks, maxlen=0)

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import os
-import signal
 import time
 from collections import deque
 from collections.abc import Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import get_context, resource_tracker
-from multiprocessing.connection import Connection
 from queue import SimpleQueue
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.errors import ParameterError, PictureError
+from contour.errors import PictureError
 from contour.image.picture_figures import PictureFigures, picture_figures
 from drivers.camera import Camera, Frame, FrameUnusable, SceneMoved
-from service.low_priority import NICENESS
+from service.jobs.worker import Worker
 from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
 from service.reasons import Reason
@@ -32,10 +27,6 @@ if TYPE_CHECKING:
     from service.config.recipes import AnyRecipe
 
 MOST_PROCESSES = 4
-
-
-class MeasuringEnded(Exception):
-    """A process that measures has ended by itself, or was killed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +70,8 @@ class LiveView:
         """gives_way: measure at a low priority."""
         self._method = sight.recipe.method
         self.processes = processes or min(MOST_PROCESSES, (os.cpu_count() or 1) + 1)
-        self._sees = [_Process(sight, gives_way) for _ in range(self.processes)]
-        self._free: SimpleQueue[_Process] = SimpleQueue()
+        self._sees = [Worker(sight.of, gives_way=gives_way) for _ in range(self.processes)]
+        self._free: SimpleQueue[Worker] = SimpleQueue()
         for process in self._sees:
             self._free.put(process)
         self._measuring = ThreadPoolExecutor(self.processes, "live-measuring")
@@ -100,7 +91,7 @@ class LiveView:
     def looks(self, camera: Camera, timeout_s: float, most_hz: float) -> Iterator[Look]:
         """Looks without end, in the order of their frames, at most so many frames a second.
 
-        Raises CameraTimeout, CameraUnavailable, ParameterError, MeasuringEnded.
+        Raises CameraTimeout, CameraUnavailable, ParameterError, WorkerEnded.
         """
         ahead: deque[tuple[Frame, Future[Any]]] = deque()
         grabbed: Future[Any] | None = None
@@ -129,7 +120,8 @@ class LiveView:
     def _seen(self, frame: Frame) -> tuple[Measurement, PictureFigures]:
         process = self._free.get()
         try:
-            return process.seen(frame)
+            seen: tuple[Measurement, PictureFigures] = process.answer(frame.pixels, frame.camera)
+            return seen
         finally:
             self._free.put(process)
 
@@ -144,54 +136,3 @@ def _wait_for(awaited: list[Future[Any]], at_most_s: float | None) -> None:
         wait(awaited, at_most_s, FIRST_COMPLETED)
     else:
         time.sleep(at_most_s or 0.0)
-
-
-class _Process:
-    """A process of its own that measures one frame at a time. An executor's pool would wait for ever for a frame that
-    is on its way to a process that was killed (Python before 3.11.5).
-    """
-
-    def __init__(self, sight: Sight, gives_way: bool) -> None:
-        spawn = get_context("spawn")
-        self._here, there = spawn.Pipe()
-        self._process = spawn.Process(target=_measure, args=(there, sight, gives_way), daemon=True)
-        # A terminal sends Ctrl-C to all processes, and it is for the one that shows: a new one keeps what is blocked,
-        # but for the first one a tracker is started, which blocks nothing any more.
-        resource_tracker.ensure_running()
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            self._process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-            there.close()
-
-    def seen(self, frame: Frame) -> tuple[Measurement, PictureFigures]:
-        """What it makes of a frame; raise ParameterError, MeasuringEnded."""
-        try:
-            self._here.send((frame.pixels, frame.camera))
-            seen: tuple[Measurement, PictureFigures] | ParameterError = self._here.recv()
-        except (OSError, EOFError) as error:
-            raise MeasuringEnded("a process that measures has ended; is there memory enough?") from error
-        if isinstance(seen, ParameterError):
-            raise seen
-        return seen
-
-    def end(self) -> None:
-        """It keeps nothing that could be lost; who waits for what it sees is told."""
-        self._process.kill()
-        self._process.join()
-
-
-def _measure(there: Connection, sight: Sight, gives_way: bool) -> None:
-    """Answer frame after frame, until nobody is left who asks."""
-    if gives_way:
-        os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
-    cv2.setNumThreads(1)
-    with suppress(OSError, EOFError):
-        while True:
-            pixels, camera = there.recv()
-            try:
-                seen: object = sight.of(pixels, camera)
-            except ParameterError as error:
-                seen = error
-            there.send(seen)

@@ -59,7 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Show line upon line, or one line anew on a terminal, until Ctrl-C."""
     from contour.errors import ParameterError
-    from service.jobs.live_view import LiveView, MeasuringEnded, Sight
+    from service.jobs.live_view import LiveView, Sight
+    from service.jobs.worker import WorkerEnded
 
     if args.config is None and args.device is None and not args.simulated and args.pictures is None:
         args.config = Path("config.yaml")
@@ -76,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         pass
     except ParameterError as error:
         raise UserError(str(error)) from error
-    except MeasuringEnded as error:
+    except WorkerEnded as error:
         raise UserError(str(error), EXIT_FAILED) from error
     finally:
         shown.end()

@@ -13,8 +13,9 @@ from pathlib import Path
 from contour.errors import ParameterError
 from contour.image.picture_figures import PictureFigures
 from service.jobs.cycle_terms import Plan
-from service.jobs.live_view import LiveView, Look, MeasuringEnded, Sight
+from service.jobs.live_view import LiveView, Look, Sight
 from service.jobs.spare_camera import LookSources, NobodyLooks, SpareCamera
+from service.jobs.worker import WorkerEnded
 from service.low_priority import go_last
 from service.records.archived_job import ArchivedJob
 from service.records.evidence import calibration_fields, measurement_fields
@@ -92,7 +93,7 @@ class LiveLooks:
                 self._look(self._sources.plan())
         except NobodyLooks:
             pass
-        except (MeasuringEnded, ParameterError) as error:
+        except (WorkerEnded, ParameterError) as error:
             log.warning("live view: %s", error)
             time.sleep(AGAIN_S)
         except Exception:  # the one owner of its defects: they must not come back with every question

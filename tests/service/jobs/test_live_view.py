@@ -17,8 +17,9 @@ from contour.image.picture_figures import picture_figures
 from drivers.camera import CameraUnavailable, FrameUnusable, SceneMoved
 from drivers.camera.simulated import SimulatedCamera
 from service.config.plain_recipe import PlainRecipe
-from service.jobs.live_view import LiveView, MeasuringEnded, Sight
+from service.jobs.live_view import LiveView, Sight
 from service.jobs.rehearsal import drawn_comb
+from service.jobs.worker import WorkerEnded
 from service.measuring.measure import Measurer
 from service.reasons import Reason
 
@@ -98,5 +99,5 @@ def test_a_process_that_is_killed_while_it_reads_a_frame_is_told_and_not_waited_
         (measures,) = set(active_children()) - before
         os.kill(measures.pid, signal.SIGSTOP)
         Timer(1.0, os.kill, (measures.pid, signal.SIGKILL)).start()  # by then more was sent than a pipe holds
-        with pytest.raises(MeasuringEnded):
+        with pytest.raises(WorkerEnded):
             deque(looks, maxlen=0)

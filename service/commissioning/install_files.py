@@ -142,6 +142,8 @@ def written_folders(config: Config) -> list[Path]:
     found = [config.service.state_dir, config.journal.path.parent, config.archive.path]
     if isinstance(config.camera, FilesCamera) and config.camera.move_to is not None:
         found += [config.camera.move_to, config.camera.path]
+    if config.adopted_recipes is not None:
+        found.append(config.adopted_recipes.parent)
     return [path for path in dict.fromkeys(found) if STATE_DIRECTORY not in (path, *path.parents)]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from contour.geometry.rings import ring_defect
 from service.config.cameras import Camera
@@ -141,6 +141,11 @@ class Config(Model):
     triggers: tuple[Trigger, ...] = Field((), description="What begins a job.")
     default_recipe: int = Field(1, ge=1, le=65_535, description="Recipe of a trigger that names none.")
     recipes: tuple[Recipe, ...] = Field((Recipe(number=1, name="default"),), description="Block types.")
+    adopted_recipes: FilePath | None = Field(
+        None,
+        description="File that the service writes, of recipes that were adopted on the page: each goes before the one "
+        "of its number here, until that one is changed; none = none can be adopted.",
+    )
     work_area_mm: tuple[Point, ...] = Field((), description="Polygon in the machine frame, mm; empty = not checked.")
     table: Table | None = Field(None, description="The taught table; none = blocks are told from any table.")
     service: Service = Field(default_factory=Service, description="The service itself.")
@@ -150,6 +155,24 @@ class Config(Model):
     metrics: Metrics | None = Field(None, description="Figures for Prometheus; none = not served.")
     page: Page | None = Field(None, description="The operator's page; none = not served.")
     log: Log = Field(default_factory=Log, description="The log.")
+
+    _written: dict[int, Recipe] = PrivateAttr(default_factory=dict)
+
+    def recipe(self, number: int) -> Recipe:
+        """The recipe of a number; raise KeyError."""
+        return {recipe.number: recipe for recipe in self.recipes}[number]
+
+    def as_written(self, number: int) -> Recipe:
+        """The recipe as the file has it, also where another one was put in its place; raise KeyError."""
+        return self._written.get(number) or self.recipe(number)
+
+    def with_recipe(self, recipe: Recipe) -> Self:
+        """The same with this recipe in the place of the one of its number; raise KeyError, ValidationError."""
+        written = {**self._written, recipe.number: self.as_written(recipe.number)}
+        recipes = tuple(recipe if one.number == recipe.number else one for one in self.recipes)
+        fresh = type(self).model_validate({**dict(self), "recipes": recipes})
+        fresh._written = written
+        return fresh
 
     @model_validator(mode="after")
     def _there_is_a_recipe(self) -> Self:

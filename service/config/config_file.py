@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
+from service.config.adopted_recipes import AdoptedError, with_adopted
 from service.config.config import Config, Service
 from service.config.mistakes import Location, describe
 from service.config.recipes import Recipe
@@ -86,7 +87,7 @@ def seen_instead_of_keys(data: Any) -> str:
 
 
 def load_config(path: Path) -> Config:
-    """The configuration of a file; raise ConfigError."""
+    """The configuration of a file, with the recipes that were adopted; raise ConfigError."""
     data = read_yaml(path)
     if not isinstance(data, dict):
         raise ConfigError(f"{path}: {seen_instead_of_keys(data)}, expected keys such as camera: and controller:")
@@ -95,7 +96,10 @@ def load_config(path: Path) -> Config:
     except ValidationError as error:
         told = describe(error, Config, lambda where: line_of(path, where))
         raise ConfigError("\n".join(f"{path}: {line}" for line in told)) from error
-    return _resolved(config, path.resolve().parent)
+    try:
+        return with_adopted(_resolved(config, path.resolve().parent))
+    except AdoptedError as error:
+        raise ConfigError(str(error)) from error
 
 
 def default_config() -> Config:
@@ -137,6 +141,8 @@ def _resolved(config: Config, folder: Path) -> Config:
         value = getattr(model, key, None)
         if value is not None:
             updates[section] = model.model_copy(update={key: folder / value})
+    if config.adopted_recipes is not None:
+        updates["adopted_recipes"] = folder / config.adopted_recipes
     updates["recipes"] = tuple(_resolved_recipe(recipe, folder) for recipe in config.recipes)
     return config.model_copy(update=updates)
 

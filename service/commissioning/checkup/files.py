@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from contour.errors import CalibrationError
 from contour.geometry.rings import bounding_box
 from service.commissioning.check_result import CheckResult, fault, ok, warning
 from service.commissioning.checkup.page import check_page
+from service.config.adopted_recipes import load_adopted
 from service.config.config import Config
 from service.config.recipes import Gcode
 from service.export.recipe_exports import trial
@@ -38,6 +40,8 @@ def check_files(config: Config) -> Iterator[CheckResult]:
     yield from _sizes(config)
     yield from _exports(config)
     yield from _parts(config)
+    if config.adopted_recipes is not None:
+        yield from _adopted(config, config.adopted_recipes)
     if config.table is not None:
         yield _table(config)
     if config.page is not None:
@@ -136,6 +140,20 @@ def _exports(config: Config) -> Iterator[CheckResult]:
     if asked and not found:
         forms = ", ".join(sorted({form for recipe in asked for form in recipe.exports})) or "gcode on demand"
         yield ok("exports", f"of a plain square: {forms}")
+
+
+def _adopted(config: Config, path: Path) -> Iterator[CheckResult]:
+    """Which recipes are not those of the configuration file, and which of them were superseded there."""
+    numbers = {recipe.number for recipe in config.recipes}
+    for number, history in load_adopted(path).recipes.items():
+        last = history.adoptions[-1]
+        told = f"recipe {number}: adopted by {last.who} at {last.at}: {last.note}"
+        if number in numbers and history.holds(config.as_written(number)):
+            yield ok("adopted", told)
+        else:
+            what = "was changed" if number in numbers else "is no longer there"
+            next_step = "Nothing, if that is meant; else put it back there, or adopt it on the page again"
+            yield warning("adopted", f"{told}. The configuration's own {what} since, and goes before", next_step)
 
 
 def _table(config: Config) -> CheckResult:

@@ -41,6 +41,8 @@ def _folders(config: Config) -> Iterator[CheckResult]:
     }
     if not config.archive.max_bytes:
         del wanted["archive"]
+    if config.adopted_recipes is not None:  # the file is replaced, so it is its folder that must be written
+        wanted["adopted"] = ("adopted_recipes", config.adopted_recipes.parent)
     for part, (key, folder) in wanted.items():
         why = _not_writable(folder)
         if why:

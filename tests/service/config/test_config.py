@@ -219,7 +219,7 @@ def test_the_embedded_defaults_need_no_file() -> None:
             "core_px: is true, as yes and on are read, expected a number",
         ),
         (SMALL + "work_area_mm: [[0, 0], [1, no], [0, 1]]\n", "work_area_mm[1][1]: is false, as no and off are read"),
-        (SMALL + "extra: 1\n", "extra: unknown key, expected one of archive, calibration, camera"),
+        (SMALL + "extra: 1\n", "extra: unknown key, expected one of adopted_recipes, archive, calibration, camera"),
         (
             SMALL.replace("file: c.yaml", "file: c.yaml, max_vertices: 3"),
             "calibration.max_vertices: unknown key, expected one of file, max_age_days, sentinel_tolerance_px, ",

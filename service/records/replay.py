@@ -51,10 +51,19 @@ class Change:
 
 
 @dataclass(frozen=True)
+class Apart:
+    """The largest distance between the outline as it was and as it is now, in `unit`; 0 = the same to the last bit."""
+
+    distance: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class Replayed:
     """What came of a job, done again. reasons: why it would be refused, empty = it would be sent.
 
     registers: of the pages as sent; 0 where none were. identical: pages and polygon are as they were, bit for bit.
+    apart: None where there is none of the two outlines.
     """
 
     job_id: int
@@ -66,6 +75,8 @@ class Replayed:
     registers: int
     was: dict[str, Any]
     now: dict[str, Any]
+    seen: Measurement
+    apart: Apart | None
 
     @property
     def identical(self) -> bool:
@@ -95,16 +106,26 @@ def replay(archived: ArchivedJob, settings: Settings) -> Replayed:
     were = tuple(Reason(entry["code"]) for entry in known["reasons"]) or _refused_pages(archived)
     reasons = seen.reasons or refusal
     now = measurement_fields(seen)
-    changes = [*_context(archived), *_fields(known, now), *_outlines(archived, seen)]
+    apart = _apart(archived, seen)
+    changes = [*_context(archived), *_fields(known, now), *_outlines(archived, seen, apart)]
     changes += [Change("reasons", _names(were), _names(reasons))] if were != reasons else []
     if archived.envelope is not None:
         changes += _page_changes(archived.pages, pages, archived.envelope.word_order)
     if not any(change.field not in CONTEXT for change in changes):
         changes = []  # another version that gives the same is no change
     registers = sum(len(page.header) + len(page.payload) for page in archived.pages)
-    taken_at = archived.document["job"]["taken_at"]
     return Replayed(
-        archived.job_id, taken_at, were, reasons, seen.texts, tuple(changes), registers, _shown(known), _shown(now)
+        archived.job_id,
+        archived.document["job"]["taken_at"],
+        were,
+        reasons,
+        seen.texts,
+        tuple(changes),
+        registers,
+        _shown(known),
+        _shown(now),
+        seen,
+        apart,
     )
 
 
@@ -149,21 +170,31 @@ def _shown(fields: dict[str, Any]) -> dict[str, Any]:
     return {name: fields[name] for name in COMPARED}
 
 
-def _outlines(archived: ArchivedJob, seen: Measurement) -> Iterator[Change]:
-    """How far the polygons are apart, where they are not the same to the last bit."""
+def _frames(archived: ArchivedJob, seen: Measurement) -> tuple[Contour | None, Contour | None, str]:
+    """The polygon as it was and as it is now, and their unit."""
     frame, unit = ("millimetres", "mm") if seen.millimetres is not None else ("pixels", "px")
-    was, now = archived.contour(frame), getattr(seen, frame)
+    return archived.contour(frame), getattr(seen, frame), unit
+
+
+def _apart(archived: ArchivedJob, seen: Measurement) -> Apart | None:
+    was, now, unit = _frames(archived, seen)
     if was is None or now is None:
+        return None
+    return Apart(0.0 if _same(was, now) else hausdorff(was.exterior, now.exterior, COMPARED_AT_MM), unit)
+
+
+def _outlines(archived: ArchivedJob, seen: Measurement, apart: Apart | None) -> Iterator[Change]:
+    """How far the polygons are apart, where they are not the same to the last bit."""
+    was, now, _ = _frames(archived, seen)
+    if was is None or now is None or apart is None:
         if (was is None) != (now is None):
             yield Change("contour", "none" if was is None else "there", "none" if now is None else "there")
         return
     if _same(was, now):
         return
-    apart = hausdorff(was.exterior, now.exterior, COMPARED_AT_MM)
     holes = "" if len(was.holes) == len(now.holes) else f", {len(now.holes)} holes"
-    yield Change(
-        "polygon", f"{was.point_count} vertices", f"{now.point_count} vertices{holes}, up to {apart:.4f} {unit} away"
-    )
+    told = f"{now.point_count} vertices{holes}, up to {apart.distance:.4f} {apart.unit} away"
+    yield Change("polygon", f"{was.point_count} vertices", told)
 
 
 def _same(one: Contour, other: Contour) -> bool:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from service.config.config import Config
 from service.config.config_file import ConfigError, load_config
+from service.config.mistakes import describe
+from service.config.recipes import Recipe
 from service.jobs.cycle_terms import Plan
 from service.jobs.health import Health
 from service.logs import event
@@ -28,8 +31,21 @@ class BadPlan(Exception):
     """The configuration is well formed, but nothing can be measured by it: a file it names is missing or unfit."""
 
 
+class Measuring(Protocol):
+    """What measures jobs; `service.jobs.cycle.Cycle`."""
+
+    @property
+    def plan(self) -> Plan:
+        """By what."""
+
+    def use(self, plan: Plan) -> None:
+        """From the next job on, by this; in the loop."""
+
+
 class Reloader:
-    """Reads the configuration again when asked. The running job keeps what it began with."""
+    """Reads the configuration again when asked, and takes over a single recipe. The running job keeps what it began
+    with.
+    """
 
     def __init__(
         self,
@@ -37,15 +53,16 @@ class Reloader:
         config: Config,
         health: Health,
         make_plan: Callable[[Config], Plan],
-        use: Callable[[Plan], None],
+        measuring: Measuring,
     ) -> None:
-        """make_plan raises BadPlan; it is called in a thread, `use` in the loop."""
+        """make_plan raises BadPlan; it is called in a thread."""
         self._path = path
         self._config = config
         self._health = health
         self._make_plan = make_plan
-        self._use = use
+        self._measuring = measuring
         self._asked = asyncio.Event()
+        self._one_change = asyncio.Lock()
 
     @property
     def config(self) -> Config:
@@ -61,7 +78,32 @@ class Reloader:
         while True:
             await self._asked.wait()
             self._asked.clear()
-            await self._reload()
+            async with self._one_change:
+                await self._reload()
+
+    async def adopt(self, expected: Recipe, recipe: Recipe, keep: Callable[[Config], int]) -> int:
+        """What `keep` gives; from the next job on `recipe` is in the place of `expected`, which must be in force.
+
+        keep: gets the configuration of before, in a thread, and makes durable what is adopted before it counts. Raise
+        BadPlan, and what `keep` raises: then all stays as it was. Nothing else is read again.
+        """
+        async with self._one_change:
+            if expected not in self._config.recipes:
+                raise BadPlan(f"recipe {expected.number} is no longer what it was when this was tried. Try it again")
+            try:
+                fresh = self._config.with_recipe(recipe)
+            except ValidationError as error:
+                raise BadPlan("; ".join(describe(error, Config))) from error
+            number = await asyncio.to_thread(keep, self._config)
+            plan = self._measuring.plan
+            self._measuring.use(replace(plan, recipes={**plan.recipes, recipe.number: recipe}))
+            self._config = fresh
+            return number
+
+    def since(self) -> str:
+        """From which job on a change counts that is made now."""
+        job = self._health.job
+        return "from the next job on" if job is None else f"from the job after {job} on"
 
     async def _reload(self) -> None:
         try:
@@ -81,14 +123,12 @@ class Reloader:
             self._health.warn(PART, f"not reloaded: {lines[0]}{more}")
             return
         changed = ", ".join(differences(self._config, fresh)) or "the files it names are read again"
-        self._use(plan)
+        self._measuring.use(plan)
         self._config = fresh
         self._health.report("calibration", None)
         self._health.warn(PART, None)
-        job = self._health.job
-        since = "from the next job on" if job is None else f"from the job after {job} on"
         fields = event("reload", reloaded=True, changed=changed)
-        log.info("configuration reloaded, %s: %s", since, changed, extra=fields)
+        log.info("configuration reloaded, %s: %s", self.since(), changed, extra=fields)
 
 
 def differences(old: BaseModel, new: BaseModel, path: str = "") -> Iterator[str]:

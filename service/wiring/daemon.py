@@ -105,7 +105,7 @@ def build(
         if stand_ins is None:
             parts.rehearse = rehearse
         if path is not None:
-            parts.reloader = Reloader(path, config, health, sound_plan, cycle.use)
+            parts.reloader = Reloader(path, config, health, sound_plan, cycle)
         add_triggers(config, parts, opened)
         add_metrics(config, parts, cycle, opened)
         add_page(config, parts, cycle)

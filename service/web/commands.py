@@ -69,6 +69,19 @@ class Known:
                 file.read()
 
 
+@dataclass(frozen=True)
+class Order:
+    """What is asked for, as the journal keeps it. otherwise: what is said to be so where the journal cannot.
+
+    take_over: why, where another person has the word.
+    """
+
+    action: str
+    detail: str | None
+    otherwise: str
+    take_over: str = ""
+
+
 class Commands:
     """Checks who asks, notes it, has it done. All methods raise RequestRefused."""
 
@@ -169,19 +182,14 @@ class Commands:
 
     async def trigger(self, who: str, address: str, asked: TriggerRequest) -> int | None:
         """The number of the job; None where it waits for its turn. Not done where it cannot be noted."""
-        await self._has_the_word(who, address, asked.take_over)
         recipe, thickness_mm = asked.recipe, asked.thickness_mm
         detail = f"recipe {recipe or 'default'}" + (f", thickness {thickness_mm:g} mm" if thickness_mm else "")
-        number = await self._noted(who, address, "trigger", detail)
-        if number is None:
-            raise RequestRefused(503, "the journal cannot be written, so nothing is triggered", Reason.STORAGE_FULL)
-        log.info("page: trigger by %s from %s, %s", who, address, detail)
 
         async def do() -> tuple[int | None, str]:
             job = await self._daemon.trigger(recipe, round(thickness_mm * 1000))
             return job, "waits for its turn" if job is None else f"job {job}"
 
-        return await self._done(number, do)
+        return await self.carry_out(who, address, Order("trigger", detail, "nothing is triggered", asked.take_over), do)
 
     async def halt(self, who: str, address: str, reason: str) -> str:
         """The state after it. Done also where it cannot be noted, or another has the word: to stop is always safe."""
@@ -195,15 +203,20 @@ class Commands:
 
     async def resume(self, who: str, address: str, taking_over: str) -> str:
         """The state after it. Not done where it cannot be noted."""
-        await self._has_the_word(who, address, taking_over)
-        number = await self._noted(who, address, "resume", None)
-        if number is None:
-            raise RequestRefused(503, "the journal cannot be written, so the halt stays", Reason.STORAGE_FULL)
 
         async def do() -> tuple[str, str]:
             state = await self._daemon.resume(f"{who} from {address}")
             return state, state
 
+        return await self.carry_out(who, address, Order("resume", None, "the halt stays", taking_over), do)
+
+    async def carry_out(self, who: str, address: str, order: Order, do: Callable[[], Awaitable[tuple[T, str]]]) -> T:
+        """What `do` gives, with its words for the note. Not done where another has the word, or it cannot be noted."""
+        await self._has_the_word(who, address, order.take_over)
+        number = await self._noted(who, address, order.action, order.detail)
+        if number is None:
+            raise RequestRefused(503, f"the journal cannot be written, so {order.otherwise}", Reason.STORAGE_FULL)
+        log.info("page: %s by %s from %s: %s", order.action, who, address, order.detail or "")
         return await self._done(number, do)
 
     async def _done(self, number: int | None, do: Callable[[], Awaitable[tuple[T, str]]]) -> T:

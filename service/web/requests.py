@@ -8,7 +8,7 @@ from pydantic import BaseModel, ValidationError
 from starlette.requests import Request
 
 from service.link.job_numbers import LARGEST_JOB
-from service.web.commands import RequestRefused
+from service.web.commands import Commands, RequestRefused
 from service.web.guard import plain_address
 
 M = TypeVar("M", bound=BaseModel)
@@ -17,6 +17,11 @@ M = TypeVar("M", bound=BaseModel)
 def address_of(request: Request) -> str:
     """Whose it is, for notes and bounds."""
     return "unknown" if request.client is None else plain_address(request.client.host)
+
+
+async def holder_of(request: Request, commands: Commands, *, by_pin: bool = True) -> str:
+    """Who gives the order that it is, by token, or where that is enough by PIN; raise RequestRefused."""
+    return await commands.holder(request.headers.get("authorization"), address_of(request), by_pin=by_pin)
 
 
 def job_number(request: Request) -> int:

@@ -2,7 +2,8 @@
 
 import { at, make, say } from "./dom.js";
 import { amount, moment, number, onLanguage, seenAs, words } from "./words.js";
-import { ORIGINS, current, reasonOf } from "./now.js";
+import { ORIGINS, current } from "./now.js";
+import { reasonOf } from "./reasons.js";
 import { list as listParts, show as showPart } from "./part.js";
 
 const STAGES = ["frame", "table", "mask", "trace", "quality", "convert", "simplify", "judge", "guard", "part", "pages", "transfer", "total"];

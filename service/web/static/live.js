@@ -3,7 +3,8 @@
 import { at, make, say } from "./dom.js";
 import { amount, moment, number, onLanguage, seenAs, words } from "./words.js";
 import { get } from "./service.js";
-import { current, reasonOf } from "./now.js";
+import { current } from "./now.js";
+import { reasonOf } from "./reasons.js";
 import { isReady } from "./orders.js";
 import * as film from "./film.js";
 import * as picture from "./picture.js";

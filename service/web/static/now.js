@@ -1,8 +1,8 @@
 // The service now: banner, counters, why it is not ready, and its parts at a glance.
 
 import { at, make, say, shape } from "./dom.js";
-import { bytes, chosen, duration, moment, number, onLanguage, seenAs, words } from "./words.js";
-import { get } from "./service.js";
+import { bytes, duration, moment, number, onLanguage, seenAs, words } from "./words.js";
+import { reasonOf, sentenceOf } from "./reasons.js";
 
 const KINDS = {
   Preoperational: "starting", Initialized: "starting", Ready: "ready", SingleExecution: "busy",
@@ -15,18 +15,7 @@ export const ORIGINS = { controller: "controller_kind" };
 let state = null;
 let heardAt = null;
 let isLost = false;
-let reasons = new Map();
 let byReason = { refused: [], failed: [], missed: [] };
-
-export async function loadReasons() {
-  const told = await get("/reasons");
-  reasons = new Map(told.reasons.map((entry) => [entry.code, entry]));
-}
-
-/** Sentence and next action of a reason's code, in the chosen language. */
-export function reasonOf(code) {
-  return reasons.get(code)?.[chosen()] ?? null;
-}
 
 export function show(next) {
   state = next;
@@ -110,11 +99,6 @@ function counters() {
     if (what !== "taken") byReason.missed.push([`${words(ORIGINS[kind] ?? kind)}: ${sentenceOf(what)}`, number(count)]);
   }
   say("count-missed", number(state.missed_triggers));
-}
-
-function sentenceOf(name) {
-  const entry = [...reasons.values()].find((one) => one.name === name);
-  return entry?.[chosen()]?.sentence ?? name;
 }
 
 /** What a counter counts, by reason: a finger cannot point at it without a touch. */

@@ -1,21 +1,17 @@
-// Orders: measure, halt, resume. Each needs a token or a PIN, which is asked for once and forgotten soon.
+// Orders: measure, halt, resume. What becomes of them is told beside them.
 
 import { at, make, say } from "./dom.js";
-import { onLanguage, seenAs, words } from "./words.js";
-import { Refused, get, isKnown, order, remember } from "./service.js";
-import { reasonOf } from "./now.js";
+import { onLanguage, words } from "./words.js";
+import * as asking from "./asking.js";
 
 let recipes = "";
-let pending = null;
 let heard = null;
 let told = () => (areOff ? words("no_orders") : "");
-let isUnderWay = false; // an order that is not answered yet
 let isHaltTold = false;
 let measured = null; // the job that was ordered here, as long as it runs
 
 const CAN_MEASURE = ["Ready", "SingleExecution", "ContinuousExecution"];
 const areOff = document.body.dataset.orders === "off"; // the page can only be looked at
-const REFUSALS = { 401: "wrong_token", 403: "no_orders", 409: "not_now", 429: "too_often", 503: "cannot" };
 
 /** Follow the state: which orders make sense now. */
 export function show(state) {
@@ -63,73 +59,13 @@ function ended(last) {
   tell(() => (isLast ? `${words("job_runs", { job: last.job })}: ${words(last.outcome)}` : ""), isLast && last.code !== 0);
 }
 
-/** Have it done, one order at a time, after asking who orders it where that is not known. */
-export function ask(button, path, body, done) {
-  if (isUnderWay || at(button).disabled) return; // a key finds it as the button does
-  pending = { path, body, done };
-  if (isKnown()) carryOut();
-  else openDialog("");
-}
-
-async function openDialog(text) {
-  say("token-told", text);
-  at("token").value = "";
-  if (!at("token-dialog").open) at("token-dialog").showModal();
-  at("token").focus();
-  try {
-    fillPeople((await get("/people")).names);
-  } catch {
-    fillPeople([]); // then by a token
-  }
-}
-
-/** Who has a PIN, to be touched; the last entry is for those who have a token. */
-function fillPeople(names) {
-  const chosen = at("person").value;
-  at("person").replaceChildren(...names.map((name) => make("option", { value: name }, name)), make("option", { value: "" }, words("with_token")));
-  if (names.includes(chosen)) at("person").value = chosen;
-  at("by-person").hidden = !names.length;
-  askedFor();
-}
-
-function askedFor() {
-  const isPin = at("person").value !== "";
-  at("token").inputMode = isPin ? "numeric" : "text";
-  say("token-what", words(isPin ? "pin" : "token"));
-  say("token-text", words(isPin ? "pin_text" : "token_text"));
-}
-
-async function carryOut() {
-  const { path, body, done } = pending;
-  isUnderWay = true;
-  measured = null;
-  tell(() => words("sending"), false);
-  try {
-    const answer = await order(path, body);
+function ask(button, path, body, done) {
+  if (at(button).disabled) return; // a key finds it as the button does
+  const begun = () => (measured = null);
+  asking.ask({ path, body, tell, begun, done: (answer) => {
     tell(done(answer), false);
     isHaltTold = path === "/halt";
-  } catch (error) {
-    if (!(error instanceof Refused)) tell(() => words("transfer_unknown"), true);
-    else tell(() => refusal(error), true);
-    if (error.status === 401) openDialog(words(at("person").value ? "wrong_pin" : "wrong_token"));
-    if (error.holder) openTakeOver(error.holder);
-  } finally {
-    isUnderWay = false;
-  }
-}
-
-function openTakeOver(who) {
-  say("lease-told", words("lease_of", { who }));
-  at("take-over").value = "";
-  at("lease-dialog").showModal();
-  at("take-over").focus();
-}
-
-function refusal(error) {
-  if (error.holder) return words("lease_of", { who: error.holder });
-  const reason = error.code ? reasonOf(error.code) : null;
-  const text = reason ? `${reason.sentence} ${reason.next_action}` : words(REFUSALS[error.status] ?? "cannot");
-  return `${text} (${seenAs(error.message)})`;
+  } });
 }
 
 function tell(text, isBad) {
@@ -148,26 +84,8 @@ export const measure = () =>
 at("trigger").addEventListener("click", measure);
 at("halt").addEventListener("click", () => ask("halt", "/halt", {}, () => () => words("halted_now")));
 at("resume").addEventListener("click", () => ask("resume", "/resume", {}, () => () => words("resumed_now")));
-at("token-cancel").addEventListener("click", () => at("token-dialog").close());
-at("token-dialog").querySelector("form").addEventListener("submit", () => {
-  const given = at("token").value.trim();
-  at("token").value = "";
-  if (!given) return;
-  remember(at("person").value ? `Pin ${at("person").value}:${given}` : `Bearer ${given}`);
-  carryOut();
-});
-at("person").addEventListener("change", () => {
-  askedFor();
-  at("token").focus();
-});
-at("lease-cancel").addEventListener("click", () => at("lease-dialog").close());
-at("lease-dialog").querySelector("form").addEventListener("submit", () => {
-  pending.body = { ...pending.body, take_over: at("take-over").value.trim() };
-  carryOut();
-});
 onLanguage(() => {
   say("told", told());
-  askedFor();
   if (heard?.lease) say("lease", words("lease_of", { who: heard.lease.who }));
   if (heard) fillRecipes();
 });

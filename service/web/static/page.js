@@ -4,6 +4,7 @@ import { at, make, say } from "./dom.js";
 import { choose, chosen, keep, load, onLanguage, words } from "./words.js";
 import { listen } from "./service.js";
 import { paced } from "./pace.js";
+import { loadReasons } from "./reasons.js";
 import * as film from "./film.js";
 import * as live from "./live.js";
 import * as now from "./now.js";
@@ -11,7 +12,7 @@ import * as orders from "./orders.js";
 
 const THEMES = { auto: "dark", dark: "light", light: "auto" };
 const AGAIN_MS = 2_000;
-const ready = Promise.all([insist(load), insist(now.loadReasons)]);
+const ready = Promise.all([insist(() => load()), insist(loadReasons)]);
 let seen = "";
 // Two for a job that ends and is kept; a machine of five jobs a second is not held up by who watches it.
 const lookSoon = paced(film.refresh, 2, 500);

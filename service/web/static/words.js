@@ -4,8 +4,13 @@ let texts = {};
 let language = document.documentElement.lang;
 const listeners = [];
 
-export async function load() {
+/** Load the texts; own: the name of those that one page has besides. */
+export async function load(own) {
   texts = await (await fetch("/static/texts.json")).json();
+  if (!own) return;
+  const more = await (await fetch(`/static/${own}`)).json();
+  Object.assign(texts.en, more.en);
+  Object.assign(texts.ru, more.ru, more.described); // sentences that the service has in English alone
 }
 
 export function chosen() {

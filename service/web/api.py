@@ -33,7 +33,8 @@ from service.web.looks.endpoints import LookEndpoints
 from service.web.looks.live_looks import LiveLooks
 from service.web.openapi import PREFIX, document
 from service.web.operations_table import MOST_JOBS, MOST_NOTES, OPERATIONS
-from service.web.requests import address_of, body, job_number, truth, whole_number
+from service.web.recipes.endpoints import RecipeEndpoints
+from service.web.requests import address_of, body, holder_of, job_number, truth, whole_number
 
 Endpoint = Callable[[Request], Awaitable[Response]]
 
@@ -51,6 +52,7 @@ class Api:
         self._pictures = Pictures()
         self.live = Live(daemon)
         self._looks = LiveLooks(daemon.sources.looks)
+        self._recipes = RecipeEndpoints(daemon, commands)
         if daemon.sources.archive is not None:
             daemon.sources.archive.on_stored = self._stored
         self._document = json.dumps(document(OPERATIONS, version), ensure_ascii=False).encode()
@@ -60,6 +62,7 @@ class Api:
         """Let go of threads."""
         self.live.close()
         self._looks.close()
+        self._recipes.close()
         if self._daemon.sources.archive is not None:
             self._daemon.sources.archive.on_stored = lambda _evidence: None
         self._pictures.close()
@@ -91,8 +94,14 @@ class Api:
             "/people": self.people,
             "/openapi.json": self.openapi,
             **LookEndpoints(self._looks).routes(),
+            **self._recipes.gets(),
         }
-        posts = {"/trigger": self.trigger, "/halt": self.halt, "/resume": self.resume}
+        posts = {
+            "/trigger": self.trigger,
+            "/halt": self.halt,
+            "/resume": self.resume,
+            **self._recipes.posts(),
+        }
         return [
             *(Route(PREFIX + path, with_problems(endpoint), methods=["GET"]) for path, endpoint in gets.items()),
             *(Route(PREFIX + path, with_problems(endpoint), methods=["POST"]) for path, endpoint in posts.items()),
@@ -189,7 +198,7 @@ class Api:
 
     async def audit(self, request: Request) -> Response:
         """Who asked for what; only for those who may ask too."""
-        await self._holder(request, by_pin=False)
+        await holder_of(request, self._commands, by_pin=False)
         limit = whole_number(request, "limit", MOST_NOTES, 100)
         return _answer(await asyncio.to_thread(self._notes, limit or 0))
 
@@ -201,25 +210,22 @@ class Api:
 
     async def trigger(self, request: Request) -> Response:
         """One job."""
-        who, address = await self._holder(request), address_of(request)
+        who, address = await holder_of(request, self._commands), address_of(request)
         asked = await body(request, models.TriggerRequest)
         job = await self._commands.trigger(who, address, asked)
         return _answer(models.Triggered(job=job), 202)
 
     async def halt(self, request: Request) -> Response:
         """No trigger from now on."""
-        who, address = await self._holder(request), address_of(request)
+        who, address = await holder_of(request, self._commands), address_of(request)
         asked = await body(request, models.HaltRequest)
         return _answer(models.StateAfter(state=await self._commands.halt(who, address, asked.reason)))
 
     async def resume(self, request: Request) -> Response:
         """The end of a halt."""
-        who, address = await self._holder(request), address_of(request)
+        who, address = await holder_of(request, self._commands), address_of(request)
         asked = await body(request, models.ResumeRequest)
         return _answer(models.StateAfter(state=await self._commands.resume(who, address, asked.take_over)))
-
-    async def _holder(self, request: Request, *, by_pin: bool = True) -> str:
-        return await self._commands.holder(request.headers.get("authorization"), address_of(request), by_pin=by_pin)
 
 
 def with_problems(endpoint: Endpoint) -> Endpoint:

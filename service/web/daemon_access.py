@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from service.config.recipes import Recipe
 from service.daemon.operations import Operations
+from service.daemon.recipe_book import RecipeBook
 from service.daemon.storage_watch import StorageWatch
 from service.jobs.executor import Executor
 from service.jobs.health import Health
@@ -55,6 +57,7 @@ class PageSources:
     link: Link | None = None
     archive: ArchiveWriter | None = None
     storage: StorageWatch | None = None
+    book: RecipeBook | None = None
 
 
 class DaemonAccess:
@@ -160,6 +163,10 @@ class DaemonAccess:
         """The state after a halt's end; raise CommandRefused, DaemonSilent."""
         assert self._operations is not None
         return str((await self._asked(self._operations.resume({}, who)))["state"])
+
+    async def adopt(self, book: RecipeBook, expected: Recipe, recipe: Recipe, who: str, note: str) -> tuple[int, str]:
+        """The adoption's number, and from which job on; raise CommandRefused, DaemonSilent."""
+        return await self._asked(book.adopt(expected, recipe, who, note))
 
     async def _asked(self, work: Coroutine[Any, Any, T]) -> T:
         """What `work` gives in the daemon's loop. Once begun it comes to its end there, whoever goes away here."""

@@ -10,6 +10,7 @@ import html
 import json
 import re
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import Any, Literal
 
 from starlette.requests import Request
@@ -22,6 +23,8 @@ from service.web.daemon_access import DaemonAccess, DaemonSilent
 
 TYPES = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml", "json": "application/json"}
 PAGE = "page.html"
+RECIPES = "recipes.html"
+PIECES = {"symbols": "symbols.svg", "dialogs": "dialogs.html"}  # that pages have in common
 LANGUAGES: tuple[Literal["en"], Literal["ru"]] = ("en", "ru")
 THEMES = ("auto", "dark", "light")
 KINDS = {
@@ -45,17 +48,21 @@ class Pages:
         self._language = language
         self._orders = orders
         folder = files("service.web") / "static"
-        self._files = {entry.name: entry.read_bytes() for entry in folder.iterdir() if entry.name != PAGE}
+        self._files = {one.name: one.read_bytes() for one in folder.iterdir() if not one.name.endswith(".html")}
         self._tags = {name: f'"{hashlib.sha256(data).hexdigest()[:16]}"' for name, data in self._files.items()}
         self._texts: dict[str, dict[str, str]] = json.loads(self._files["texts.json"])
-        template = (folder / PAGE).read_text(encoding="utf-8")
-        template = template.replace("{{symbols}}", self._files["symbols.svg"].decode())
-        self._templates: dict[str, str] = {language: _worded(template, self._texts[language]) for language in LANGUAGES}
+        of_recipes = json.loads(self._files["recipes-texts.json"])
+        self._templates: dict[tuple[str, str], str] = {}
+        for spoken in LANGUAGES:
+            known = self._texts[spoken]
+            self._templates[PAGE, spoken] = _worded(_whole(folder, PAGE), known)
+            self._templates[RECIPES, spoken] = _worded(_whole(folder, RECIPES), {**known, **of_recipes[spoken]})
 
     def routes(self) -> list[Route]:
         """The page, and its files."""
         return [
             Route("/", self.page, methods=["GET"]),
+            Route("/recipes", self.recipes_page, methods=["GET"]),
             Route("/static/{name}", self.file, methods=["GET"]),
         ]
 
@@ -77,14 +84,17 @@ class Pages:
             state: dict[str, Any] | None = await self._daemon.state()
         except DaemonSilent:
             state = None
-        text = self._templates[language]
-        shown = {
-            "theme": theme,
-            "orders": "on" if self._orders else "off",
-            "view": ' data-view="kiosk"' if "kiosk" in request.query_params else "",
-            **self._banner(state, language),
-        }
-        for name, value in shown.items():
+        view = ' data-view="kiosk"' if "kiosk" in request.query_params else ""
+        return self._filled(PAGE, language, {"theme": theme, "view": view, **self._banner(state, language)})
+
+    async def recipes_page(self, request: Request) -> Response:
+        """The page of recipes, which asks for them itself."""
+        language, theme = self.reader(request)
+        return self._filled(RECIPES, language, {"theme": theme, **self._languages(language)})
+
+    def _filled(self, page: str, language: str, shown: dict[str, str]) -> Response:
+        text = self._templates[page, language]
+        for name, value in {"orders": "on" if self._orders else "off", **shown}.items():
             text = text.replace(f"{{{{{name}}}}}", value)
         return Response(text, media_type="text/html")
 
@@ -103,13 +113,15 @@ class Pages:
             return self._language
         return preferred(request.headers.get("accept-language", ""))
 
+    def _languages(self, language: str) -> dict[str, str]:
+        """The one it is in, and the other one."""
+        other = next(one for one in LANGUAGES if one != language)
+        return {"language": language, "other": other, "other_name": self._texts[other]["name"]}
+
     def _banner(self, state: dict[str, Any] | None, language: str) -> dict[str, str]:
         texts = self._texts[language]
-        other = next(one for one in LANGUAGES if one != language)
         shown = {
-            "language": language,
-            "other": other,
-            "other_name": self._texts[other]["name"],
+            **self._languages(language),
             "since": "",
             "whys": "",
             "why_hidden": " hidden",
@@ -149,6 +161,14 @@ def _why(code: int, text: str, language: str) -> str:
         f"<li><strong>{html.escape(words.sentence)}</strong> {html.escape(words.next_action)}"
         f"<small>{html.escape(_seen_as(text, language))}</small></li>"
     )
+
+
+def _whole(folder: Traversable, page: str) -> str:
+    """A page's template, with the pieces that pages have in common."""
+    text = (folder / page).read_text(encoding="utf-8")
+    for name, piece in PIECES.items():
+        text = text.replace(f"{{{{{name}}}}}", (folder / piece).read_text(encoding="utf-8"))
+    return text
 
 
 def _worded(template: str, texts: dict[str, str]) -> str:

@@ -6,6 +6,7 @@ from service.web import models
 from service.web.evidence_files import FILES, WIDTHS_PX
 from service.web.looks import endpoints as looks
 from service.web.openapi import Operation, Parameter
+from service.web.recipes.operations import operations as of_recipes
 from service.web.trend_models import Trends
 
 MOST_JOBS = 200
@@ -104,4 +105,5 @@ OPERATIONS = (
         token=True,
     ),
     Operation("POST", "/resume", "End a halt", models.StateAfter, _ORDER, request=models.ResumeRequest, token=True),
+    *of_recipes(_SILENT, _ORDER),
 )

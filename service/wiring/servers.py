@@ -44,6 +44,7 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
     if config.page is None:
         return
     try:
+        from service.daemon.recipe_book import RecipeBook
         from service.jobs.spare_camera import LookSources
         from service.web.daemon_access import PageSources
         from service.web.server import PageError, make_page
@@ -73,6 +74,7 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
         link=parts.link,
         archive=parts.archive,
         storage=parts.storage,
+        book=None if parts.reloader is None else RecipeBook(parts.reloader),
     )
     try:
         parts.page = make_page(config.page, sources)

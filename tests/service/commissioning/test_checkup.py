@@ -23,8 +23,10 @@ from service.commissioning.checkup.listening import check_listening
 from service.commissioning.checkup.page import check_page
 from service.commissioning.checkup.running import holder
 from service.commissioning.checkup.storage import check_storage
+from service.config.adopted_recipes import Word, keep_adopted
 from service.config.config import Config
 from service.config.config_file import SAMPLES, load_config
+from service.config.recipe_keys import with_values
 from service.daemon.lock import Lock, NameLock, name_is_held
 from service.records.job import TriggerStamp
 from service.records.journal import Journal
@@ -43,6 +45,24 @@ def written(folder: Path, camera: str = "{kind: files, path: in}", more: str = "
 
 def config(folder: Path, camera: str = "{kind: files, path: in}", more: str = "") -> Config:
     return load_config(written(folder, camera, more))
+
+
+def test_adopted_recipes_are_told_and_those_that_the_file_has_superseded(tmp_path: Path) -> None:
+    kept = "adopted_recipes: kept/adopted.json\nrecipes: [{number: 1, name: sheet}, {number: 2, name: other}]\n"
+    settings = config(tmp_path, more=kept)
+    assert settings.adopted_recipes is not None
+    settings.adopted_recipes.parent.mkdir()
+    for number in (1, 2):
+        recipe = with_values(settings.recipe(number), {"tolerance_mm": 0.5})
+        keep_adopted(settings.adopted_recipes, settings, recipe, Word("anna", "2026-11-23", "less points"))
+    found = list(check_files(config(tmp_path, more=kept.replace("name: other", "name: other, edge: cut"))))
+    told = [(one.level, one.text) for one in found if one.part == "adopted"]
+    assert told[0] == (Level.OK, "recipe 1: adopted by anna at 2026-11-23: less points")
+    assert told[1][0] is Level.WARNING
+    assert "The configuration's own was changed since" in told[1][1]
+    gone = config(tmp_path, more="adopted_recipes: kept/adopted.json\nrecipes: [{number: 1, name: sheet}]\n")
+    assert "is no longer there" in [one.text for one in check_files(gone) if one.part == "adopted"][1]
+    assert part(list(check_storage(settings, running=False)), "adopted").level is Level.OK
 
 
 def part(found: list[CheckResult], name: str) -> CheckResult:

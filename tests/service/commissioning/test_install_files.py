@@ -112,8 +112,9 @@ def test_what_no_unit_can_name_is_refused() -> None:
 
 
 def test_the_folders_to_be_made_are_those_that_are_opened(tmp_path: Path) -> None:
-    of_config(tmp_path, "")
-    assert written_folders(load_config(tmp_path / "config.yaml")) == [tmp_path / "var", tmp_path / "var" / "archive"]
+    of_config(tmp_path, "adopted_recipes: kept/adopted.json\n")
+    folders = [tmp_path / "var", tmp_path / "var" / "archive", tmp_path / "kept"]
+    assert written_folders(load_config(tmp_path / "config.yaml")) == folders
 
 
 def test_only_with_a_genicam_camera_the_unit_may_ask_for_network_cards(tmp_path: Path) -> None:

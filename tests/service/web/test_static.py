@@ -5,32 +5,41 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 import service.judging
 import service.web
+from service.config.recipe_keys import FILES, WRITTEN_ONLY
+from service.config.recipes import Gcode, OneOfParts, PartToCut, Recipe
 from service.state import State
 from service.web.html import KINDS
+from service.web.recipes.models import TrialState
 
 STATIC = Path(service.web.__file__).parent / "static"
 TEXTS = json.loads((STATIC / "texts.json").read_text())
+OF_RECIPES = json.loads((STATIC / "recipes-texts.json").read_text())
+RECIPE_SCRIPTS = ("recipes.js", "recipe-form.js", "tried.js")
 SCRIPTS = {path.name: path.read_text() for path in STATIC.glob("*.js")}
-PAGE = (STATIC / "page.html").read_text()
+PAGE = (STATIC / "page.html").read_text() + (STATIC / "dialogs.html").read_text()
 CSS = (STATIC / "page.css").read_text()
 INK = ("ink", "dim", "good", "bad", "busy", "hold", "gone", "strong")
 
 
-def test_both_languages_have_the_same_words_with_the_same_places() -> None:
-    assert TEXTS["en"].keys() == TEXTS["ru"].keys()
-    for key, english in TEXTS["en"].items():
-        places = [sorted(re.findall(r"\{\w+\}", text)) for text in (english, TEXTS["ru"][key])]
+@pytest.mark.parametrize("texts", [TEXTS, OF_RECIPES], ids=["the page", "recipes"])
+def test_both_languages_have_the_same_words_with_the_same_places(texts: dict[str, dict[str, str]]) -> None:
+    assert texts["en"].keys() == texts["ru"].keys()
+    for key, english in texts["en"].items():
+        places = [sorted(re.findall(r"\{\w+\}", text)) for text in (english, texts["ru"][key])]
         assert places[0] == places[1], key
 
 
 def test_every_word_that_is_asked_for_is_there() -> None:
     asked = set(re.findall(r'data-[ta]="(\w+)"', PAGE)) | {state.label for state in State}
-    for script in SCRIPTS.values():
+    for name, script in SCRIPTS.items():
+        if name in RECIPE_SCRIPTS:
+            continue
         asked |= set(re.findall(r'words\("(\w+)"', script))
         asked |= set(re.findall(r'(?:line\(|\[)"(\w+)", (?:camera|link|look|report|job|seen|size|sure|!)', script))
         asked |= set(re.findall(r'\["[^"]+", "(key_\w+)"\]', script))
@@ -40,6 +49,26 @@ def test_every_word_that_is_asked_for_is_there() -> None:
         asked |= set(re.findall(r'"(\w+)"', stages[1])) if stages else set()
     assert len(asked) > 60
     assert asked - TEXTS["en"].keys() == set()
+
+
+def test_every_word_of_the_page_of_recipes_is_there_and_none_is_one_of_the_other_pages() -> None:
+    asked = set(re.findall(r'data-[ta]="(\w+)"', (STATIC / "recipes.html").read_text()))
+    for name in RECIPE_SCRIPTS:
+        asked |= set(re.findall(r'words\("(\w+)"', SCRIPTS[name]))
+    asked |= {f"trial_{state}" for state in get_args(TrialState.model_fields["state"].annotation)}
+    assert asked - TEXTS["en"].keys() - OF_RECIPES["en"].keys() == set()
+    assert OF_RECIPES["en"].keys() & TEXTS["en"].keys() == set()
+
+
+def test_every_key_of_a_recipe_that_can_be_set_is_described_in_russian_too() -> None:
+    described = set()
+    for model in (Recipe, Gcode, PartToCut, OneOfParts):
+        for name, field in model.model_fields.items():
+            if name not in (*WRITTEN_ONLY, *FILES, "gcode"):
+                described.add(field.description)
+    assert OF_RECIPES["described"].keys() == described
+    for text in OF_RECIPES["described"].values():
+        assert re.search("[а-я]", text)
 
 
 def test_the_server_and_the_script_tell_the_same_shape_of_each_state() -> None:

@@ -1,0 +1,1 @@
+"""Recipes on the page: listed, tried on archived jobs, adopted, and taken back."""

@@ -157,9 +157,9 @@ class Trials:
         finally:
             limit.cancel()
             with self._lock:
-                worker, run.worker = run.worker, None  # with which its pipes go
-            if worker is not None:
-                worker.end()
+                ending, run.worker = run.worker, None  # with which its pipes go
+            if ending is not None:
+                ending.end()
             with self._lock:
                 run.ended = run.ended or ended
 

@@ -14,7 +14,7 @@ const CALM_MS = 5_000;
 const areOff = document.body.dataset.orders === "off"; // the page can only be looked at
 let known = null; // what the service says of recipes
 let selected = null; // number
-let shown = ""; // of which recipe, and in which state, the form is
+let shown = []; // of which recipe, in which language and state, the form is
 let trial = null;
 let looking = null;
 
@@ -63,12 +63,12 @@ function list() {
   }
 }
 
-/** The form, made anew only where the recipe is another one: what somebody types stays. */
-function fill(edited = {}) {
-  const next = `${chosen()} ${JSON.stringify(recipe())}`;
-  if (next === shown) return;
+/** The form, made anew only where it is of something else; what somebody has typed stays as long as it is that recipe. */
+function fill() {
+  const next = [selected, chosen(), JSON.stringify(recipe())];
+  if (next.join() === shown.join()) return;
+  form.show(recipe(), selected === shown[0] ? form.changes() : {});
   shown = next;
-  form.show(recipe(), edited);
 }
 
 function history() {
@@ -147,11 +147,7 @@ at("theme").addEventListener("click", () => {
   root.dataset.theme = THEMES[root.dataset.theme];
   keep("theme", root.dataset.theme);
 });
-onLanguage(() => {
-  if (!known) return;
-  fill(form.changes());
-  refresh();
-});
+onLanguage(() => known && refresh());
 
 async function start() {
   try {

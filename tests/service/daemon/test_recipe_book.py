@@ -70,6 +70,24 @@ async def test_the_next_job_has_it_and_one_under_way_keeps_its_own(tmp_path: Pat
     assert it.book.former(it.recipe, 2) is None
 
 
+async def test_it_is_durable_before_it_counts_so_that_a_kill_at_any_moment_loses_nothing(tmp_path: Path) -> None:
+    it = Book(tmp_path)
+    changed = with_values(it.recipe, {"tolerance_mm": 0.4})
+    found: list[Recipe] = []
+
+    class Killed(Exception):
+        pass
+
+    def use(_plan: Plan) -> None:
+        found.append(load_config(it.path).recipe(1))  # as the next start would
+        raise Killed
+
+    it.jobs.use = use  # type: ignore[method-assign]
+    with pytest.raises(Killed):
+        await it.book.adopt(it.recipe, changed, "anna", "just in time")
+    assert found == [changed]
+
+
 async def test_what_is_no_longer_in_force_is_not_replaced(tmp_path: Path) -> None:
     it = Book(tmp_path)
     before = it.recipe

@@ -85,7 +85,7 @@ class Reloader:
         """What `keep` gives; from the next job on `recipe` is in the place of `expected`, which must be in force.
 
         keep: gets the configuration of before, in a thread, and makes durable what is adopted before it counts. Raise
-        BadPlan, and what `keep` raises: then all stays as it was. Nothing else is read again.
+        BadPlan, and what `keep` raises: then all stays as it was. Nothing else comes into force.
         """
         async with self._one_change:
             if expected not in self._config.recipes:
@@ -94,6 +94,7 @@ class Reloader:
                 fresh = self._config.with_recipe(recipe)
             except ValidationError as error:
                 raise BadPlan("; ".join(describe(error, Config))) from error
+            await asyncio.to_thread(self._make_plan, fresh)  # the next start must not fail by it, as by a part's unit
             number = await asyncio.to_thread(keep, self._config)
             plan = self._measuring.plan
             self._measuring.use(replace(plan, recipes={**plan.recipes, recipe.number: recipe}))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from service.config.adopted_recipes import AS_WRITTEN
-from service.config.config_file import load_config
+from service.config.config_file import SAMPLES, load_config
 from service.config.recipe_keys import with_values
 from service.config.recipes import Recipe
 from service.daemon.control import CommandRefused
@@ -21,11 +23,7 @@ from service.measuring.measure import Measurer
 from service.state import StateMachine
 from service.wiring.plan import sound_plan
 
-CONFIG = """\
-camera: {kind: files, path: in}
-controller: {kind: none}
-recipes: [{number: 1, name: sheet}, {number: 2, name: other}]
-"""
+CONFIG = "camera: {kind: files, path: in}\ncontroller: {kind: none}\n"
 
 
 class Jobs:
@@ -41,9 +39,11 @@ class Jobs:
 class Book:
     """A service's recipes, by a configuration file."""
 
-    def __init__(self, folder: Path, more: str = "adopted_recipes: adopted.json\n") -> None:
+    def __init__(
+        self, folder: Path, more: str = "adopted_recipes: adopted.json\n", recipe: str = "{number: 1, name: sheet}"
+    ) -> None:
         self.path = folder / "config.yaml"
-        self.path.write_text(CONFIG + more)
+        self.path.write_text(f"{CONFIG}recipes: [{recipe}, {{number: 2, name: other}}]\n{more}")
         self.config = load_config(self.path)
         recipes = {recipe.number: recipe for recipe in self.config.recipes}
         self.jobs = Jobs(Plan(Measurer(None), recipes))
@@ -119,3 +119,16 @@ async def test_what_the_configuration_does_not_allow_is_refused_and_not_kept(tmp
     with pytest.raises(BadPlan, match="margin_mm needs millimetres"):
         await it.reloader.adopt(it.recipe, with_values(it.recipe, {"margin_mm": 1}), pytest.fail)
     assert not (tmp_path / "adopted.json").exists()
+
+
+async def test_what_the_next_start_would_fail_by_is_refused(tmp_path: Path) -> None:
+    shutil.copy(SAMPLES / "calibration.yaml", tmp_path)
+    plate = {"type": "Polygon", "coordinates": [[[0, 0], [60, 0], [60, 40], [0, 0]]]}
+    (tmp_path / "plate.geojson").write_text(json.dumps(plate))
+    more = "calibration: {file: calibration.yaml}\nadopted_recipes: adopted.json\n"
+    it = Book(tmp_path, more, recipe="{number: 1, name: sheet, part: {file: plate.geojson, units: mm}}")
+    wider = with_values(it.recipe, {"part.margin_mm": 3})
+    assert (await it.book.adopt(it.recipe, wider, "anna", "for the new blade"))[0] == 1
+    with pytest.raises(CommandRefused, match="GeoJSON, which has no layers"):
+        await it.book.adopt(wider, with_values(wider, {"part.layer": "cut"}), "anna", "by mistake")
+    assert it.recipe == load_config(it.path).recipe(1) == wider

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, Page, Route, expect, sync_playwright
 
 from service.web.recipes.models import RecipeList, TrialAnswer
 from tests.support.interop.programs import node_modules
@@ -23,7 +23,8 @@ from tests.support.processes.page_states import WIDTHS
 from tests.support.processes.processes import free_port, until
 
 SHEET = "{number: 1, name: sheet, max_area_mm2: 200000}"
-OTHER = "{number: 2, name: other, exports: [dxf]}"
+OTHER = "{number: 2, name: other, exports: [dxf], parts: [{file: plate.geojson, units: mm, quantity: 2}]}"
+PLATE = {"type": "Polygon", "coordinates": [[[0, 0], [60, 0], [60, 40], [0, 40], [0, 0]]]}
 PICTURES = 4  # whose blocks are 68 to 101 thousand mm²
 BETWEEN = 90_000  # mm²: one of them is larger
 PINS = {"maria": "4711", "oleg": "0815"}
@@ -91,6 +92,7 @@ def started(folder: Path, *names: str, more: str = "") -> Served:
     (folder / "tokens").touch(0o600)
     (folder / "tokens").write_text(lines)
     people_file(folder, PINS)
+    (folder / "plate.geojson").write_text(json.dumps(PLATE))
     port = free_port()
     page = f"page: {{port: {port}, token_file: tokens, people_file: people}}\n"
     kept = "adopted_recipes: state/adopted.json\n"
@@ -183,6 +185,56 @@ def test_a_change_is_tried_adopted_used_by_the_next_job_and_taken_back(served: S
     assert adopted[0][1] == "recipe 1: max_area_mm2 90000.0 -> 200000.0; back to 0: the press is gone"
     assert [note[2].split(", ")[1] for note in adopted] == ["from the next job on"] * 2
     assert ("try recipe", f"recipe 1: max_area_mm2 200000.0 -> 90000.0; on {PICTURES} jobs", "begun") in notes
+
+
+def test_the_form_has_a_control_of_its_kind_for_each_key_and_sends_what_differs(
+    served: Served, browser: Browser
+) -> None:
+    typed = {
+        "start": ("[10, 20.5]", [10, 20.5]),
+        "binarize": ("otsu", "otsu"),
+        "roi_mm": ("[0, 0, 600, 400]", [0, 0, 600, 400]),
+        "gcode.safe_z_mm": ("35", 35),
+        "parts.0.layer": ("cut", "cut"),
+        "parts.0.quantity": ("1", 1),
+        "parts.0.rotation": ("4", 4),
+    }
+    sent: list[Any] = []
+
+    def keep(route: Route) -> None:
+        sent.append(route.request.post_data_json)
+        route.fulfill(status=422, json={"error": "max_bridged_mm: seen 'x'", "ru": {"max_bridged_mm: seen 'x'": "икс"}})
+
+    with clean_page(browser, served.client.url, (*EXPECTED_NOISE, "422"), locale="en-GB") as page:
+        page.goto(f"{served.client.url}recipes")
+        page.route("**/api/v1/recipes/2/trial", keep)
+        page.get_by_role("button", name="2 other").click()
+        expect(page.locator("#edit-title")).to_have_text("2 other")
+        keys = page.locator("#keys-of .key code").all_text_contents()
+        assert sorted(keys) == sorted(served.recipe(2)["values"])
+        expect(page.locator(".key.changed")).to_have_count(0)
+        expect(page.locator("legend")).to_have_text(["gcode", "parts.0: plate.geojson"])
+        for key, (text, _) in typed.items():
+            given(page, key, text)
+        page.locator('.key:has(code:text-is("edge")) select').select_option("cut")
+        page.get_by_role("checkbox", name="svg").check()
+        given(page, "tolerance_mm", "-1")
+        page.locator("#try").click()
+        assert sent == [], "the browser knows the bound"
+        given(page, "tolerance_mm", "0.1")
+        page.locator("#language").click()
+        expect(page.locator(".key.changed")).to_have_count(len(typed) + 2)
+        page.locator("#try").click()
+        page.locator("#person").select_option("")
+        page.locator("#token").fill(token("person11"))
+        page.locator("#token-ok").click()
+        expect(page.locator("#told")).to_have_text("Так нельзя. (икс)")
+        page.locator("#undo").click()
+        expect(page.locator(".key.changed")).to_have_count(0)
+        page.get_by_role("button", name="1 sheet").click()
+        expect(page.locator(".key.changed")).to_have_count(0)
+    expected = {**{key: value for key, (_, value) in typed.items()}, "edge": "cut", "exports": ["dxf", "svg"]}
+    assert sent == [{"changes": expected, "jobs": 20}]
 
 
 def test_where_the_outline_changes_both_are_told_apart_in_millimetres(served: Served) -> None:
@@ -346,6 +398,19 @@ def test_nothing_is_adopted_where_the_file_cannot_be_written(served: Served) -> 
         kept.rmdir()
         if aside is not None:
             aside.rename(kept)
+
+
+def test_a_try_ends_with_its_service_also_by_kill_minus_nine(tmp_path: Path) -> None:
+    served = started(tmp_path, *WHO)
+    try:
+        served.jobs(1, WHO[0])
+        assert served.order("1/trial", WHO[0], {"changes": {"margin_mm": 1}}).status == 202
+        mine = served.cell.service.process_id
+        trying = until(lambda: [one for one in children(mine) if os.getpriority(os.PRIO_PROCESS, one) >= 10], what="it")
+        served.cell.service.kill()
+        until(lambda: not any(Path(f"/proc/{one}").exists() for one in trying), what="its end")
+    finally:
+        served.cell.stop()
 
 
 def test_what_was_adopted_outlives_kill_minus_nine_wherever_it_comes(tmp_path: Path) -> None:

@@ -17,8 +17,9 @@ from service.daemon.control import CommandRefused
 from service.reasons import Outcome
 from service.records.job import Progress, Terms, TriggerStamp
 from service.records.journal import Journal
-from service.web.recipes.models import TrialState
-from service.web.recipes.trials import Asked, Trials, last_jobs
+from service.web.recipes.models import TrialState, TriedJob
+from service.web.recipes.trial import Drawn
+from service.web.recipes.trials import MOST_DRAWN_BYTES, Asked, Trials, _Run, last_jobs
 from tests.support.processes.processes import until
 
 RECIPE = Recipe(number=1, name="sheet")
@@ -55,6 +56,26 @@ def test_jobs_that_cannot_be_measured_again_are_left_out_and_nothing_is_adopted_
         trials.tried(number + 1)
     assert trials.begin(asked(1)) > number
     ended(trials)
+
+
+def test_drawings_are_kept_as_long_as_there_is_room() -> None:
+    run = _Run(1, asked(3))
+    for number in range(3):
+        job = TriedJob(
+            job_id=number,
+            taken_at="2026-11-23T12:00:00+00:00",
+            code_before=0,
+            code_after=0,
+            text=None,
+            flipped=False,
+            distance=0.0,
+            unit="mm",
+            area_mm2_before=1.0,
+            area_mm2_after=1.0,
+        )
+        run.add(Drawn(job, bytes(MOST_DRAWN_BYTES // 2)))
+    assert [one.job_id for one in run.jobs] == [0, 1, 2]
+    assert list(run.drawn) == [0, 1]
 
 
 def test_a_try_that_takes_too_long_is_ended(tmp_path: Path) -> None:

@@ -106,11 +106,9 @@ function drawInto(picture, one, width) {
   const [was, now] = drawings.get(one.job_id);
   picture.setAttribute("viewBox", `-0.5 -0.5 ${now.width} ${now.height}`);
   const frame = { href: `/api/v1/frames/${one.job_id}?width=${width}`, x: -0.5, y: -0.5, width: now.width, height: now.height, preserveAspectRatio: "none" };
-  const lines = [[now, `now${now.refused ? " refused" : ""}`], [was, "was"]].flatMap(([drawing, kind]) => {
-    const d = rings(drawing);
-    return d ? [draw("path", { class: "under", d }), draw("path", { class: kind, d })] : [];
-  });
-  picture.replaceChildren(draw("image", frame), ...lines);
+  const outlines = [[`now${now.refused ? " refused" : ""}`, rings(now)], ["was", rings(was)]].filter(([, d]) => d);
+  const under = outlines.map(([, d]) => draw("path", { class: "under", d })); // of both, that neither hides the other
+  picture.replaceChildren(draw("image", frame), ...under, ...outlines.map(([kind, d]) => draw("path", { class: kind, d })));
 }
 
 const rings = ({ exterior, holes }) => [exterior, ...holes].filter((ring) => ring.length).map((ring) => `M${ring.map(([x, y]) => `${x} ${y}`).join("L")}Z`).join("");

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from contour.errors import PictureError
 from contour.image.picture_figures import PictureFigures, picture_figures
 from drivers.camera import Camera, Frame, FrameUnusable, SceneMoved
-from service.jobs.worker import Worker
 from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
 from service.reasons import Reason
+from service.worker import Worker
 
 if TYPE_CHECKING:
     from service.config.recipes import AnyRecipe

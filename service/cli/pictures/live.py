@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     """Show line upon line, or one line anew on a terminal, until Ctrl-C."""
     from contour.errors import ParameterError
     from service.jobs.live_view import LiveView, Sight
-    from service.jobs.worker import WorkerEnded
+    from service.worker import WorkerEnded
 
     if args.config is None and args.device is None and not args.simulated and args.pictures is None:
         args.config = Path("config.yaml")

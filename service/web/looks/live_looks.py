@@ -15,7 +15,6 @@ from contour.image.picture_figures import PictureFigures
 from service.jobs.cycle_terms import Plan
 from service.jobs.live_view import LiveView, Look, Sight
 from service.jobs.spare_camera import LookSources, NobodyLooks, SpareCamera
-from service.jobs.worker import WorkerEnded
 from service.low_priority import go_last
 from service.records.archived_job import ArchivedJob
 from service.records.evidence import calibration_fields, measurement_fields
@@ -24,6 +23,7 @@ from service.web.drawing import drawing
 from service.web.evidence_files import made_small
 from service.web.looks.models import LiveAnswer, LiveLook, LookFigures, LookFinding
 from service.web.models import Drawing, RecipeName
+from service.worker import WorkerEnded
 
 log = logging.getLogger("combtrace.page")
 

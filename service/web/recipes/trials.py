@@ -14,13 +14,13 @@ from typing import Literal
 from service.config.recipe_keys import changes
 from service.config.recipes import Recipe
 from service.daemon.control import CommandRefused
-from service.jobs.worker import Worker, WorkerEnded
 from service.low_priority import go_last
 from service.records.archive import document_of
 from service.records.job import Job
 from service.records.journal_reader import JobFilter, JournalReader, reading
 from service.web.recipes.models import KeyChange, LeftOut, TrialState, TriedJob
 from service.web.recipes.trial import Drawn, Trial
+from service.worker import Worker, WorkerEnded
 
 log = logging.getLogger("combtrace.page")
 

@@ -19,9 +19,9 @@ from drivers.camera.simulated import SimulatedCamera
 from service.config.plain_recipe import PlainRecipe
 from service.jobs.live_view import LiveView, Sight
 from service.jobs.rehearsal import drawn_comb
-from service.jobs.worker import WorkerEnded
 from service.measuring.measure import Measurer
 from service.reasons import Reason
+from service.worker import WorkerEnded
 
 EMPTY = np.full((120, 150), 25, np.uint8)
 FAST_HZ = 1000.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -23,6 +24,12 @@ _BLUR_RATIO, _BLUR_PX = 2.5, 2.0
 _OUTLIER_RATIO, _OUTLIER_PX = 3.0, 0.1
 _MOST_OUTLIERS = 1 / 3
 _LEAST_TURN_DEG = 3.0
+_TILTED_DEG = 6.0
+_FEWEST_FOR_A_POSE = 3
+"""Views that a camera can be solved from at all (Zhang, 2000): enough to tell to which side a board is tilted."""
+
+Side = Literal["left", "right", "top", "bottom"]
+SIDES: tuple[Side, ...] = get_args(Side)
 
 
 @dataclass(frozen=True)
@@ -31,6 +38,56 @@ class Dropped:
 
     name: str
     reason: str
+
+
+@dataclass(frozen=True)
+class ViewsSoFar:
+    """What views are good for that are not all there yet: `kept` and `dropped` by name, and the sides of the picture at
+    which the board was raised in some view. `fault`: why no calibration comes of them now; None = one may."""
+
+    kept: tuple[str, ...]
+    dropped: tuple[Dropped, ...]
+    raised: frozenset[Side]
+    fault: str | None
+
+
+def judge_so_far(views: Sequence[BoardView], board: Board, size: tuple[int, int], plane: str) -> ViewsSoFar:
+    """What a calibration of these views of (width, height) px would keep and lacks. `plane` names the one that lies
+    flat; outliers are looked for once there are views enough."""
+    kept, dropped = list(views), list[Dropped]()
+    try:
+        for without in (without_blurred, without_duplicates):
+            kept, left = without(kept, plane) if kept else ([], [])
+            dropped += left
+        check_count(kept, dropped)
+        kept, left = without_outliers(kept, board, size, plane)
+        dropped += left
+        check_count(kept, dropped)
+        fault = None
+    except CalibrationFailed as error:
+        fault = str(error)
+    raised = _raised_sides(kept, board, size, plane)
+    return ViewsSoFar(tuple(view.name for view in kept), tuple(dropped), raised, fault)
+
+
+def _raised_sides(views: Sequence[BoardView], board: Board, size: tuple[int, int], plane: str) -> frozenset[Side]:
+    """At which sides of the picture the board stood higher than when it lay flat."""
+    names = [view.name for view in views]
+    solved = solve(observe(views, board), size, BROAD) if len(views) >= _FEWEST_FOR_A_POSE else None
+    if solved is None or plane not in names:
+        return frozenset()
+    normals = np.array([rotation_matrix(rotation)[:, 2] for rotation in solved.rotations])
+    leans = normals - normals[names.index(plane)]  # in the camera's frame: x right, y down
+    least = np.sin(np.radians(_TILTED_DEG))
+    x, y = leans[:, 0], leans[:, 1]
+    # A board that looks to the right has its left side raised.
+    found: dict[Side, np.bool_] = {
+        "left": (x > least).any(),
+        "right": (x < -least).any(),
+        "top": (y > least).any(),
+        "bottom": (y < -least).any(),
+    }
+    return frozenset(side for side, seen in found.items() if seen)
 
 
 def without_blurred(views: Sequence[BoardView], plane: str) -> tuple[list[BoardView], list[Dropped]]:

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 from service.cli.calibration.fixed_marks import fixed_marks
 from service.cli.errors import UserError
 from service.cli.options.board import board_of
-from service.cli.options.length import accept_share, known_length, made_of_lengths, tell_lengths
+from service.cli.options.length import accept_share, known_length, tell_lengths
 from service.cli.pictures.given_pictures import pictures_of
 
 if TYPE_CHECKING:
-    from contour.calibration.fixed_marks import Sentinels
     from contour.calibration.position_uncertainty import PositionUncertainty
-    from contour.camera_calibration.board import Board
     from contour.camera_calibration.calibrate import CameraResult
+    from service.calibrating.from_board import BoardCalibration
     from service.measuring.board_pictures import Gathered
     from service.measuring.calibration_file import CalibrationRecord
 
@@ -26,10 +25,10 @@ def from_board(args: argparse.Namespace) -> CalibrationRecord | None:
     """What the calibration file is to hold; None where the verdict is not good. Raise UserError."""
     from datetime import UTC, datetime
 
-    from contour.camera_calibration.calibrate import Setup, calibrate_camera
+    from contour.camera_calibration.calibrate import Setup
     from contour.errors import CalibrationFailed
-    from service.measuring.board_pictures import PlaneViewError, gather_views
-    from service.measuring.calibration_file import CalibrationRecord
+    from service.calibrating.from_board import calibrate_board
+    from service.measuring.board_pictures import PlaneViewError
 
     missing = [
         f"--{name.replace('_', '-')}" for name in ("squares", "square_mm", "plane") if getattr(args, name) is None
@@ -50,40 +49,24 @@ def from_board(args: argparse.Namespace) -> CalibrationRecord | None:
         camera_name=args.camera_name,
     )
     try:
-        gathered = gather_views(args.plane, pictures_of(args.images), board, _progress)
-        sentinels = fixed_marks(args, gathered)
-        result = calibrate_camera(gathered.views, board, gathered.size, setup, _progress)
+        made = calibrate_board(
+            args.plane,
+            pictures_of(args.images),
+            board,
+            setup,
+            lambda gathered: fixed_marks(args, gathered),
+            lambda: datetime.now(UTC),
+            _progress,
+        )
     except (PlaneViewError, CalibrationFailed) as error:
         raise UserError(str(error)) from error
-    _tell(result, gathered, setup.accept_apart)
-    made = made_of(result, board, setup.block_mm)
-    _report(args, result, gathered, board, setup, sentinels)
-    if not result.verdict.good:
-        options = " ".join(result.verdict.overrides)
+    _tell(made.result, made.gathered, setup.accept_apart)
+    _report(report_path(args), made)
+    if not made.result.verdict.good:
+        options = " ".join(made.result.verdict.overrides)
         print(f"{args.output}: not written. To take it nevertheless: {options}", file=sys.stderr)
         return None
-    return CalibrationRecord(result.calibration, args.camera_name, datetime.now(UTC), sentinels, made)
-
-
-def made_of(result: CameraResult, board: Board, block_mm: float) -> dict[str, str | float | None]:
-    """What the calibration file keeps of how it was made."""
-    verdict, sure = result.verdict, result.verdict.uncertainty
-    return {
-        "made_from": f"{board.kind} {board.name_of_size}",
-        "square_mm": float(board.square_mm),
-        "lens_model": result.model.name,
-        "views": len(result.views),
-        "corner_noise_px": round(result.noise_px, 4),
-        "turn_deg": round(result.turn_deg, 1),
-        "covered_share": round(verdict.zones.covered_share, 3),
-        "table_95_mm": round(sure.figure_mm(0.0), 4),
-        "block_mm": float(block_mm),
-        "block_95_mm": round(sure.figure_mm(block_mm), 4),
-        "halves_apart_mm": round(float(verdict.halves_mm[0].mean()), 4),
-        "inflation": round(verdict.inflation, 2),
-        **made_of_lengths(result.lengths),
-        "verdict": verdict.sentence,
-    }
+    return made.record
 
 
 def report_path(args: argparse.Namespace) -> Path:
@@ -114,19 +97,9 @@ def _told_use(sure: PositionUncertainty) -> str:
     return "; a block that leaves that part is refused (115 outside_work_area)"
 
 
-def _report(
-    args: argparse.Namespace,
-    result: CameraResult,
-    gathered: Gathered,
-    board: Board,
-    setup: object,
-    sentinels: Sentinels | None,
-) -> None:
-    from service.measuring.calibration_report import write_report
-
-    path = report_path(args)
+def _report(path: Path, made: BoardCalibration) -> None:
     try:
-        write_report(path, result, gathered, board, setup, sentinels)  # type: ignore[arg-type]
+        made.report(path)
     except OSError as error:
         raise UserError(f"--report {path}: cannot be written: {error.strerror}. Name another file") from error
     print(f"report    {path}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from service.cli.calibration.fixed_marks import fixed_marks
 from service.cli.errors import EXIT_REFUSED, UserError
-from service.cli.options.length import compare_span, made_of_lengths
+from service.cli.options.length import compare_span
 
 if TYPE_CHECKING:
     from contour.calibration.calibration import Calibration
@@ -18,6 +18,7 @@ def without_board(args: argparse.Namespace, way: str) -> CalibrationRecord:
     """What the calibration file is to hold, by `points` or `scale`; raise UserError."""
     from datetime import UTC, datetime
 
+    from service.calibrating.from_board import made_of_lengths
     from service.measuring.calibration_file import CalibrationRecord
 
     if way == "points":

@@ -12,7 +12,7 @@ from service.cli.errors import EXIT_FAILED, EXIT_OK, UserError
 
 if TYPE_CHECKING:
     from drivers.controller.modbus.client import ModbusController
-    from service.commissioning.check_result import CheckResult
+    from service.check_result import CheckResult
     from service.config.config import Config
 
 HELP = "find out what the controller can do and how it numbers its registers"
@@ -60,8 +60,8 @@ def run(args: argparse.Namespace) -> int:
 
 async def _probe(config: Config, args: argparse.Namespace) -> int:
     from drivers.controller import ControllerError
-    from service.commissioning.check_result import fault
-    from service.commissioning.probing.probe import Probe
+    from service.check_result import fault
+    from service.probing.probe import Probe
     from service.config.controllers import NoController
     from service.daemon.lock import LockError, Locks, NameLock
     from service.wiring.devices import controller_names, make_controller
@@ -107,7 +107,7 @@ def _print(result: CheckResult) -> None:
 
 
 async def _restarted(controller: ModbusController) -> bool:
-    from service.commissioning.check_result import fault, ok
+    from service.check_result import fault, ok
     from service.daemon.restart_watch import RESTART_WAIT_S, RestartWatch
 
     watch = RestartWatch(controller)

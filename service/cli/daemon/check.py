@@ -13,7 +13,7 @@ from service.cli.colour import Colour, painted
 from service.cli.errors import EXIT_FAILED, EXIT_OK, EXIT_UNUSABLE
 
 if TYPE_CHECKING:
-    from service.commissioning.check_result import CheckResult
+    from service.check_result import CheckResult
 
 HELP = "say what is wrong with configuration, devices and machine"
 DESCRIPTION = """\
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check, print, and tell by the exit status."""
     from service.cli.text_output import text_output
-    from service.commissioning.check_result import Level
+    from service.check_result import Level
 
     with text_output(args.json) as write:
         text = sys.stderr if args.json == "-" else sys.stdout
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _results(args: argparse.Namespace) -> Iterator[CheckResult]:
     """All that can be checked, part by part; after a bad configuration nothing more."""
-    from service.commissioning.check_result import fault, ok, warning
+    from service.check_result import fault, ok, warning
     from service.config.config_file import ConfigError, load_config
 
     try:

@@ -99,9 +99,3 @@ def compare_span(args: argparse.Namespace, calibration: Calibration, cause: str)
             f"{fault}. To take it nevertheless: --accept-apart-percent {check.needed_percent:g}", EXIT_REFUSED
         )
     return (check,)
-
-
-def made_of_lengths(lengths: Sequence[LengthCheck]) -> dict[str, str | float | None]:
-    """What the calibration file keeps of the comparisons."""
-    told = "; ".join(f"{check.what}: {check.solved_mm:.1f} mm, measured {check.measured_mm:g}" for check in lengths)
-    return {"compared_lengths": told} if told else {}

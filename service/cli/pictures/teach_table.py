@@ -39,10 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Take, average, check, write."""
-    from contour.errors import EdgeContradicted, NoBlockFound, PictureError
-    from contour.image.taught_table import teach
-    from contour.tracing.trace import TraceSettings
-    from contour.tracing.tracing import trace
+    from service.calibrating.teaching import TableRefused, taught_table
     from service.cli.file_names import check_outputs
     from service.cli.options.measuring import load_config_or_default
     from service.measuring.table_file import TableFileError, TableRecord, save_table
@@ -59,21 +56,9 @@ def run(args: argparse.Namespace) -> int:
     check_outputs(args.images, [("--output" if args.output else "table.file", path)])
     pictures, camera = _read(args.images) if args.images else _taken(config, args.frames)
     try:
-        table = teach(pictures)
-        found = trace(table.picture, TraceSettings())
-    except NoBlockFound:
-        pass
-    except PictureError as error:
+        table = taught_table(pictures)
+    except TableRefused as error:
         raise UserError(str(error), EXIT_REFUSED) from error
-    except EdgeContradicted as error:
-        raise UserError(f"a block seems to lie on the table: {error}. Clear the table", EXIT_REFUSED) from error
-    else:
-        x, y = found.contour.exterior.mean(axis=0)
-        if not found.reaches_frame:
-            raise UserError(
-                f"a block seems to lie on the table, around ({x:.0f}, {y:.0f}) px. Clear the table and teach it again",
-                EXIT_REFUSED,
-            )
     record = TableRecord(table, camera, len(pictures), datetime.now(UTC).isoformat(timespec="seconds"))
     try:
         save_table(path, record)

@@ -15,7 +15,7 @@ from drivers.camera import CameraError, Frame
 from drivers.camera.files.folder import list_versions
 from drivers.controller import ControllerError
 from drivers.trigger import TriggerUnavailable
-from service.commissioning.check_result import CheckResult, fault, ok, warning
+from service.check_result import CheckResult, fault, ok, warning
 from service.commissioning.checkup.running import other_user_of_controller
 from service.config.cameras import FilesCamera, GenicamCamera, V4l2Camera
 from service.config.config import Config

@@ -10,7 +10,7 @@ import numpy as np
 from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
 from contour.geometry.rings import bounding_box
-from service.commissioning.check_result import CheckResult, fault, ok, warning
+from service.check_result import CheckResult, fault, ok, warning
 from service.commissioning.checkup.page import check_page
 from service.config.adopted_recipes import load_adopted
 from service.config.config import Config

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 from collections.abc import Iterator
 
-from service.commissioning.check_result import CheckResult, fault, ok
+from service.check_result import CheckResult, fault, ok
 from service.config.config import Config
 from service.daemon.listening_socket import bound
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 from collections.abc import Iterator
 
-from service.commissioning.check_result import CheckResult, fault, ok, warning
+from service.check_result import CheckResult, fault, ok, warning
 from service.config.config import Page
 
 

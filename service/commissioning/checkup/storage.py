@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from service.commissioning.check_result import CheckResult, fault, ok, warning
+from service.check_result import CheckResult, fault, ok, warning
 from service.config.config import Config
 from service.records.archive import free_bytes
 from service.records.job import Job

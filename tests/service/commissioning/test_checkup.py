@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from service.cli.main import main
-from service.commissioning.check_result import CheckResult, Level
+from service.check_result import CheckResult, Level
 from service.commissioning.checkup.devices import check_devices
 from service.commissioning.checkup.files import check_files
 from service.commissioning.checkup.listening import check_listening

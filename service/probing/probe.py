@@ -16,10 +16,10 @@ from drivers.controller import ControllerUnavailable
 from drivers.controller.mailbox.blocks import BLOCK_REGISTERS
 from drivers.controller.modbus.client import ModbusController
 from drivers.controller.modbus.requests import LONGEST_READ
-from service.commissioning.check_result import CheckResult, fault, ok
-from service.commissioning.probing.probed import HEADER, Probed
-from service.commissioning.probing.reading import ReadProbe
-from service.commissioning.probing.writing import WriteProbe
+from service.check_result import CheckResult, fault, ok
+from service.probing.probed import HEADER, Probed
+from service.probing.reading import ReadProbe
+from service.probing.writing import WriteProbe
 
 
 class Probe:

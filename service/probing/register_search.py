@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Iterator
 
 from drivers.controller.mailbox.layout import REGISTERS
-from service.commissioning.probing.link_signature import Registers
+from service.probing.link_signature import Registers
 
 SURVEY_S = 60.0  # on a slow line the nearest registers alone can be read in it
 BLOCK = 16

@@ -9,9 +9,9 @@ from functools import partial
 from drivers.controller import ControllerRefused, ControllerUnavailable
 from drivers.controller.mailbox.blocks import BLOCK_REGISTERS, TEST_VALUE
 from drivers.controller.modbus.requests import LONGEST_WRITE, read_registers, registers_of, stream_of, write_registers
-from service.commissioning.check_result import CheckResult, fault, ok
-from service.commissioning.probing.link_signature import Signature, from_echo
-from service.commissioning.probing.probed import LOOK_PERIOD_S, Probed, largest, pieces
+from service.check_result import CheckResult, fault, ok
+from service.probing.link_signature import Signature, from_echo
+from service.probing.probed import LOOK_PERIOD_S, Probed, largest, pieces
 
 OWNER_WATCH_S = 3.0  # as long as the protocol lets a service watch another's heartbeat
 ECHO_WAIT_S = 3.0

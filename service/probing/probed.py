@@ -10,8 +10,8 @@ from drivers.controller.mailbox.layout import MailboxLayout
 from drivers.controller.mailbox.pages import HEADER_REGISTERS
 from drivers.controller.modbus.client import ModbusController
 from drivers.controller.modbus.requests import SHORTEST_LIMIT, Request, people, read_registers, registers_of
-from service.commissioning.check_result import CheckResult, fault, ok
-from service.commissioning.probing.link_signature import Registers, Signature
+from service.check_result import CheckResult, fault, ok
+from service.probing.link_signature import Registers, Signature
 
 HEADER = 1 + HEADER_REGISTERS
 NO_SUCH_REGISTER = 2  # exception code

@@ -1,1 +1,0 @@
-"""A connected controller in, what it can do and what to change in the configuration out. Used by the commands."""

@@ -19,7 +19,7 @@ from service.daemon.control_triggers import ControlTriggers
 from service.daemon.lock import Held, LockError
 from service.daemon.missed_watch import MissedWatch
 from service.daemon.opening import DiskRefuses, Opening
-from service.daemon.operations import CONTROL_PART, Halt, Operations
+from service.daemon.operations import CONTROL_PART, LINK_PART, Halt, Operations
 from service.daemon.reload import Reloader
 from service.daemon.storage_watch import StorageWatch
 from service.daemon.supervisor import Supervisor
@@ -203,7 +203,7 @@ class Daemon:
         if parts.archive is not None:
             parts.archive.start()
         if parts.link is not None:
-            add("link", parts.link.run)
+            add(LINK_PART, parts.link.run)
             add("link watch", partial(self._watch_link, parts.link))
             watched.append("link")
             self._report_link(parts.link)

@@ -7,12 +7,12 @@ import json
 import logging
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from service.atomic_file import sync_folder, write_whole
 from service.daemon.control import CommandRefused, Handler, reason_text
@@ -27,6 +27,8 @@ from service.state import State
 log = logging.getLogger("combtrace.control")
 
 HALT_FILE = "halted.json"
+LINK_PART = "link"
+T = TypeVar("T")
 CONTROL_PART = "control"  # of the supervisor's parts the one that serves these commands
 
 
@@ -156,6 +158,12 @@ class Operations:
         for text in said:
             log.warning("confirmed by %s: %s", who, text)
         return {"state": self._health.state.label, "confirmed": said}
+
+    async def alone_with_the_controller(self, work: Awaitable[T]) -> T:
+        """What `work` gives while the service leaves its controller alone; only while it is halted."""
+        if self._health.state is not State.HALTED or not self._executor.idle:
+            raise CommandRefused(f"the service is {self._health.state.label}, not Halted and idle. Halt it first")
+        return await self._supervisor.without(LINK_PART, work)
 
     async def reset(self, _request: Mapping[str, Any], who: str) -> dict[str, Any]:
         """Start all parts anew: connections, camera, ports. A halt stays."""

@@ -56,7 +56,7 @@ class Reloader:
         measuring: Measuring,
     ) -> None:
         """make_plan raises BadPlan; it is called in a thread."""
-        self._path = path
+        self.path = path
         self._config = config
         self._health = health
         self._make_plan = make_plan
@@ -78,8 +78,7 @@ class Reloader:
         while True:
             await self._asked.wait()
             self._asked.clear()
-            async with self._one_change:
-                await self._reload()
+            await self.reload()
 
     async def adopt(self, expected: Recipe, recipe: Recipe, keep: Callable[[Config], int]) -> int:
         """What `keep` gives; from the next job on `recipe` is in the place of `expected`, which must be in force.
@@ -106,13 +105,18 @@ class Reloader:
         job = self._health.job
         return "from the next job on" if job is None else f"from the job after {job} on"
 
-    async def _reload(self) -> None:
+    async def reload(self) -> str | None:
+        """Why what was read does not apply; None where it does."""
+        async with self._one_change:
+            return await self._reloaded()
+
+    async def _reloaded(self) -> str | None:
         try:
-            fresh = await asyncio.to_thread(load_config, self._path)
+            fresh = await asyncio.to_thread(load_config, self.path)
             fixed = [key for key in differences(self._config, fresh) if key.split(".")[0].split(" ")[0] not in RELOADED]
             if fixed:
                 what = ", ".join(fixed)
-                raise BadPlan(f"{self._path}: {what} changed, which needs a restart. Restart the service, or undo it")
+                raise BadPlan(f"{self.path}: {what} changed, which needs a restart. Restart the service, or undo it")
             plan = await asyncio.to_thread(self._make_plan, fresh)
         except (ConfigError, BadPlan) as error:
             lines = str(error).splitlines()
@@ -122,7 +126,7 @@ class Reloader:
             log.warning("the configuration of before stays in force, all of it", extra=fields)
             more = f" (and {len(lines) - 1} more)" if lines[1:] else ""
             self._health.warn(PART, f"not reloaded: {lines[0]}{more}")
-            return
+            return lines[0] + more
         changed = ", ".join(differences(self._config, fresh)) or "the files it names are read again"
         self._measuring.use(plan)
         self._config = fresh
@@ -130,6 +134,7 @@ class Reloader:
         self._health.warn(PART, None)
         fields = event("reload", reloaded=True, changed=changed)
         log.info("configuration reloaded, %s: %s", self.since(), changed, extra=fields)
+        return None
 
 
 def differences(old: BaseModel, new: BaseModel, path: str = "") -> Iterator[str]:

@@ -11,6 +11,7 @@ import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from typing import TypeVar
 
 from service.jobs.health import Fault, Health
 from service.reasons import Reason
@@ -20,6 +21,9 @@ log = logging.getLogger("combtrace.supervisor")
 RESTART_PAUSES_S = (0.1, 0.5, 2.0, 10.0, 30.0)
 SOUND_AFTER_S = 2.0  # a part that has run so long again is no fault any more
 FORGIVEN_AFTER_S = 300.0  # and after that the pauses begin anew
+SIGN_OF_LIFE_S = 1.0  # of a part that rests
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,7 @@ class Part:
     failed_at: str | None = None
     failures: int = field(default=0, repr=False)
     task: asyncio.Future[None] | None = field(default=None, repr=False)
+    rests: bool = field(default=False, repr=False)
 
 
 class Supervisor:
@@ -77,8 +82,24 @@ class Supervisor:
             if part.task is not None:
                 part.task.cancel()
 
+    async def without(self, name: str, work: Awaitable[T]) -> T:
+        """What `work` gives while a part has ended, to begin anew after it."""
+        part = next(one for one in self.parts if one.name == name)
+        part.rests = True
+        try:
+            if part.task is not None:
+                part.task.cancel()
+                await asyncio.wait([part.task])
+            return await work
+        finally:
+            part.rests = False
+
     async def _keep(self, part: Part) -> None:
         while True:
+            if part.rests:
+                self._feed_watchdog(part.name)
+                await asyncio.sleep(SIGN_OF_LIFE_S)
+                continue
             error = await self._run_once(part)
             if error is None:
                 continue

@@ -11,8 +11,9 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
+from dataclasses import dataclass
 
-from drivers.controller import ControllerUnavailable
+from drivers.controller import ControllerError, ControllerUnavailable
 from drivers.controller.mailbox.blocks import BLOCK_REGISTERS
 from drivers.controller.modbus.client import ModbusController
 from drivers.controller.modbus.requests import LONGEST_READ
@@ -20,6 +21,28 @@ from service.check_result import CheckResult, fault, ok
 from service.probing.probed import HEADER, Probed
 from service.probing.reading import ReadProbe
 from service.probing.writing import WriteProbe
+
+
+@dataclass(frozen=True)
+class ProbeFindings:
+    """All that was found out, and keys of the configuration's `controller` with what they should be."""
+
+    results: tuple[CheckResult, ...]
+    changes: dict[str, object]
+
+
+async def probed(controller: ModbusController, timeout_s: float, *, write: bool) -> ProbeFindings:
+    """What one look at a controller finds out; it is closed then."""
+    probe = Probe(controller, timeout_s)
+    results = []
+    try:
+        async for result in probe.results(write=write):
+            results.append(result)
+    except ControllerError as error:
+        results.append(fault("controller", str(error)))
+    finally:
+        await controller.close()
+    return ProbeFindings(tuple(results), probe.changes)
 
 
 class Probe:

@@ -10,10 +10,10 @@ from drivers.controller import ControllerNonsense, ControllerTimeout
 from drivers.controller.mailbox.blocks import BLOCK_REGISTERS
 from drivers.controller.modbus.requests import LONGEST_READ, people, read_registers
 from service.check_result import CheckResult, fault, ok
+from service.poll_timing import off_beat
 from service.probing.link_signature import Registers, Signature, from_mailbox, from_movement
 from service.probing.probed import LOOK_PERIOD_S, Probed, largest, pieces
 from service.probing.register_search import SURVEY_S, survey
-from service.poll_timing import off_beat
 
 ROUND_TRIPS = 20
 MOVEMENT_WATCH_S = 2.5  # a heartbeat changes at least once a second

@@ -124,3 +124,33 @@ async def test_the_end_of_the_supervisor_ends_its_parts() -> None:
     async with keeping(part=part):
         await asyncio.sleep(0.01)
     assert ended == ["part"]
+
+
+async def test_a_part_rests_while_other_work_is_done_and_begins_anew_after_it() -> None:
+    begun: list[str] = []
+
+    async def part() -> None:
+        begun.append("part")
+        try:
+            await for_ever()
+        finally:
+            begun.append("end")
+
+    async def work() -> str:
+        begun.append("work")
+        await asyncio.sleep(0.05)
+        return "done"
+
+    async def fails() -> str:
+        raise KeyError("a defect")
+
+    async with keeping(part=part) as (kept, health):
+        await until(lambda: begun == ["part"])
+        assert await kept.without("part", work()) == "done"
+        assert begun[:3] == ["part", "end", "work"]
+        await until(lambda: begun == ["part", "end", "work", "part"])
+        with pytest.raises(KeyError):
+            await kept.without("part", fails())
+        await until(lambda: begun.count("part") == 3)
+        assert health.state is State.READY
+        assert kept.kept()[0].restarts == 0

@@ -10,6 +10,8 @@ import numpy as np
 from contour.geometry.arrays import Bytes
 
 DARKEST, BRIGHTEST = 2, 253  # noise moves clipped pixels by a level or two
+MOST_CLIPPED = 0.01
+"""Of a picture's pixels: beyond, light or exposure is to be changed."""
 
 
 @dataclass(frozen=True)

@@ -31,10 +31,11 @@ vertical-align: top; } td.number { text-align: right; }
 .value { font-size: 11px; text-anchor: middle; } .axis { font-size: 18px; font-weight: bold; fill: #fff; stroke: #000;
 stroke-width: 3; paint-order: stroke; }
 .x { stroke: #e41a1c; stroke-width: 4; } .y { stroke: #4daf4a; stroke-width: 4; }
+.aside { position: absolute; }
 .origin { fill: #fff; stroke: #000; stroke-width: 2; } .seen circle { fill: none; stroke: #ff0; stroke-width: 1; }
 """
 HATCH = (
-    '<svg width="0" height="0" style="position:absolute"><defs><pattern id="hatch" width="8" height="8" '
+    '<svg width="0" height="0" class="aside"><defs><pattern id="hatch" width="8" height="8" '
     'patternUnits="userSpaceOnUse" patternTransform="rotate(45)"><rect width="8" height="8" fill="#fff"/>'
     '<line x1="0" y1="0" x2="0" y2="8" stroke="#c33" stroke-width="3"/></pattern></defs></svg>'
 )

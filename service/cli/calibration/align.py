@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,7 +32,6 @@ how far off a point may lie; without any, --jog-mm does.
 Exit status: 0 written, 3 refused (a point is farther off than jogging explains, or the
 scale is not 1 within --accept-scale-percent), 2 unusable input."""
 
-WORK = ("x_mm", "y_mm", "machine_x_mm", "machine_y_mm")
 PIXELS = ("x_px", "y_px", "machine_x_mm", "machine_y_mm")
 
 
@@ -58,6 +56,7 @@ def run(args: argparse.Namespace) -> int:
     """Fit, print, write."""
     from contour.camera_calibration.alignment_fit import AlignmentLimits, fit_alignment
     from contour.errors import CalibrationError, CalibrationFailed
+    from service.calibrating.alignment import WORK_POINTS, aligned, square_mm
     from service.measuring.calibration_file import CalibrationFileError, load_record, save_record
     from service.measuring.points_file import PointsFileError, read_points
 
@@ -69,15 +68,9 @@ def run(args: argparse.Namespace) -> int:
             raise UserError(f"--{name.replace('_', '-')} {value:g}: expected a number above 0")
     try:
         record = load_record(args.calibration)
-        layout, table = read_points(args.points, [WORK, PIXELS])
+        layout, table = read_points(args.points, [WORK_POINTS, PIXELS])
         work = _work_points(table[:, :2], record.calibration, args.height_mm) if layout == PIXELS else table[:, :2]
-        square_mm = record.made.get("square_mm")
-        limits = AlignmentLimits(
-            args.accept_mm,
-            args.accept_scale_percent / 100,
-            args.jog_mm,
-            float(square_mm) if isinstance(square_mm, int | float) else None,
-        )
+        limits = AlignmentLimits(args.accept_mm, args.accept_scale_percent / 100, args.jog_mm, square_mm(record))
         fit = fit_alignment(work, table[:, 2:], limits)
     except (CalibrationFileError, PointsFileError) as error:
         raise UserError(str(error)) from error
@@ -88,17 +81,9 @@ def run(args: argparse.Namespace) -> int:
         options = " ".join(fit.refusal.overrides)
         nevertheless = f". To take it nevertheless: {options}" if options else ""
         raise UserError(f"{args.points}: {fit.refusal.text}{nevertheless}", EXIT_REFUSED)
-    calibration = replace(record.calibration, alignment=fit.alignment)  # type: ignore[type-var]
-    made = {
-        **record.made,
-        "alignment_points": float(len(work)),
-        "alignment_worst_mm": round(float(fit.residuals_mm.max()), 4),
-        "alignment_scale": round(fit.scale, 6),
-        "alignment_scale_95": round(fit.scale_95, 6),
-    }
     path = args.output or args.calibration
     try:
-        save_record(path, replace(record, calibration=calibration, made=made))
+        save_record(path, aligned(record, fit))
     except CalibrationFileError as error:
         raise UserError(str(error)) from error
     print(f"written   {path}")

@@ -61,9 +61,9 @@ def run(args: argparse.Namespace) -> int:
 async def _probe(config: Config, args: argparse.Namespace) -> int:
     from drivers.controller import ControllerError
     from service.check_result import fault
-    from service.probing.probe import Probe
     from service.config.controllers import NoController
     from service.daemon.lock import LockError, Locks, NameLock
+    from service.probing.probe import Probe
     from service.wiring.devices import controller_names, make_controller
 
     controller = make_controller(config)

@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check, print, and tell by the exit status."""
-    from service.cli.text_output import text_output
     from service.check_result import Level
+    from service.cli.text_output import text_output
 
     with text_output(args.json) as write:
         text = sys.stderr if args.json == "-" else sys.stdout

@@ -23,7 +23,6 @@ Exit status: 0 ended, 1 no frame, 2 bad configuration or usage."""
 
 BAR = 30
 PERIOD_S = 0.2
-CLIPPED = 0.01
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,12 +54,14 @@ def run(args: argparse.Namespace) -> int:
 
 def focus_line(figures: PictureFigures, best: float) -> str:
     """One line for the person at the lens: a bar that is full at the best so far, figures, and what is clipped."""
+    from contour.image.picture_figures import MOST_CLIPPED
+
     share = figures.sharpness / best if best > 0 else 0.0
     bar = "#" * round(BAR * share)
     notes = []
-    if figures.bright_share > CLIPPED:
+    if figures.bright_share > MOST_CLIPPED:
         notes.append("white clipped: less light or exposure")
-    if figures.dark_share > CLIPPED:
+    if figures.dark_share > MOST_CLIPPED:
         notes.append("black clipped: more light or exposure")
     text = f"[{bar:<{BAR}}] {share:4.0%} of the best; {figures}"
     return text + (" - " + ", ".join(notes) if notes else "")

@@ -212,30 +212,35 @@ class Commands:
 
     async def carry_out(self, who: str, address: str, order: Order, do: Callable[[], Awaitable[tuple[T, str]]]) -> T:
         """What `do` gives, with its words for the note. Not done where another has the word, or it cannot be noted."""
+        return await self._done(await self.begun(who, address, order), do)
+
+    async def begun(self, who: str, address: str, order: Order) -> int:
+        """The number of the note that they begin this; whoever carries it out notes its result."""
         await self._has_the_word(who, address, order.take_over)
         number = await self._noted(who, address, order.action, order.detail)
         if number is None:
             raise RequestRefused(503, f"the journal cannot be written, so {order.otherwise}", Reason.STORAGE_FULL)
         log.info("page: %s by %s from %s: %s", order.action, who, address, order.detail or "")
-        return await self._done(number, do)
+        return number
 
     async def _done(self, number: int | None, do: Callable[[], Awaitable[tuple[T, str]]]) -> T:
         """What `do` gives; what became of it is noted, however it ends."""
         try:
             given, result = await do()
         except TriggerRefused as refused:
-            await self._note_result(number, f"refused: {refused.reason.label}: {refused}")
+            await self.note_result(number, f"refused: {refused.reason.label}: {refused}")
             raise RequestRefused(409, str(refused), refused.reason) from refused
         except CommandRefused as refused:
-            await self._note_result(number, f"refused: {refused}")
+            await self.note_result(number, f"refused: {refused}")
             raise RequestRefused(409, str(refused)) from refused
         except DaemonSilent as silent:
-            await self._note_result(number, f"not known: {silent}")
+            await self.note_result(number, f"not known: {silent}")
             raise RequestRefused(503, str(silent)) from silent
-        await self._note_result(number, result)
+        await self.note_result(number, result)
         return given
 
-    async def _note_result(self, number: int | None, result: str) -> None:
+    async def note_result(self, number: int | None, result: str) -> None:
+        """What became of it, where it is noted."""
         if number is None:
             return
         try:

@@ -1,14 +1,17 @@
-// Orders: measure, halt, resume. What becomes of them is told beside them.
+// Orders: measure, halt, resume. Each needs a token or a PIN.
 
 import { at, make, say } from "./dom.js";
 import { onLanguage, words } from "./words.js";
-import * as asking from "./asking.js";
+import { give } from "./giving.js";
 
 let recipes = "";
 let heard = null;
 let told = () => (areOff ? words("no_orders") : "");
 let isHaltTold = false;
 let measured = null; // the job that was ordered here, as long as it runs
+
+/** What a page has a job told besides its recipe. */
+export const extra = {};
 
 const CAN_MEASURE = ["Ready", "SingleExecution", "ContinuousExecution"];
 const areOff = document.body.dataset.orders === "off"; // the page can only be looked at
@@ -61,14 +64,18 @@ function ended(last) {
 
 function ask(button, path, body, done) {
   if (at(button).disabled) return; // a key finds it as the button does
-  const begun = () => (measured = null);
-  asking.ask({ path, body, tell, begun, done: (answer) => {
+  const begun = () => {
+    measured = null;
+    tell(() => words("sending"), false);
+  };
+  const ended = (answer) => {
     tell(done(answer), false);
     isHaltTold = path === "/halt";
-  } });
+  };
+  give({ path, body, begun, done: ended, failed: (text) => tell(text, true) });
 }
 
-function tell(text, isBad) {
+export function tell(text, isBad) {
   told = text;
   isHaltTold = false;
   at("told").classList.toggle("bad", isBad);
@@ -76,7 +83,7 @@ function tell(text, isBad) {
 }
 
 export const measure = () =>
-  ask("trigger", "/trigger", { recipe: Number(at("recipe").value) }, ({ job }) => {
+  ask("trigger", "/trigger", { recipe: Number(at("recipe").value), ...extra }, ({ job }) => {
     measured = job;
     return () => (job === null ? words("queued") : words("ordered", { job }));
   });

@@ -17,3 +17,17 @@ export function paced(action, most, period) {
     timer ??= setTimeout(act, Math.max(1 - left, 0) * period);
   };
 }
+
+const AGAIN_MS = 2_000;
+
+/** The task done, however often the service must be asked; `lost` is told each time that it does not answer. */
+export async function insist(task, lost) {
+  for (;;) {
+    try {
+      return await task();
+    } catch {
+      lost();
+      await new Promise((again) => setTimeout(again, AGAIN_MS));
+    }
+  }
+}

@@ -1,33 +1,20 @@
 // The operator's page: puts its parts together. It uses nothing but the REST interface under /api/v1.
 
 import { at, make, say } from "./dom.js";
-import { choose, chosen, keep, load, onLanguage, words } from "./words.js";
+import { load, onLanguage, words } from "./words.js";
 import { listen } from "./service.js";
-import { paced } from "./pace.js";
+import { insist, paced } from "./pace.js";
 import { loadReasons } from "./reasons.js";
+import { switchLanguage, switchTheme } from "./reader.js";
 import * as film from "./film.js";
 import * as live from "./live.js";
 import * as now from "./now.js";
 import * as orders from "./orders.js";
 
-const THEMES = { auto: "dark", dark: "light", light: "auto" };
-const AGAIN_MS = 2_000;
-const ready = Promise.all([insist(() => load()), insist(loadReasons)]);
+const ready = Promise.all([insist(load, now.lose), insist(loadReasons, now.lose)]);
 let seen = "";
 // Two for a job that ends and is kept; a machine of five jobs a second is not held up by who watches it.
 const lookSoon = paced(film.refresh, 2, 500);
-
-/** The task done, however often the service must be asked; meanwhile the banner says that it does not answer. */
-async function insist(task) {
-  for (;;) {
-    try {
-      return await task();
-    } catch {
-      now.lose();
-      await new Promise((again) => setTimeout(again, AGAIN_MS));
-    }
-  }
-}
 
 function heard(state) {
   now.show(state);
@@ -43,15 +30,9 @@ function lost() {
   orders.allow(null);
 }
 
-async function switchLanguage() {
+async function changeLanguage() {
   await ready;  // a key may come before the words
-  choose(chosen() === "en" ? "ru" : "en");
-}
-
-function switchTheme() {
-  const root = document.documentElement;
-  root.dataset.theme = THEMES[root.dataset.theme];
-  keep("theme", root.dataset.theme);
+  switchLanguage();
 }
 
 function help() {
@@ -63,7 +44,7 @@ function help() {
 
 // By the key's place, so that they work under a Russian layout too.
 const KEYS = {
-  KeyM: orders.measure, KeyV: live.toggle, KeyF: past(film.freeze), KeyR: past(film.toggleRefused), KeyL: switchLanguage, KeyT: switchTheme, Slash: help,
+  KeyM: orders.measure, KeyV: live.toggle, KeyF: past(film.freeze), KeyR: past(film.toggleRefused), KeyL: changeLanguage, KeyT: switchTheme, Slash: help,
   ArrowLeft: past(() => film.go(-1)), ArrowRight: past(() => film.go(1)), Escape: past(film.live),
 };
 
@@ -82,8 +63,7 @@ document.addEventListener("keydown", (event) => {
   event.preventDefault();
   KEYS[event.code]();
 });
-at("language").addEventListener("click", switchLanguage);
-at("theme").addEventListener("click", switchTheme);
+at("language").addEventListener("click", changeLanguage);
 at("help").addEventListener("click", help);
 onLanguage(() => at("help-dialog").open && help());
 

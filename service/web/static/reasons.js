@@ -1,4 +1,4 @@
-// Why jobs are not accepted, in words: the table of reasons.
+// The table of reasons: what a code means, and what to do.
 
 import { chosen } from "./words.js";
 import { get } from "./service.js";
@@ -15,7 +15,7 @@ export function reasonOf(code) {
   return reasons.get(code)?.[chosen()] ?? null;
 }
 
-/** The sentence of a reason's name; the name where there is none. */
+/** The sentence of a reason by its name; the name where there is none. */
 export function sentenceOf(name) {
   const entry = [...reasons.values()].find((one) => one.name === name);
   return entry?.[chosen()]?.sentence ?? name;

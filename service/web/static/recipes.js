@@ -1,14 +1,15 @@
 // The page of recipes: what is in force, a change that is tried on archived jobs, and what was adopted.
 
-import { ask } from "./asking.js";
 import { at, make, say } from "./dom.js";
-import * as form from "./recipe-form.js";
-import { loadReasons } from "./reasons.js";
+import { chosen, load, moment, onLanguage, seenAs, words } from "./words.js";
 import { get } from "./service.js";
+import { insist } from "./pace.js";
+import { loadReasons } from "./reasons.js";
+import { switchLanguage } from "./reader.js";
+import { give } from "./giving.js";
+import * as form from "./recipe-form.js";
 import * as tried from "./tried.js";
-import { choose, chosen, keep, load, moment, onLanguage, seenAs, words } from "./words.js";
 
-const THEMES = { auto: "dark", dark: "light", light: "auto" };
 const BUSY_MS = 1_000;
 const CALM_MS = 5_000;
 const areOff = document.body.dataset.orders === "off"; // the page can only be looked at
@@ -114,7 +115,7 @@ function order(id, path, body, told) {
     tell(() => told(answer), false);
     look();
   };
-  ask({ path, body, tell, done });
+  give({ path, body, begun: () => tell(() => words("sending"), false), done, failed: (text) => tell(text, true) });
 }
 
 function back(adoption) {
@@ -141,25 +142,11 @@ at("adopt-form").addEventListener("submit", (event) => {
   event.preventDefault();
   order("adopt-told", `/recipes/${selected}/adopt`, { trial: trial.number, note: at("note").value.trim() }, adopted);
 });
-at("language").addEventListener("click", () => choose(chosen() === "en" ? "ru" : "en"));
-at("theme").addEventListener("click", () => {
-  const root = document.documentElement;
-  root.dataset.theme = THEMES[root.dataset.theme];
-  keep("theme", root.dataset.theme);
-});
+at("language").addEventListener("click", switchLanguage);
 onLanguage(() => known && refresh());
 
-async function start() {
-  try {
-    await Promise.all([load("recipes-texts.json"), loadReasons(), get("/recipes/schema").then(form.use)]);
-  } catch {
-    at("lost").hidden = false;
-    setTimeout(start, BUSY_MS);
-    return;
-  }
-  if (areOff) telling("told")(() => words("no_orders"), false);
-  for (const id of ["language", "theme"]) at(id).disabled = false;
-  await look();
-}
-
-start();
+const lost = () => (at("lost").hidden = false);
+await Promise.all([insist(() => load("recipes-texts.json"), lost), insist(loadReasons, lost), insist(() => get("/recipes/schema").then(form.use), lost)]);
+if (areOff) telling("told")(() => words("no_orders"), false);
+for (const id of ["language", "theme"]) at(id).disabled = false;
+await look();

@@ -27,8 +27,9 @@ export async function get(path) {
   return learn(await answer.json());
 }
 
-export function isKnown() {
-  return proof !== null;
+/** True where who gives orders is known; a PIN only where it is enough. */
+export function isKnown(byPin = true) {
+  return proof !== null && (byPin || proof.startsWith("Bearer "));
 }
 
 export function remember(value) {

@@ -4,13 +4,10 @@ let texts = {};
 let language = document.documentElement.lang;
 const listeners = [];
 
-/** Load the texts; own: the name of those that one page has besides. */
-export async function load(own) {
-  texts = await (await fetch("/static/texts.json")).json();
-  if (!own) return;
-  const more = await (await fetch(`/static/${own}`)).json();
-  Object.assign(texts.en, more.en);
-  Object.assign(texts.ru, more.ru, more.described); // sentences that the service has in English alone
+/** The words of the pages, and of one page's own files; `described` are sentences that the service has in English alone. */
+export async function load(...more) {
+  const told = await Promise.all(["texts.json", ...more].map(async (name) => (await fetch(`/static/${name}`)).json()));
+  texts = { en: Object.assign({}, ...told.map(({ en }) => en)), ru: Object.assign({}, ...told.flatMap(({ ru, described }) => [ru, described])) };
 }
 
 export function chosen() {

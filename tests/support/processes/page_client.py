@@ -12,6 +12,7 @@ from service.web.people.pins import line_of
 
 TOKEN = "anna-has-this-token-0123"
 OTHER_TOKEN = "oleg-has-this-token-4567"
+THIRD_TOKEN = "nina-has-this-token-8901"
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,9 @@ class Client:
 
 
 def token_file(folder: Path) -> Path:
-    """A file with two people's tokens."""
+    """A file with three people's tokens."""
     path = folder / "tokens"
-    path.write_text(f"# who may give orders\nanna {TOKEN}\noleg {OTHER_TOKEN}\n")
+    path.write_text(f"# who may give orders\nanna {TOKEN}\noleg {OTHER_TOKEN}\nnina {THIRD_TOKEN}\n")
     path.chmod(0o600)
     return path
 

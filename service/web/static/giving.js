@@ -1,22 +1,23 @@
-// Who gives an order: a token or a PIN, asked for once and forgotten soon, and a word where another person gives orders.
+// Giving an order: who gives it is asked for once and forgotten soon, and why they take over from another person.
 
 import { at, make, say } from "./dom.js";
-import { reasonOf } from "./reasons.js";
-import { Refused, get, isKnown, order, remember } from "./service.js";
 import { onLanguage, seenAs, words } from "./words.js";
+import { Refused, get, isKnown, order, remember } from "./service.js";
+import { reasonOf } from "./reasons.js";
 
 const REFUSALS = { 401: "wrong_token", 403: "no_orders", 409: "not_now", 422: "not_so", 429: "too_often", 503: "cannot" };
+
 let pending = null;
 let isUnderWay = false; // an order that is not answered yet
 
 /** Have it done, one order at a time, after asking who orders it where that is not known.
  *
- * asked: path and body of the order; tell(text, isBad) shows a text of how it goes, a function that gives it in the
- * chosen language; begun() is called when it is sent, done(answer) when it has been carried out. */
-export function ask(asked) {
+ * begun() when it is sent; done(answer) or failed(words) with what became of it. byPin: a PIN is proof enough.
+ */
+export function give(asked) {
   if (isUnderWay) return;
-  pending = asked;
-  if (isKnown()) carryOut();
+  pending = { byPin: true, ...asked };
+  if (isKnown(pending.byPin)) carryOut();
   else openDialog("");
 }
 
@@ -26,7 +27,7 @@ async function openDialog(text) {
   if (!at("token-dialog").open) at("token-dialog").showModal();
   at("token").focus();
   try {
-    fillPeople((await get("/people")).names);
+    fillPeople(pending.byPin ? (await get("/people")).names : []);
   } catch {
     fillPeople([]); // then by a token
   }
@@ -49,15 +50,14 @@ function askedFor() {
 }
 
 async function carryOut() {
-  const { path, body, tell, begun, done } = pending;
+  const { path, body, begun, done, failed } = pending;
   isUnderWay = true;
-  begun?.();
-  tell(() => words("sending"), false);
+  begun();
   try {
     done(await order(path, body));
   } catch (error) {
-    if (!(error instanceof Refused)) tell(() => words("transfer_unknown"), true);
-    else tell(() => refusal(error), true);
+    if (!(error instanceof Refused)) failed(() => words("transfer_unknown"));
+    else failed(() => refusal(error));
     if (error.status === 401) openDialog(words(at("person").value ? "wrong_pin" : "wrong_token"));
     if (error.holder) openTakeOver(error.holder);
   } finally {

@@ -24,6 +24,7 @@ from service.records.job import Job
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 from service.web import models
 from service.web.commands import Commands, RequestRefused
+from service.web.commission.endpoints import CommissionEndpoints
 from service.web.daemon_access import DaemonAccess, DaemonSilent
 from service.web.drawing import drawing
 from service.web.evidence_files import FILES, WIDTHS_PX, NoPicture, Pictures, file_of, files_kept, tag_of
@@ -53,6 +54,7 @@ class Api:
         self.live = Live(daemon)
         self._looks = LiveLooks(daemon.sources.looks)
         self._recipes = RecipeEndpoints(daemon, commands)
+        self._commission = CommissionEndpoints(daemon, commands)
         if daemon.sources.archive is not None:
             daemon.sources.archive.on_stored = self._stored
         self._document = json.dumps(document(OPERATIONS, version), ensure_ascii=False).encode()
@@ -63,6 +65,7 @@ class Api:
         self.live.close()
         self._looks.close()
         self._recipes.close()
+        self._commission.close()
         if self._daemon.sources.archive is not None:
             self._daemon.sources.archive.on_stored = lambda _evidence: None
         self._pictures.close()
@@ -95,12 +98,14 @@ class Api:
             "/openapi.json": self.openapi,
             **LookEndpoints(self._looks).routes(),
             **self._recipes.gets(),
+            **self._commission.gets(),
         }
         posts = {
             "/trigger": self.trigger,
             "/halt": self.halt,
             "/resume": self.resume,
             **self._recipes.posts(),
+            **self._commission.posts(),
         }
         return [
             *(Route(PREFIX + path, with_problems(endpoint), methods=["GET"]) for path, endpoint in gets.items()),

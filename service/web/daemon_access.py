@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from service.config.config import Config
 from service.config.recipes import Recipe
 from service.daemon.operations import Operations
 from service.daemon.recipe_book import RecipeBook
@@ -23,6 +24,7 @@ from service.jobs.spare_camera import LookSources
 from service.jobs.trigger_queue import Queued
 from service.link.link import Link
 from service.measuring.calibration_guard import CalibrationGuard
+from service.probing.probe import ProbeFindings
 from service.records.archive_writer import ArchiveWriter
 from service.records.job import Job, TriggerStamp
 from service.records.journal import Journal
@@ -32,11 +34,26 @@ from service.web.people.lease import Lease
 T = TypeVar("T")
 
 ANSWER_BOUND_S = 10.0
+PROBE_BOUND_S = 600.0
 TRIGGER_KIND = "page"
 
 
 class DaemonSilent(Exception):
     """The daemon's loop does not answer, or has ended."""
+
+
+@dataclass(frozen=True)
+class CommissionSources:
+    """What setting up a cell takes. folder: for its notes and pictures. path: of the configuration's file, None where
+    the daemon has none. reload: the files that the configuration names are read again; why not, else None. probe: of
+    the controller, None where there is none; whether to write too.
+    """
+
+    folder: Path
+    config: Callable[[], Config]
+    path: Path | None
+    reload: Callable[[], Awaitable[str | None]]
+    probe: Callable[[bool], Awaitable[ProbeFindings]] | None
 
 
 @dataclass(frozen=True)
@@ -52,6 +69,7 @@ class PageSources:
     recipes: Callable[[], tuple[tuple[int, str], ...]]  # number and name of each, as they are now
     guard: Callable[[], CalibrationGuard | None]
     looks: LookSources
+    commission: CommissionSources
     camera: str
     controller: str
     link: Link | None = None
@@ -168,14 +186,32 @@ class DaemonAccess:
         """The adoption's number, and from which job on; raise CommandRefused, DaemonSilent."""
         return await self._asked(book.adopt(expected, recipe, who, note))
 
-    async def _asked(self, work: Coroutine[Any, Any, T]) -> T:
+    async def reload(self) -> str | None:
+        """Why the files that the configuration names do not apply, None where they do; raise DaemonSilent."""
+
+        async def work() -> str | None:
+            return await self.sources.commission.reload()
+
+        return await self._asked(work())
+
+    async def probe(self, write: bool) -> ProbeFindings:
+        """What the controller can do, while the service leaves it alone; raise CommandRefused, DaemonSilent."""
+
+        async def work() -> ProbeFindings:
+            assert self._operations is not None
+            assert self.sources.commission.probe is not None
+            return await self._operations.alone_with_the_controller(self.sources.commission.probe(write))
+
+        return await self._asked(work(), PROBE_BOUND_S)
+
+    async def _asked(self, work: Coroutine[Any, Any, T], bound_s: float = ANSWER_BOUND_S) -> T:
         """What `work` gives in the daemon's loop. Once begun it comes to its end there, whoever goes away here."""
         if self._loop is None or self._loop.is_closed():
             work.close()
             raise DaemonSilent("the service has ended")
         answer = asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, self._loop))
         try:
-            async with asyncio.timeout(ANSWER_BOUND_S):
+            async with asyncio.timeout(bound_s):
                 return await asyncio.shield(answer)
         except TimeoutError as error:
-            raise DaemonSilent(f"the service has not answered for {ANSWER_BOUND_S:g} s. See its log") from error
+            raise DaemonSilent(f"the service has not answered for {bound_s:g} s. See its log") from error

@@ -9,8 +9,8 @@ import hashlib
 import html
 import json
 import re
+from collections.abc import Awaitable, Callable
 from importlib.resources import files
-from importlib.resources.abc import Traversable
 from typing import Any, Literal
 
 from starlette.requests import Request
@@ -22,9 +22,7 @@ from service.reasons import Language, Reason
 from service.web.daemon_access import DaemonAccess, DaemonSilent
 
 TYPES = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml", "json": "application/json"}
-PAGE = "page.html"
-RECIPES = "recipes.html"
-PIECES = {"symbols": "symbols.svg", "dialogs": "dialogs.html"}  # that pages have in common
+OWN = ("commission", "recipes")  # pages beside the operator's, each with its words in a file of its name
 LANGUAGES: tuple[Literal["en"], Literal["ru"]] = ("en", "ru")
 THEMES = ("auto", "dark", "light")
 KINDS = {
@@ -51,18 +49,19 @@ class Pages:
         self._files = {one.name: one.read_bytes() for one in folder.iterdir() if not one.name.endswith(".html")}
         self._tags = {name: f'"{hashlib.sha256(data).hexdigest()[:16]}"' for name, data in self._files.items()}
         self._texts: dict[str, dict[str, str]] = json.loads(self._files["texts.json"])
-        of_recipes = json.loads(self._files["recipes-texts.json"])
+        shared = {"symbols": self._files["symbols.svg"].decode(), "dialogs": _template("dialogs")}
         self._templates: dict[tuple[str, str], str] = {}
-        for spoken in LANGUAGES:
-            known = self._texts[spoken]
-            self._templates[PAGE, spoken] = _worded(_whole(folder, PAGE), known)
-            self._templates[RECIPES, spoken] = _worded(_whole(folder, RECIPES), {**known, **of_recipes[spoken]})
+        for name in ("page", *OWN):
+            own: dict[str, dict[str, str]] = json.loads(self._files[f"{name}.json"]) if name in OWN else {}
+            for spoken in LANGUAGES:
+                words = self._texts[spoken] | own.get(spoken, {})
+                self._templates[name, spoken] = _worded(_filled(_template(name), shared), words)
 
     def routes(self) -> list[Route]:
-        """The page, and its files."""
+        """The pages, and their files."""
         return [
             Route("/", self.page, methods=["GET"]),
-            Route("/recipes", self.recipes_page, methods=["GET"]),
+            *(Route(f"/{name}", self._own(name), methods=["GET"]) for name in OWN),
             Route("/static/{name}", self.file, methods=["GET"]),
         ]
 
@@ -84,19 +83,27 @@ class Pages:
             state: dict[str, Any] | None = await self._daemon.state()
         except DaemonSilent:
             state = None
-        view = ' data-view="kiosk"' if "kiosk" in request.query_params else ""
-        return self._filled(PAGE, language, {"theme": theme, "view": view, **self._banner(state, language)})
+        kiosk = ' data-view="kiosk"' if "kiosk" in request.query_params else ""
+        return self._answer("page", language, theme, view=kiosk, **self._banner(state, language))
 
-    async def recipes_page(self, request: Request) -> Response:
-        """The page of recipes, which asks for them itself."""
-        language, theme = self.reader(request)
-        return self._filled(RECIPES, language, {"theme": theme, **self._languages(language)})
+    def _own(self, name: str) -> Callable[[Request], Awaitable[Response]]:
+        """A page that asks for all it shows itself."""
 
-    def _filled(self, page: str, language: str, shown: dict[str, str]) -> Response:
-        text = self._templates[page, language]
-        for name, value in {"orders": "on" if self._orders else "off", **shown}.items():
-            text = text.replace(f"{{{{{name}}}}}", value)
-        return Response(text, media_type="text/html")
+        async def answer(request: Request) -> Response:
+            return self._answer(name, *self.reader(request))
+
+        return answer
+
+    def _answer(self, name: str, language: str, theme: str, **more: str) -> Response:
+        other = next(one for one in LANGUAGES if one != language)
+        shown = {
+            "theme": theme,
+            "orders": "on" if self._orders else "off",
+            "language": language,
+            "other": other,
+            "other_name": self._texts[other]["name"],
+        }
+        return Response(_filled(self._templates[name, language], shown | more), media_type="text/html")
 
     def reader(self, request: Request) -> tuple[str, str]:
         """In which language and theme somebody reads."""
@@ -113,15 +120,9 @@ class Pages:
             return self._language
         return preferred(request.headers.get("accept-language", ""))
 
-    def _languages(self, language: str) -> dict[str, str]:
-        """The one it is in, and the other one."""
-        other = next(one for one in LANGUAGES if one != language)
-        return {"language": language, "other": other, "other_name": self._texts[other]["name"]}
-
     def _banner(self, state: dict[str, Any] | None, language: str) -> dict[str, str]:
         texts = self._texts[language]
         shown = {
-            **self._languages(language),
             "since": "",
             "whys": "",
             "why_hidden": " hidden",
@@ -163,12 +164,15 @@ def _why(code: int, text: str, language: str) -> str:
     )
 
 
-def _whole(folder: Traversable, page: str) -> str:
-    """A page's template, with the pieces that pages have in common."""
-    text = (folder / page).read_text(encoding="utf-8")
-    for name, piece in PIECES.items():
-        text = text.replace(f"{{{{{name}}}}}", (folder / piece).read_text(encoding="utf-8"))
-    return text
+def _template(name: str) -> str:
+    return (files("service.web") / "static" / f"{name}.html").read_text(encoding="utf-8")
+
+
+def _filled(template: str, values: dict[str, str]) -> str:
+    """The template with values in their places, {{name}}."""
+    for name, value in values.items():
+        template = template.replace(f"{{{{{name}}}}}", value)
+    return template
 
 
 def _worded(template: str, texts: dict[str, str]) -> str:

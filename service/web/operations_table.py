@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from service.web import models
+from service.web.commission import endpoints as commission
 from service.web.evidence_files import FILES, WIDTHS_PX
 from service.web.looks import endpoints as looks
 from service.web.openapi import Operation, Parameter
@@ -106,4 +107,5 @@ OPERATIONS = (
     ),
     Operation("POST", "/resume", "End a halt", models.StateAfter, _ORDER, request=models.ResumeRequest, token=True),
     *of_recipes(_SILENT, _ORDER),
+    *commission.OPERATIONS,
 )

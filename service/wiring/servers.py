@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import importlib.metadata
+from collections.abc import Awaitable
 from contextlib import ExitStack
+from typing import TYPE_CHECKING
 
 from service.config.config import Config
+from service.config.controllers import NoController
 from service.daemon.daemon import Parts
 from service.jobs.cycle import Cycle
-from service.wiring.devices import controller_words, single_frames
+from service.probing.probe import ProbeFindings, probed
+from service.wiring.devices import controller_words, make_controller, single_frames
 from service.wiring.errors import WiringError
+
+if TYPE_CHECKING:
+    from service.web.daemon_access import CommissionSources
 
 
 def add_metrics(config: Config, parts: Parts, cycle: Cycle, opened: ExitStack) -> None:
@@ -69,6 +76,7 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
         lambda: tuple((number, recipe.name) for number, recipe in sorted(cycle.recipes.items())),
         lambda: cycle.measurer.guard,
         looks,
+        _commission_sources(config, parts),
         camera=config.camera.kind,
         controller=controller_words(config),
         link=parts.link,
@@ -80,3 +88,26 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
         parts.page = make_page(config.page, sources)
     except PageError as error:
         raise WiringError(str(error)) from error
+
+
+def _commission_sources(config: Config, parts: Parts) -> CommissionSources:
+    from service.web.daemon_access import CommissionSources
+
+    reloader = parts.reloader
+
+    async def no_reload() -> str | None:
+        return "the daemon was started without a file of its configuration. Restart it"
+
+    def probe(write: bool) -> Awaitable[ProbeFindings]:
+        controller, settings = make_controller(config), config.controller
+        assert controller is not None
+        assert not isinstance(settings, NoController)
+        return probed(controller, settings.timeout_s, write=write)
+
+    return CommissionSources(
+        config.service.state_dir / "commission",
+        lambda: config if reloader is None else reloader.config,
+        None if reloader is None else reloader.path,
+        no_reload if reloader is None else reloader.reload,
+        None if parts.link is None else probe,
+    )

@@ -146,7 +146,7 @@ at("language").addEventListener("click", switchLanguage);
 onLanguage(() => known && refresh());
 
 const lost = () => (at("lost").hidden = false);
-await Promise.all([insist(() => load("recipes-texts.json"), lost), insist(loadReasons, lost), insist(() => get("/recipes/schema").then(form.use), lost)]);
+await Promise.all([insist(() => load("recipes.json"), lost), insist(loadReasons, lost), insist(() => get("/recipes/schema").then(form.use), lost)]);
 if (areOff) telling("told")(() => words("no_orders"), false);
 for (const id of ["language", "theme"]) at(id).disabled = false;
 await look();

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from service.cli.main import main
 from service.check_result import CheckResult, Level
+from service.cli.main import main
 from service.commissioning.checkup.devices import check_devices
 from service.commissioning.checkup.files import check_files
 from service.commissioning.checkup.listening import check_listening

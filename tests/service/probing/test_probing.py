@@ -19,9 +19,9 @@ from drivers.controller.simulated.faults import FaultPlan, LineFault, Target
 from drivers.controller.simulated.program import Pace
 from drivers.controller.simulated.window import ServerLimits
 from service.check_result import CheckResult
+from service.daemon.restart_watch import RestartWatch
 from service.probing.probe import Probe
 from service.probing.probed import LOOK_PERIOD_S
-from service.daemon.restart_watch import RestartWatch
 from tests.support.controller.misbehaving_server import MisbehavingServer, exception_reply, right_reply
 from tests.support.controller.pty_line import PtyLine
 from tests.support.interop.programs import libmodbus_tcp

@@ -11,23 +11,26 @@ import pytest
 
 import service.judging
 import service.web
+from contour.camera_calibration.view_selection import SIDES
 from service.config.recipe_keys import FILES, WRITTEN_ONLY
 from service.config.recipes import Gcode, OneOfParts, PartToCut, Recipe
 from service.state import State
+from service.web.commission.endpoints import OPERATIONS
 from service.web.html import KINDS
 from service.web.recipes.models import TrialState
 
 STATIC = Path(service.web.__file__).parent / "static"
 TEXTS = json.loads((STATIC / "texts.json").read_text())
-OF_RECIPES = json.loads((STATIC / "recipes-texts.json").read_text())
+COMMISSION = json.loads((STATIC / "commission.json").read_text())
+OF_RECIPES = json.loads((STATIC / "recipes.json").read_text())
 RECIPE_SCRIPTS = ("recipes.js", "recipe-form.js", "tried.js")
 SCRIPTS = {path.name: path.read_text() for path in STATIC.glob("*.js")}
-PAGE = (STATIC / "page.html").read_text() + (STATIC / "dialogs.html").read_text()
+PAGE = "".join((STATIC / f"{name}.html").read_text() for name in ("page", "dialogs"))
 CSS = (STATIC / "page.css").read_text()
 INK = ("ink", "dim", "good", "bad", "busy", "hold", "gone", "strong")
 
 
-@pytest.mark.parametrize("texts", [TEXTS, OF_RECIPES], ids=["the page", "recipes"])
+@pytest.mark.parametrize("texts", [TEXTS, COMMISSION, OF_RECIPES], ids=["page", "commission", "recipes"])
 def test_both_languages_have_the_same_words_with_the_same_places(texts: dict[str, dict[str, str]]) -> None:
     assert texts["en"].keys() == texts["ru"].keys()
     for key, english in texts["en"].items():
@@ -35,11 +38,21 @@ def test_both_languages_have_the_same_words_with_the_same_places(texts: dict[str
         assert places[0] == places[1], key
 
 
+def test_every_word_that_setting_up_asks_for_is_there() -> None:
+    script, page = SCRIPTS["commission.js"], (STATIC / "commission.html").read_text()
+    asked = set(re.findall(r'data-[ta]="(\w+)"', page)) | set(re.findall(r'words\("(\w+)"', script))
+    asked |= {f"{what}_{step}" for step in re.findall(r'data-step="(\w+)"', page) for what in ("step", "do")}
+    asked |= {f"missing_{side}" for side in SIDES} | {f"part_{part}" for part in range(9)}
+    asked |= {one.path.rpartition("/")[2] for one in OPERATIONS if one.method == "POST"} | {"begin"}
+    known = TEXTS["en"].keys() | COMMISSION["en"].keys()
+    assert len(asked) > 60
+    assert asked - known == set()
+    assert TEXTS["en"].keys() & COMMISSION["en"].keys() == set(), "a word of the page means one thing"
+
+
 def test_every_word_that_is_asked_for_is_there() -> None:
     asked = set(re.findall(r'data-[ta]="(\w+)"', PAGE)) | {state.label for state in State}
-    for name, script in SCRIPTS.items():
-        if name in RECIPE_SCRIPTS:
-            continue
+    for script in (text for name, text in SCRIPTS.items() if name not in ("commission.js", *RECIPE_SCRIPTS)):
         asked |= set(re.findall(r'words\("(\w+)"', script))
         asked |= set(re.findall(r'(?:line\(|\[)"(\w+)", (?:camera|link|look|report|job|seen|size|sure|!)', script))
         asked |= set(re.findall(r'\["[^"]+", "(key_\w+)"\]', script))

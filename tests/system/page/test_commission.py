@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from service.cli.main import main
+from service.measuring.calibration_file import load_record
 from tests.support.pictures.bare_cell import BareCell
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import TOKEN, Client, token_file
@@ -108,6 +112,8 @@ def test_a_cell_is_set_up_to_its_first_accepted_job(
         prove(page)
         expect(page.locator("#adopt")).to_be_enabled()
         assert not (cell[0].folder / "calibration.yaml").exists(), "it is not in force before somebody adopts it"
+        same_by_command(page, cell[0].folder)
+        whole_report(page)
         press(page, "adopt")
         done(page, "calibration")
         page.locator("#height-mm").fill("20")
@@ -139,6 +145,36 @@ def test_a_cell_is_set_up_to_its_first_accepted_job(
     exterior = np.array(job["millimetres"]["exterior"])
     assert abs(abs(area(exterior)) - BLOCK_MM2) < 0.01 * BLOCK_MM2
     assert 780 < exterior[:, 0].min() < exterior[:, 0].max() < 1000, "in the machine's frame"
+
+
+def same_by_command(page: Page, folder: Path) -> None:
+    """The command that the step shows makes the same calibration of the same pictures."""
+    words = shlex.split(str(page.locator('[data-step="calibration"] code').text_content()))[1:]
+    words[words.index("--output") + 1] = str(folder / "by-command.yaml")
+    assert main(words) == 0
+    by_page, by_command = (
+        load_record(path) for path in (folder / "state" / "commission" / "calibration.yaml", folder / "by-command.yaml")
+    )
+    assert by_page.made == by_command.made
+    assert by_page.content.keys() == by_command.content.keys()
+    places = np.array([[0.0, 0.0], [959.0, 719.0]])
+    apart_mm = by_page.calibration.to_work(places, 20.0) - by_command.calibration.to_work(places, 20.0)
+    assert np.abs(apart_mm).max() < 1e-6, "solved again, the last digits differ"
+
+
+def whole_report(page: Page) -> None:
+    """The report has its pictures, and nothing in it is against its policy."""
+    complaints: list[str] = []
+    page.context.on("console", lambda message: complaints.append(message.text))
+    with page.context.expect_page() as opened:
+        page.locator("#report").click()
+    report = opened.value
+    expect(report.locator("figure svg")).to_have_count(7)
+    assert report.locator("image").first.evaluate("e => e.getBBox().width") > 100
+    policy = page.request.get(report.url).headers["content-security-policy"]
+    assert policy.startswith("default-src 'none'; style-src 'sha256-")
+    report.close()
+    assert complaints == []
 
 
 def pictures_of_the_board(page: Page, bare: BareCell) -> None:

@@ -127,9 +127,7 @@ class BoardActions:
         settings = self.bench.config.calibration
         calibration = self.bench.session.notes.calibration
         if settings is None:
-            raise StepRefused(
-                "the configuration names no calibration.file. Add `calibration: {file: calibration.yaml}`"
-            )
+            raise StepRefused("the configuration names no calibration.file. Name one")
         if calibration is None or not self.bench.session.candidate.is_file():
             raise StepRefused("there is no calibration to adopt. Calibrate first")
 

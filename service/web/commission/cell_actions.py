@@ -28,7 +28,7 @@ class CellActions:
         """The empty table, in force for the next job."""
         settings = self.bench.config.table
         if settings is None:
-            raise StepRefused("the configuration names no table.file. Add `table: {file: table.npz}`")
+            raise StepRefused("the configuration names no table.file. Name one")
 
         def work() -> str:
             frames = []

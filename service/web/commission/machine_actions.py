@@ -100,7 +100,7 @@ class MachineActions:
         """The calibration's file, changed and in force."""
         settings = self.bench.config.calibration
         if settings is None:
-            raise StepRefused("the configuration names no calibration.file. Add one, and calibrate first")
+            raise StepRefused("the configuration names no calibration.file. Name one")
 
         def work() -> CalibrationRecord:
             try:

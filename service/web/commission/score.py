@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from contour.image.picture_figures import MOST_CLIPPED
 from service.config.controllers import NoController
-from service.measuring.board_svg import arguments
 from service.reasons import Outcome
 from service.state import State
-from service.web.commission.board_shots import GOOD_VIEWS, Judged, board_of
+from service.web.commission.board_shots import GOOD_VIEWS, Judged
 from service.web.commission.models import Commission, Step, StepName
 from service.web.commission.session import MOST_SHOTS, Session, StepRefused
+from service.web.commission.shell import Shell
 from service.web.daemon_access import PageSources
 
 SHARP_SHARE = 0.9
@@ -57,10 +55,10 @@ class _Steps:
     def __init__(self, sources: PageSources, session: Session, judged: Judged) -> None:
         self._sources = sources
         self._notes = session.notes
-        self._folder = session.folder
         self._flat = session.flat
         self._judged = judged
         self._config = sources.commission.config()
+        self._commands = Shell(self._config, sources.commission.path, session).commands
 
     def all(self) -> list[Step]:
         """In the order in which they are done."""
@@ -69,18 +67,14 @@ class _Steps:
             *(self._table(), self._marks(), self._controller(), self._job()),
         ]
 
-    def _step(self, name: StepName, score: int, command: str, lines: list[str], *, well: bool) -> Step:
+    def _step(self, name: StepName, score: int, lines: list[str], *, well: bool) -> Step:
         fault = self._notes.faults.get(name)
-        return Step(name=name, score=score, well=well, command=f"combtrace {command}", lines=lines, fault=fault)
-
-    @property
-    def _at_config(self) -> str:
-        return f"--config {self._sources.commission.path or Path('config.yaml')}"
+        return Step(name=name, score=score, well=well, command=self._commands[name], lines=lines, fault=fault)
 
     def _camera(self) -> Step:
-        look, command = self._notes.look, f"focus {self._at_config}"
+        look = self._notes.look
         if look is None:
-            return self._step("camera", 0, command, [], well=False)
+            return self._step("camera", 0, [], well=False)
         share = look.sharpness / look.best if look.best > 0 else 0.0
         clipped = max(look.white_share, look.black_share) > MOST_CLIPPED
         kind = "colour" if look.colour else "grey"
@@ -93,14 +87,12 @@ class _Steps:
         if look.black_share > MOST_CLIPPED:
             lines.append(f"{look.black_share:.1%} black, clipped: more light or exposure")
         score = min(round(100 * share), CLIPPED_SCORE if clipped else 100)
-        return self._step("camera", score, command, lines, well=share >= SHARP_SHARE and not clipped)
+        return self._step("camera", score, lines, well=share >= SHARP_SHARE and not clipped)
 
     def _board(self) -> Step:
-        so_far, command = self._judged.so_far, f"grab {self._at_config} --output {self._folder}/view-001.png"
+        so_far = self._judged.so_far
         lines = [] if so_far is None or so_far.fault is None else [so_far.fault]
-        return self._step(
-            "board", self._judged.score, command, lines, well=self._judged.sound and self._flat is not None
-        )
+        return self._step("board", self._judged.score, lines, well=self._judged.sound and self._flat is not None)
 
     def _calibration(self) -> Step:
         made, guard = self._notes.calibration, self._sources.guard()
@@ -114,27 +106,12 @@ class _Steps:
             expired = guard.expired()
             lines.append(f"In force: {guard.record.digest}." if expired is None else expired[1])
         well = guard is not None and guard.expired() is None and (made is None or made.adopted)
-        return self._step("calibration", score, self._calibrate_command(), lines, well=well)
-
-    def _calibrate_command(self) -> str:
-        notes, settings = self._notes, self._config.calibration
-        board = (
-            "--board charuco --squares 11x8 --square-mm 25" if notes.board is None else arguments(board_of(notes.board))
-        )
-        flat = "flat.png" if self._flat is None else self._flat.path
-        options = f"--block-mm {notes.setup.block_mm:g}"
-        if notes.setup.camera_height_mm is not None:
-            options += f" --camera-height-mm {notes.setup.camera_height_mm:g}"
-        if notes.board is not None and notes.board.thickness_mm:
-            options += f" --board-thickness-mm {notes.board.thickness_mm:g}"
-        output = "calibration.yaml" if settings is None else settings.file
-        return f"calibrate {board} --plane {flat} {options} --output {output} {self._folder}"
+        return self._step("calibration", score, lines, well=well)
 
     def _height(self) -> Step:
         height_mm, guard = self._notes.thickness_mm, self._sources.guard()
-        command = f"trigger {self._at_config} --thickness-mm {height_mm or 20:g}"
         if height_mm is None:
-            return self._step("height", 0, command, [], well=False)
+            return self._step("height", 0, [], well=False)
         plan = self._sources.looks.plan()
         recipe = plan.recipes[plan.default_recipe]
         lines = []
@@ -145,58 +122,52 @@ class _Steps:
             )
         if guard is None or not guard.record.calibration.height_known(height_mm):
             lines.append("No calibration in force holds at that height.")
-            return self._step("height", 50, command, lines, well=False)
+            return self._step("height", 50, lines, well=False)
         sure = guard.record.calibration.uncertainty
         figure_mm = None if sure is None else sure.figure_mm(height_mm)
         if figure_mm is not None:
             lines.append(f"95 % of positions at {height_mm:g} mm are within {figure_mm:.3f} mm.")
         share = 1.0 if figure_mm is None else min(self._notes.setup.accept_mm / figure_mm, 1.0)
-        return self._step("height", round(100 * share), command, lines, well=share == 1.0)
+        return self._step("height", round(100 * share), lines, well=share == 1.0)
 
     def _alignment(self) -> Step:
-        guard, settings = self._sources.guard(), self._config.calibration
-        points = f"{self._folder}/points.csv"
-        command = f"align --points {points} --calibration {'calibration.yaml' if settings is None else settings.file}"
+        guard = self._sources.guard()
         is_aligned = guard is not None and guard.record.calibration.aligned
-        return self._step("alignment", 100 * is_aligned, command, self._notes.alignment, well=is_aligned)
+        return self._step("alignment", 100 * is_aligned, self._notes.alignment, well=is_aligned)
 
     def _marks(self) -> Step:
-        guard, command = self._sources.guard(), f"{self._calibrate_command()} --sentinels DICT_4X4_50"
+        guard = self._sources.guard()
         sentinels = None if guard is None else guard.record.sentinels
         if sentinels is None:
-            return self._step("marks", 0, command, [], well=False)
+            return self._step("marks", 0, [], well=False)
         seen = ", ".join(str(mark.id) for mark in sentinels.marks)
-        return self._step("marks", 100, command, [f"Marks {seen} of {sentinels.dictionary} are kept."], well=True)
+        return self._step("marks", 100, [f"Marks {seen} of {sentinels.dictionary} are kept."], well=True)
 
     def _table(self) -> Step:
-        taught, command = self._sources.looks.plan().measurer.table, f"teach-table {self._at_config}"
+        taught = self._sources.looks.plan().measurer.table
         if self._config.table is None:
             return self._step(
-                "table", 0, command, ["The configuration names no table.file: this step may be left out."], well=False
+                "table", 0, ["The configuration names no table.file: this step may be left out."], well=False
             )
         if taught is None:
-            return self._step("table", 0, command, [], well=False)
+            return self._step("table", 0, [], well=False)
         line = (
             f"Taught at {taught.taught_at} of {taught.pictures} pictures, noise {taught.table.noise:.1f} grey levels."
         )
-        return self._step("table", 100, command, [line], well=True)
+        return self._step("table", 100, [line], well=True)
 
     def _controller(self) -> Step:
-        command = f"probe {self._at_config} --write"
         if isinstance(self._config.controller, NoController):
-            return self._step(
-                "controller", 100, command, ["controller.kind is none: contours are only archived."], well=True
-            )
+            return self._step("controller", 100, ["controller.kind is none: contours are only archived."], well=True)
         lines = self._notes.probe
         score = round(100 * sum(line.well for line in lines) / len(lines)) if lines else 0
         told = [f"{'ok' if line.well else 'FAULT'} {line.part}: {line.text}" for line in lines]
-        return self._step("controller", score, command, told, well=bool(lines) and score == 100)
+        return self._step("controller", score, told, well=bool(lines) and score == 100)
 
     def _job(self) -> Step:
-        job, height_mm = self._sources.executor.last_settled, self._notes.thickness_mm
-        command = f"trigger {self._at_config}" + (f" --thickness-mm {height_mm:g}" if height_mm else "")
+        job = self._sources.executor.last_settled
         if job is None or job.outcome is None:
-            return self._step("job", 0, command, [], well=False)
+            return self._step("job", 0, [], well=False)
         accepted = job.outcome in (Outcome.ACCEPTED, Outcome.WRITTEN)
         lines = [job.detail] if job.detail else []
-        return self._step("job", 100 if accepted else 0, command, lines, well=accepted)
+        return self._step("job", 100 if accepted else 0, lines, well=accepted)

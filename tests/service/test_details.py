@@ -75,12 +75,12 @@ def test_what_is_filled_in_comes_out_in_its_place(english: str) -> None:
             "2: как кромка идёт под ним, сказать нельзя. Уберите его.",
         ),
         (
-            "repeat with more tilt: 95 % of positions are within 0.018 mm on the table and 0.141 mm at 60 mm; 0.1 mm are "
-            "allowed. Tilt tells distance from focal length: 20 degrees to all four sides, in more views where it was "
-            "that already.",
-            "повторите с большим наклоном: 95 % положений верны с точностью 0,018 мм на столе и 0,141 мм на высоте 60 мм; "
-            "допускается 0,1 мм. Наклон отличает расстояние от фокусного: 20 градусов во все четыре стороны, а если так "
-            "и было — на большем числе снимков.",
+            "repeat with more tilt: 95 % of positions are within 0.018 mm on the table and 0.141 mm at 60 mm; 0.1 mm "
+            "are allowed. Tilt tells distance from focal length: 20 degrees to all four sides, in more views where it "
+            "was that already.",
+            "повторите с большим наклоном: 95 % положений верны с точностью 0,018 мм на столе и 0,141 мм на высоте "
+            "60 мм; допускается 0,1 мм. Наклон отличает расстояние от фокусного: 20 градусов во все четыре стороны, а "
+            "если так и было — на большем числе снимков.",
         ),
         ("halted: blade (anna from 127.0.0.1)", "остановлено: blade (anna, адрес 127.0.0.1)"),
     ],

@@ -156,12 +156,20 @@ function allow() {
 }
 
 function act(name, body = {}) {
-  const begun = () => orders.tell(() => words("sending"), false);
+  const begun = () => {
+    orders.tell(() => words("sending"), false);
+    told = { ...told, running: name }; // nothing else can be pressed before the answer comes
+    show();
+  };
   const done = (answer) => {
     orders.tell(() => "", false);
     take(answer);
   };
-  give({ path: `/commission/${name}`, body, begun, done, failed: (text) => orders.tell(text, true), byPin: false });
+  const failed = (text) => {
+    orders.tell(text, true);
+    refresh();
+  };
+  give({ path: `/commission/${name}`, body, begun, done, failed, byPin: false });
 }
 
 const valueOf = (id) => (at(id).value === "" ? null : Number(at(id).value));

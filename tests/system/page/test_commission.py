@@ -108,9 +108,13 @@ def test_a_cell_is_set_up_to_its_first_accepted_job(
         expect(page.locator("#square-mm")).to_have_value("30")
         expect(page.locator("#missing")).to_have_text("Nothing is missing: calibrate")
 
+        until(lambda: cell[1].get("/api/v1/state").json["link"]["up"], what="the link")
+        linked = cell[1].get("/api/v1/state").json["link"]["connections"]
         page.locator("#calibrate").click()
         prove(page)
         expect(page.locator("#adopt")).to_be_enabled()
+        link = cell[1].get("/api/v1/state").json["link"]
+        assert (link["up"], link["connections"]) == (True, linked), "heartbeats go on while it calibrates"
         assert not (cell[0].folder / "calibration.yaml").exists(), "it is not in force before somebody adopts it"
         same_by_command(page, cell[0].folder)
         whole_report(page)

@@ -1,4 +1,4 @@
-"""Recipes on the page of a running daemon: tried on archived jobs, adopted, taken back; and what is refused."""
+"""Recipes by REST at a running daemon: tried on archived jobs, adopted over kill -9; and what is refused."""
 
 from __future__ import annotations
 
@@ -7,111 +7,19 @@ import json
 import os
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, expect, sync_playwright
 
 from service.web.recipes.models import RecipeList, TrialAnswer
-from tests.support.interop.programs import node_modules
-from tests.support.processes.cell import ON_SAMPLES, Cell
-from tests.support.processes.page_client import Client, Reply, people_file
-from tests.support.processes.page_panel import EXPECTED_NOISE, chromium, clean_page
-from tests.support.processes.page_states import WIDTHS
-from tests.support.processes.processes import free_port, until
-
-SHEET = "{number: 1, name: sheet, max_area_mm2: 200000}"
-OTHER = "{number: 2, name: other, exports: [dxf], parts: [{file: plate.geojson, units: mm, quantity: 2}]}"
-PLATE = {"type": "Polygon", "coordinates": [[[0, 0], [60, 0], [60, 40], [0, 40], [0, 0]]]}
-PICTURES = 4  # whose blocks are 68 to 101 thousand mm²
-BETWEEN = 90_000  # mm²: one of them is larger
-PINS = {"maria": "4711", "oleg": "0815"}
-
-
-def token(who: str) -> str:
-    return f"{who}-has-a-token-of-her-own"
-
-
-@dataclass
-class Served:
-    """A daemon with recipes, and who asks it. Each person may give thirty orders a minute: tests have their own."""
-
-    cell: Cell
-    client: Client
-
-    def order(self, path: str, who: str, content: dict[str, Any]) -> Reply:
-        body = {"take_over": "her own test", **content}
-        return self.client.order(f"/api/v1/recipes/{path}", token(who), body)
-
-    def jobs(self, count: int, who: str, recipe: int = 1) -> list[dict[str, Any]]:
-        """So many more jobs, once their evidence is kept."""
-        found = []
-        for _ in range(count):
-            content = {"recipe": recipe, "take_over": "her own test"}
-            asked = until(
-                lambda c=content: (r := self.client.order("/api/v1/trigger", token(who), c)).status == 202 and r,  # type: ignore[misc]
-                what="a trigger that is taken",
-                pause_s=0.3,
-            )
-            path = f"/api/v1/jobs/{asked.json['job']}"
-            found.append(until(lambda p=path: (j := self.client.get(p).json)["files"] and j, what="evidence"))  # type: ignore[misc]
-        return found
-
-    def recipe(self, number: int = 1) -> dict[str, Any]:
-        told = self.client.get("/api/v1/recipes").json
-        return dict(next(one for one in told["recipes"] if one["number"] == number))
-
-    def trial(self) -> dict[str, Any]:
-        return dict(self.client.get("/api/v1/recipes/trial").json["trial"])
-
-    def tried(self, who: str, changes: dict[str, Any], jobs: int = PICTURES) -> dict[str, Any]:
-        """A try, come to its end."""
-        begun = self.order("1/trial", who, {"changes": changes, "jobs": jobs})
-        assert begun.status == 202, begun.body
-        found = dict(until(lambda: (t := self.trial())["state"] != "running" and t, what="the end of a try"))
-        assert found["number"] == begun.json["trial"]
-        return found
-
-    def adopted(self, who: str, changes: dict[str, Any]) -> int:
-        trial = self.tried(who, changes, jobs=1)
-        reply = self.order("1/adopt", who, {"trial": trial["number"], "note": "to begin with"})
-        assert reply.status == 200, reply.body
-        return int(reply.json["adoption"])
-
-    def notes(self, who: str) -> list[dict[str, Any]]:
-        """Newest first."""
-        told = self.client.get("/api/v1/audit?limit=200", Authorization=f"Bearer {token(who)}").json["notes"]
-        return [note for note in told if note["who"] == who]
-
-
-def started(folder: Path, *names: str, more: str = "") -> Served:
-    """A daemon with these people."""
-    lines = "".join(f"{name} {token(name)}\n" for name in names)
-    (folder / "tokens").touch(0o600)
-    (folder / "tokens").write_text(lines)
-    people_file(folder, PINS)
-    (folder / "plate.geojson").write_text(json.dumps(PLATE))
-    port = free_port()
-    page = f"page: {{port: {port}, token_file: tokens, people_file: people}}\n"
-    kept = "adopted_recipes: state/adopted.json\n"
-    cell = Cell(
-        folder,
-        triggers="[]",
-        camera=ON_SAMPLES,
-        trigger_every_s=None,
-        more=f"{page}{kept}recipes: [{SHEET}, {OTHER}]\n{more}",
-    )
-    cell.ready()
-    return Served(cell, Client(port))
-
-
-WHO = [f"person{number}" for number in range(12)]
+from tests.support.processes.page_client import Client
+from tests.support.processes.processes import until
+from tests.support.processes.recipes_cell import PICTURES, WHO, RecipesCell, started, token
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RecipesCell]:
     built = started(tmp_path_factory.mktemp("recipes"), *WHO)
     try:
         ended = built.jobs(PICTURES, WHO[0])
@@ -121,123 +29,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         built.cell.stop()
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    with sync_playwright() as playwright:
-        opened = chromium(playwright)
-        yield opened
-        opened.close()
-
-
-def given(page: Page, key: str, value: str) -> None:
-    """Type a key's value."""
-    page.locator(f'.key:has(code:text-is("{key}")) input').fill(value)
-
-
-def test_a_change_is_tried_adopted_used_by_the_next_job_and_taken_back(served: Served, browser: Browser) -> None:
-    url = f"{served.client.url}recipes"
-    with clean_page(browser, served.client.url, EXPECTED_NOISE, locale="en-GB") as page:
-        page.get_by_role("link", name="Recipes").click()
-        expect(page).to_have_url(url)
-        expect(page.locator("#try")).to_be_disabled()
-        given(page, "max_area_mm2", str(BETWEEN))
-        expect(page.locator(".key.changed small")).to_have_text("was 200000")
-        page.locator("#try").click()
-        page.locator("#person").select_option("")
-        page.locator("#token").fill(token("person1"))
-        page.locator("#token-ok").click()
-        page.locator("#take-over").fill("the recipe is changed")  # for person0 gave the orders before
-        page.locator("#lease-ok").click()
-        expect(page.locator("#summary")).to_contain_text(f"All {PICTURES} jobs were tried. Verdicts that flip: 1 acc")
-        expect(page.locator("#tried > li")).to_have_count(PICTURES)
-        flipped = page.locator("#tried > li.flipped")
-        expect(flipped).to_have_count(1)
-        expect(flipped).to_contain_text("accepted → refused flips112 The contour's area is outside")
-        calm = page.locator("#tried > li:not(.flipped)").first
-        expect(calm).to_contain_text("accepted → acceptedThe outline stays the same.")
-        for card in (flipped, calm):  # both outlines are drawn, each twice: a line and what lies under it
-            expect(card.locator("path")).to_have_count(4)
-            assert card.locator("path.was").get_attribute("d") == card.locator("path.now").get_attribute("d")
-        assert served.recipe()["values"]["max_area_mm2"] == 200_000, "nothing counts yet"
-        calm.locator("button").click()
-        expect(page.locator("#large path.now")).to_have_count(1)
-        page.keyboard.press("Escape")
-        page.locator("#adopt").click()
-        assert page.locator("#adopt-told").text_content() == "", "not without a note"
-        page.locator("#note").fill("sheets of the new press are smaller")
-        page.locator("#adopt").click()
-        expect(page.locator("#adopt-told")).to_contain_text("It counts from the next job on.")
-        expect(page.locator("#history")).to_contain_text("person1: sheets of the new press are smaller")
-        expect(page.locator("#adopt")).to_be_disabled()
-        after = served.jobs(PICTURES, "person1")
-        assert {job["recipe"]["max_area_mm2"] for job in after} == {BETWEEN}
-        assert sorted(job["outcome"] for job in after) == ["accepted"] * (PICTURES - 1) + ["refused"]
-        page.locator("#language").click()
-        expect(page.locator("#edit .dim")).to_contain_text("Изменение сначала пробуют")
-        expect(page.locator("#tried > li.flipped")).to_contain_text("по рецепту от 100 до 90000 мм²")
-        page.locator("#note").fill("the press is gone")
-        page.locator('[data-back="0"]').click()
-        expect(page.locator("#adopt-told")).to_contain_text("Действует со следующего задания.")
-    assert {job["recipe"]["max_area_mm2"] for job in served.jobs(1, "person1")} == {200_000}
-    notes = [(note["action"], note["detail"], note["result"]) for note in served.notes("person1")]
-    adopted = [note for note in notes if note[0] == "adopt recipe"]
-    assert adopted[1][1] == "recipe 1: max_area_mm2 200000.0 -> 90000.0; sheets of the new press are smaller"
-    assert adopted[0][1] == "recipe 1: max_area_mm2 90000.0 -> 200000.0; back to 0: the press is gone"
-    assert [note[2].split(", ")[1] for note in adopted] == ["from the next job on"] * 2
-    assert ("try recipe", f"recipe 1: max_area_mm2 200000.0 -> 90000.0; on {PICTURES} jobs", "begun") in notes
-
-
-def test_the_form_has_a_control_of_its_kind_for_each_key_and_sends_what_differs(
-    served: Served, browser: Browser
-) -> None:
-    typed = {
-        "start": ("[10, 20.5]", [10, 20.5]),
-        "binarize": ("otsu", "otsu"),
-        "roi_mm": ("[0, 0, 600, 400]", [0, 0, 600, 400]),
-        "gcode.safe_z_mm": ("35", 35),
-        "parts.0.layer": ("cut", "cut"),
-        "parts.0.quantity": ("1", 1),
-        "parts.0.rotation": ("4", 4),
-    }
-    sent: list[Any] = []
-
-    def keep(route: Route) -> None:
-        sent.append(route.request.post_data_json)
-        route.fulfill(status=422, json={"error": "max_bridged_mm: seen 'x'", "ru": {"max_bridged_mm: seen 'x'": "икс"}})
-
-    with clean_page(browser, served.client.url, (*EXPECTED_NOISE, "422"), locale="en-GB") as page:
-        page.goto(f"{served.client.url}recipes")
-        page.route("**/api/v1/recipes/2/trial", keep)
-        page.get_by_role("button", name="2 other").click()
-        expect(page.locator("#edit-title")).to_have_text("2 other")
-        keys = page.locator("#keys-of .key code").all_text_contents()
-        assert sorted(keys) == sorted(served.recipe(2)["values"])
-        expect(page.locator(".key.changed")).to_have_count(0)
-        expect(page.locator("legend")).to_have_text(["gcode", "parts.0: plate.geojson"])
-        for key, (text, _) in typed.items():
-            given(page, key, text)
-        page.locator('.key:has(code:text-is("edge")) select').select_option("cut")
-        page.get_by_role("checkbox", name="svg").check()
-        given(page, "tolerance_mm", "-1")
-        page.locator("#try").click()
-        assert sent == [], "the browser knows the bound"
-        given(page, "tolerance_mm", "0.1")
-        page.locator("#language").click()
-        expect(page.locator(".key.changed")).to_have_count(len(typed) + 2)
-        page.locator("#try").click()
-        page.locator("#person").select_option("")
-        page.locator("#token").fill(token("person11"))
-        page.locator("#token-ok").click()
-        expect(page.locator("#told")).to_have_text("Так нельзя. (икс)")
-        page.locator("#undo").click()
-        expect(page.locator(".key.changed")).to_have_count(0)
-        page.get_by_role("button", name="1 sheet").click()
-        expect(page.locator(".key.changed")).to_have_count(0)
-    expected = {**{key: value for key, (_, value) in typed.items()}, "edge": "cut", "exports": ["dxf", "svg"]}
-    assert sent == [{"changes": expected, "jobs": 20}]
-
-
-def test_where_the_outline_changes_both_are_told_apart_in_millimetres(served: Served) -> None:
+def test_where_the_outline_changes_both_are_told_apart_in_millimetres(served: RecipesCell) -> None:
     trial = served.tried("person2", {"margin_mm": 5})
     TrialAnswer.model_validate({"trial": trial})
     assert [job["flipped"] for job in trial["jobs"]] == [bool(job["code_before"]) for job in trial["jobs"]]
@@ -276,7 +68,7 @@ WRONG: dict[str, tuple[str, dict[str, Any], int, str]] = {
 
 
 @pytest.mark.parametrize("wrong", WRONG)
-def test_what_cannot_be_tried_is_refused_in_a_sentence_and_changes_nothing(served: Served, wrong: str) -> None:
+def test_what_cannot_be_tried_is_refused_in_a_sentence_and_changes_nothing(served: RecipesCell, wrong: str) -> None:
     recipe, content, status, told = WRONG[wrong]
     before = served.client.get("/api/v1/recipes").body, served.client.get("/api/v1/recipes/trial").body
     reply = served.order(f"{recipe}/trial", "person3", content)
@@ -285,7 +77,7 @@ def test_what_cannot_be_tried_is_refused_in_a_sentence_and_changes_nothing(serve
     assert (served.client.get("/api/v1/recipes").body, served.client.get("/api/v1/recipes/trial").body) == before
 
 
-def test_only_what_was_tried_to_its_end_can_be_adopted(served: Served) -> None:
+def test_only_what_was_tried_to_its_end_can_be_adopted(served: RecipesCell) -> None:
     before = served.recipe()
     for trial in (0, 1, 2**60):
         reply = served.order("1/adopt", "person4", {"trial": trial, "note": "without a try"})
@@ -300,7 +92,7 @@ def test_only_what_was_tried_to_its_end_can_be_adopted(served: Served) -> None:
     assert served.recipe() == before
 
 
-def test_what_was_tried_against_another_recipe_than_the_one_in_force_is_not_adopted(served: Served) -> None:
+def test_what_was_tried_against_another_recipe_than_the_one_in_force_is_not_adopted(served: RecipesCell) -> None:
     trial = served.tried("person5", {"margin_mm": 3}, jobs=1)["number"]
     note = "once, and again"
     assert served.order("1/adopt", "person5", {"trial": trial, "note": note}).status == 200
@@ -324,7 +116,7 @@ def children(process_id: int) -> list[int]:
     return found
 
 
-def test_one_try_at_a_time_which_gives_way_to_jobs_and_can_be_ended(served: Served) -> None:
+def test_one_try_at_a_time_which_gives_way_to_jobs_and_can_be_ended(served: RecipesCell) -> None:
     ask = {"changes": {"margin_mm": 1}, "jobs": 50}
     assert served.order("1/trial", "person6", ask).status == 202
     second = served.order("1/trial", "person7", {**ask, "take_over": "me too"})
@@ -352,7 +144,7 @@ def test_one_try_at_a_time_which_gives_way_to_jobs_and_can_be_ended(served: Serv
     assert served.order("trial/stop", "person6", {}).status == 200
 
 
-def test_each_order_needs_a_person_and_their_word(served: Served) -> None:
+def test_each_order_needs_a_person_and_their_word(served: RecipesCell) -> None:
     client = Client(served.client.port, source="127.0.0.21")
     bodies = {
         "1/trial": {"changes": {"margin_mm": 1}},
@@ -381,7 +173,7 @@ def test_each_order_needs_a_person_and_their_word(served: Served) -> None:
     assert served.recipe()["values"]["margin_mm"] == 0
 
 
-def test_nothing_is_adopted_where_the_file_cannot_be_written(served: Served) -> None:
+def test_nothing_is_adopted_where_the_file_cannot_be_written(served: RecipesCell) -> None:
     trial = served.tried("person9", {"margin_mm": 4}, jobs=1)["number"]
     kept = served.cell.folder / "state" / "adopted.json"
     aside = kept.rename(kept.with_name("aside.json")) if kept.exists() else None
@@ -453,45 +245,3 @@ def test_what_was_adopted_outlives_kill_minus_nine_wherever_it_comes(tmp_path: P
         assert served.recipe()["adopted"][0]["in_force"] is False
     finally:
         served.cell.stop()
-
-
-FAULTS = """() => {
-  const wrong = [];
-  if (document.documentElement.scrollWidth > innerWidth) wrong.push(`${document.documentElement.scrollWidth} px wide`);
-  for (const one of document.querySelectorAll("button, select, input, a")) {
-    if (!one.checkVisibility()) continue;
-    const name = one.getAttribute("aria-label") || one.textContent.trim() || one.labels?.[0]?.textContent;
-    if (!name) wrong.push(`no name: ${one.outerHTML}`);
-    if (one.offsetHeight < 24) wrong.push(`too small: ${one.outerHTML}`);
-  }
-  return wrong;
-}"""
-AXE = """async () => {
-  const told = await axe.run(document, { resultTypes: ["violations"] });
-  return told.violations.filter(({ impact }) => ["serious", "critical"].includes(impact))
-    .map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.target).join(" ")}`);
-}"""
-
-
-@pytest.mark.parametrize("language", ["en", "ru"])
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_the_page_is_whole_and_axe_core_finds_nothing_serious(
-    served: Served, browser: Browser, theme: str, language: str
-) -> None:
-    if not served.recipe()["adopted"]:
-        served.adopted("person10", {"margin_mm": 6})
-    served.tried("person10", {"max_area_mm2": BETWEEN - 10 * len(theme + language)})
-    context = browser.new_context(locale=language, bypass_csp=True)
-    page = context.new_page()
-    page.emulate_media(color_scheme="dark" if theme == "dark" else "light")
-    page.goto(f"{served.client.url}recipes")
-    expect(page.locator("#tried path.now")).to_have_count(PICTURES)
-    given(page, "margin_mm", "7")
-    page.evaluate((node_modules() / "axe-core" / "axe.min.js").read_text())
-    wrong = {}
-    for width, height in WIDTHS.items():
-        page.set_viewport_size({"width": width, "height": height})
-        if faults := page.evaluate(FAULTS) + page.evaluate(AXE):
-            wrong[width] = faults
-    context.close()
-    assert wrong == {}

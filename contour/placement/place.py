@@ -7,6 +7,7 @@ promise was not kept (sequential linear programming with a trust region, Fletche
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -70,17 +71,17 @@ def best_placement(part: Contour, block: Contour, turns: Turns) -> Placement:
     lying = _Lying.of(rough_part, rough_block, field)
     rough: list[tuple[Candidate, Placement]] = []
     for candidate in found[:_MEASURED]:
-        best_so_far = max((placement.margin for _, placement in rough), default=-np.inf)
+        known = [placement for _, placement in rough]
+        best_so_far = max((placement.margin for placement in known), default=-np.inf)
         # What the field may be off by, and a climb on it may have left, decide whether it can still win.
         if candidate.depth_mm < best_so_far - 2 * first_move:
             break
-        rough.append((candidate, lying.improved(candidate, first_move, _ROUGH_MOVE_MM, best_so_far)))
+        rough.append((candidate, lying.improved(candidate, first_move, _ROUGH_MOVE_MM, known)))
     lying = _Lying.of(part, block, field)
     final: list[Placement] = []
     for candidate, placement in _best_apart(rough, part):
-        best_so_far = max((one.margin for one in final), default=-np.inf)
         moved = replace(candidate, pose=placement.pose)
-        final.append(lying.improved(moved, _ROUGH_MOVE_MM, _LEAST_MOVE_MM, best_so_far))
+        final.append(lying.improved(moved, _ROUGH_MOVE_MM, _LEAST_MOVE_MM, final))
     return max((_checked(part, block, one) for one in final), key=lambda placement: placement.margin)
 
 
@@ -144,17 +145,27 @@ class _Lying:
         in_part = DepthField.of(part, _PART_PAD * float(np.ptp(part.exterior, axis=0).max()), _PART_NODES)
         return cls(Outline.of(part), Outline.of(block), in_part, in_block, pivot_of(part))
 
-    def improved(self, candidate: Candidate, move_mm: float, least_mm: float, beaten_by: float = -np.inf) -> Placement:
+    def improved(
+        self, candidate: Candidate, move_mm: float, least_mm: float, known: Sequence[Placement] = ()
+    ) -> Placement:
         """From the candidate on, as far as moves lead, the first of them up to `move_mm`, the last `least_mm`.
 
-        It is given up where a dozen more of its moves would not reach a margin that another one has.
+        It is given up where a dozen more of its moves would not reach a margin that a known one has, and where it has
+        come so near to a known one with a larger margin that the next move could lead there.
         """
+        corners = np.array([self.part.start.min(axis=0), self.part.start.max(axis=0)])
+        beaten_by = max((one.margin for one in known), default=-np.inf)
+        others = np.array([one.pose.moved(corners) for one in known]).reshape(-1, 2, 2)
+        margins = np.array([one.margin for one in known])
         pose, limits = candidate.pose, candidate.turn_range
         arm = max(float(np.hypot(*(self.part.start - self.pivot).T).max()), 1e-9)
         largest = _MOST_GROWTH * move_mm
         near = self._contacts(pose, 3 * move_mm)
         for _ in range(_MOST_MOVES):
             if move_mm < least_mm or near.least + _GIVEN_UP_MOVES * move_mm < beaten_by:
+                break
+            apart = np.abs(others - pose.moved(corners)).max(axis=(1, 2))
+            if bool(((apart < move_mm) & (margins >= near.least)).any()):
                 break
             turns = (limits[0] - pose.angle, limits[1] - pose.angle)
             step = _best_step(near, self._place(pose), arm, move_mm, turns)

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int16s
 from contour.geometry.rings import Contour, bounding_box, densified
+from contour.image.side_by_side import side_by_side
 from contour.placement.clearance import Outline, contacts
 from contour.placement.field import DepthField
 from contour.placement.pose import Pose, Turns
@@ -21,6 +22,7 @@ _NODES = 640
 _STRIDE = 4
 _MOST_SAMPLES = 320
 _CLIMBERS = 192
+_MOST_STEPS = 32_000
 _CLIMB_STEPS = 36
 _PAD_SHARE = 0.04
 """Of the block's size, besides what the part is larger by however it is turned: beyond the grid nothing is known."""
@@ -51,7 +53,13 @@ def candidates(part: Contour, block: Contour, turns: Turns) -> tuple[list[Candid
     coarse = fine.every(_STRIDE)
     samples = _samples(part, block, coarse.spacing_mm) - pivot
     angles = turns.samples()
-    levels = [_eroded(coarse, samples, angle) for angle, _ in angles]
+    half = len(angles) // 2
+    field, step = _in_steps(coarse.depth), coarse.spacing_mm
+    one, other = side_by_side(
+        lambda: [_eroded(field, samples, step, angle) for angle, _ in angles[:half]],
+        lambda: [_eroded(field, samples, step, angle) for angle, _ in angles[half:]],
+    )
+    levels = one + other
     chosen = _peaks(levels, turns)
     starts = np.array(
         [
@@ -60,7 +68,12 @@ def candidates(part: Contour, block: Contour, turns: Turns) -> tuple[list[Candid
         ]
     )
     ranges = np.array([angles[k][1] for k, _, _ in chosen.tolist()])
-    climbed, depth = _climbed(fine, samples, starts, ranges, coarse.spacing_mm)
+    half = len(starts) // 2
+    (climbed, depth), (others, their_depth) = side_by_side(
+        lambda: _climbed(fine, samples, starts[:half], ranges[:half], coarse.spacing_mm),
+        lambda: _climbed(fine, samples, starts[half:], ranges[half:], coarse.spacing_mm),
+    )
+    climbed, depth = np.concatenate([climbed, others]), np.concatenate([depth, their_depth])
     found = []
     for index in _distinct(climbed, depth, samples, fine.spacing_mm):
         x, y, angle = climbed[index].tolist()
@@ -89,22 +102,27 @@ def _samples(part: Contour, block: Contour, spacing: float) -> Float64s:
     return np.concatenate([*along, grid[np.unique(inner.vertex[inner.distance > 0])]])
 
 
-def _eroded(field: DepthField, samples: Float64s, angle: float) -> Float32s:
+def _in_steps(depth: Float32s) -> Int16s:
+    """The depths in whole steps, as fine as int16 holds: eroded twice as fast, and alike are only those that are."""
+    steps = np.rint(depth * (_MOST_STEPS / max(float(np.abs(depth).max()), 1e-9)))
+    return np.asarray(steps, np.int16)
+
+
+def _eroded(depth: Int16s, samples: Float64s, spacing: float, angle: float) -> Int16s:
     """The least depth of any sample, where the pivot lies on each node; shape as the field's."""
-    nodes = np.round(Pose(0.0, 0.0, angle).moved(samples) / field.spacing_mm).astype(np.intp)
+    nodes = np.round(Pose(0.0, 0.0, angle).moved(samples) / spacing).astype(np.intp)
     reach = int(np.abs(nodes).max())
     element: Bytes = np.zeros((2 * reach + 1, 2 * reach + 1), np.uint8)
     element[nodes[:, 1] + reach, nodes[:, 0] + reach] = 1
-    lowest = float(field.depth.min())
-    eroded = cv2.erode(field.depth, element, borderType=cv2.BORDER_CONSTANT, borderValue=(2 * lowest, 0, 0, 0))
-    return np.asarray(eroded, np.float32)
+    outside = (float(np.iinfo(np.int16).min), 0, 0, 0)
+    return np.asarray(cv2.erode(depth, element, borderType=cv2.BORDER_CONSTANT, borderValue=outside), np.int16)
 
 
-def _peaks(levels: list[Float32s], turns: Turns) -> Indices:
+def _peaks(levels: list[Int16s], turns: Turns) -> Indices:
     """Places (turn, row, column) no worse than their neighbours, the best `_CLIMBERS`, shape (K, 3)."""
-    around = [np.asarray(cv2.dilate(level, np.ones((3, 3), np.uint8)), np.float32) for level in levels]
+    around = [np.asarray(cv2.dilate(level, np.ones((3, 3), np.uint8)), np.int16) for level in levels]
     linked = [turns.cyclic, *turns.neighbours(), turns.cyclic]
-    floor = min(float(level.min()) for level in levels)
+    floor = min(int(level.min()) for level in levels)
     places, depths = [], []
     for k, level in enumerate(levels):
         beside = [
@@ -116,7 +134,7 @@ def _peaks(levels: list[Float32s], turns: Turns) -> Indices:
         row, column = np.nonzero((level >= np.maximum.reduce(beside)) & (level > floor))
         places.append(np.column_stack([np.full(len(row), k), row, column]))
         depths.append(level[row, column])
-    order = np.argsort(-np.concatenate(depths), kind="stable")[:_CLIMBERS]
+    order = np.argsort(-np.concatenate(depths).astype(np.intp), kind="stable")[:_CLIMBERS]
     return np.asarray(np.concatenate(places)[order], np.intp)
 
 
@@ -127,6 +145,8 @@ def _climbed(
 
     The way is that of the samples that lie least deep, each the more the less; steps and what counts as least shrink.
     """
+    if not len(starts):
+        return starts, np.empty(0)
     arm = max(float(np.hypot(*samples.T).max()), 1e-9)
     now, best = starts.copy(), starts.copy()
     reached = np.full(len(starts), -np.inf)

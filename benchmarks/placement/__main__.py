@@ -19,7 +19,7 @@ import cv2
 
 from benchmarks.page_section import put_section, table
 from benchmarks.placement.parts import random_part
-from benchmarks.placement.pose_search import Found, margin, search, shape_of
+from benchmarks.placement.pose_search import Found, margin, search, shape_of, signed_margin
 from contour.placement.place import best_placement
 from contour.placement.pose import Turns
 from contour.synthetic import render
@@ -35,8 +35,8 @@ CLOSE_MM = 0.1
 
 @dataclass(frozen=True)
 class Laid:
-    """A part laid into one traced block: what was reached, and by whom. true_mm: its distance from the
-    rendered edge, -inf where it leaves the rendered block. own_mm: the contour's bound; bound_mm: that for the part.
+    """A part laid into one traced block: what was reached, and by whom. true_mm: its distance from the rendered edge,
+    negative where it leaves the rendered block. own_mm: the contour's bound; bound_mm: that for the part.
     """
 
     seed: int
@@ -79,7 +79,7 @@ def laid(seed: int) -> Laid | None:
         search(part, seen.millimetres, seed),
         bound_mm,
         seen.uncertainty_mm,
-        margin(placed, shape_of(rendered.truth_mm)),
+        signed_margin(placed, shape_of(rendered.truth_mm)),
         seconds,
         cpu_seconds,
     )

@@ -41,6 +41,18 @@ def margin(part: shapely.Polygon, block: shapely.Polygon) -> float:
     return float(shapely.distance(part, block.boundary)) if block.contains(part) else -math.inf
 
 
+def signed_margin(part: shapely.Polygon, block: shapely.Polygon) -> float:
+    """The margin; where the part leaves the block's material, minus how far: of the part's places outside, and of the
+    block's edge within the part, the farthest from where it should be.
+    """
+    if block.contains(part):
+        return margin(part, block)
+    outside = shapely.points(shapely.get_coordinates(part.difference(block)))
+    within = shapely.points(shapely.get_coordinates(block.boundary.intersection(part)))
+    far = shapely.distance(outside, block).max(initial=0.0), shapely.distance(within, part.boundary).max(initial=0.0)
+    return -float(max(far))
+
+
 def search(part: Contour, block: Contour, seed: int) -> Found:
     """Poses at random over the block's box and all turns; of the best ones the margin is measured."""
     rng = np.random.default_rng([seed, 77])

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.placement import pose_search
 from benchmarks.placement.__main__ import Laid, report
 from benchmarks.placement.parts import random_part
-from benchmarks.placement.pose_search import Found, margin, search, shape_of
+from benchmarks.placement.pose_search import Found, margin, search, shape_of, signed_margin
 from contour.geometry.rings import area, contour_defect
 from contour.synthetic import disc_ring, rectangle, with_holes
 
@@ -28,6 +28,13 @@ def test_margin_is_that_to_the_edge_and_to_holes_and_none_outside() -> None:
     assert margin(shape_of(rectangle((190.0, 100.0), 60.0, 20.0)), block) == pytest.approx(10.0, abs=0.01)
     assert margin(shape_of(rectangle((250.0, 100.0), 90.0, 90.0)), block) == -np.inf
     assert margin(shape_of(rectangle((300.0, 100.0), 50.0, 50.0)), block) == -np.inf
+
+
+def test_what_leaves_the_block_is_told_by_how_far() -> None:
+    block = shape_of(with_holes(BLOCK, disc_ring((250.0, 100.0), 20.0)))
+    assert signed_margin(shape_of(rectangle((100.0, 100.0), 100.0, 100.0)), block) == pytest.approx(50.0)
+    assert signed_margin(shape_of(rectangle((48.0, 100.0), 100.0, 100.0)), block) == pytest.approx(-2.0)
+    assert signed_margin(shape_of(rectangle((190.0, 100.0), 82.0, 20.0)), block) == pytest.approx(-1.0, abs=0.01)
 
 
 def test_parts_are_sound_and_of_the_size_that_is_said() -> None:

@@ -38,6 +38,8 @@ class Lattice:
     border: Border
     bright_table: bool
     pitch_px: float
+    ribbon_deg: float | None = None
+    """Direction of the walls that the cells are symmetric about alone, degrees from x, counter-clockwise as seen."""
 
 
 def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
@@ -51,7 +53,8 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
     x, y = (x + 0.5) / _FINER - 0.5, (y + 0.5) / _FINER - 0.5
     # A hole that a later cut opens is a bay with closed cells: nobody can tell where it was meant to end.
     outline = _box(rng, x, y, pitch, holed=border != "mixed")
-    into_wall, number, centre = _pattern(rng, cells, x, y, pitch, wall)
+    angle = float(rng.uniform(0, np.pi))
+    into_wall, number, centre = _pattern(rng, cells, (x, y), angle, pitch, wall)
     body = outline
     if border != "cut" and cells != "round":
         body = _whole_cells(outline, number, centre, wall)
@@ -65,7 +68,8 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
     material = body & (into_wall > 0)
     bright_table = bool(rng.random() < 0.5)
     picture = _rendered(rng, body, material, bright_table)
-    return Lattice(picture, _contour(body), cells, border, bright_table, pitch)
+    ribbon_deg = (90.0 - float(np.degrees(angle))) % 180.0 if cells in ("over-expanded", "flex") else None
+    return Lattice(picture, _contour(body), cells, border, bright_table, pitch, ribbon_deg)
 
 
 def _box(rng: np.random.Generator, x: Floats, y: Floats, pitch: float, *, holed: bool) -> NDArray[np.bool_]:
@@ -86,10 +90,10 @@ def _box(rng: np.random.Generator, x: Floats, y: Floats, pitch: float, *, holed:
 
 
 def _pattern(
-    rng: np.random.Generator, cells: Cells, x: Floats, y: Floats, pitch: float, wall: float
+    rng: np.random.Generator, cells: Cells, place: tuple[Floats, Floats], angle: float, pitch: float, wall: float
 ) -> tuple[Floats, NDArray[np.int64], tuple[Floats, Floats]]:
     """How far each place lies within a wall (px, negative in cells), its cell's number, and that cell's centre."""
-    angle = float(rng.uniform(0, np.pi))
+    x, y = place
     u = x * np.cos(angle) + y * np.sin(angle) + rng.uniform(0, pitch)
     v = -x * np.sin(angle) + y * np.cos(angle) + rng.uniform(0, pitch)
     wide = 1.0

@@ -29,6 +29,7 @@ CASES = (
     ("2-l-shape", (), "part-fits"),
     ("4-with-holes", ("--margin-mm", "10"), "part-between-holes"),
     ("3-u-shape", ("--margin-mm", "25"), "part-does-not-fit"),
+    ("4-with-holes", ("--margin-mm", "3", "--ribbon-from-picture"), "part-along-ribbon"),
     ("1-rectangle", ("--margin-mm", "10", "--rotation", "fixed"), "part-as-drawn"),
 )
 RECIPE = """

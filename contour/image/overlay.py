@@ -79,6 +79,7 @@ def draw_overlay(
     shown_px: Sequence[Float64s] = (),
     hidden: Sequence[Hidden] = (),
     parts: Sequence[DrawnPart] = (),
+    ribbon: tuple[tuple[float, float], tuple[float, float]] | None = None,
 ) -> Bytes:
     """The picture as BGR, shape (H + h, W, 3), with the contour and its vertices, below h rows with lines of text.
 
@@ -86,8 +87,8 @@ def draw_overlay(
     is the largest. Where `uncertainty_px` is wider than the line, a veil covers what lies within it. `shown_px`,
     paths (N, 2) that show why it is refused, lie over all in yellow. Of `hidden` parts bridged ones are
     dashed, covered ones red and wide; the rest of a refused exterior then is orange. `parts` are drawn in violet, or
-    red where one does not fit, margins as veils around them, tightest places as lines with dots, numbers within. Raises
-    PictureError.
+    red where one does not fit, margins as veils around them, tightest places as lines with dots, numbers within.
+    `ribbon` is a white line from end to end with an L, the core's direction. Raises PictureError.
     """
     check_picture(picture)
     canvas = _cv.bgr(picture)
@@ -107,6 +108,8 @@ def draw_overlay(
                 _mark_vertices(canvas, ring, unit)
     for part in parts:
         _draw_part(canvas, part, unit)
+    if ribbon is not None:
+        _draw_ribbon(canvas, np.array(ribbon), unit)
     for path in shown_px:
         _draw_path(canvas, path, (0, 0, 0), 2 * _line_width(unit) + 2)
         _draw_path(canvas, path, VERTEX, 2 * _line_width(unit))
@@ -184,10 +187,19 @@ def _draw_number(canvas: Bytes, number: str, inside: Bytes, unit: float) -> None
     framed = np.pad(inside[top : top + height, left : left + width], 1)
     depth = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_3)
     _, _, _, (x, y) = cv2.minMaxLoc(depth)
-    wide = _text_width(number, unit)
-    place = (left + int(x) - wide // 2, top + int(y) + round(11 * unit))
+    _draw_text(canvas, number, (left + int(x) - _text_width(number, unit) // 2, top + int(y) + round(11 * unit)), unit)
+
+
+def _draw_ribbon(canvas: Bytes, ends: Float64s, unit: float) -> None:
+    for tone, width in (((0, 0, 0), _line_width(unit) + 4), (_TEXT, _line_width(unit) + 1)):
+        _draw_path(canvas, ends, tone, width)
+    x, y = np.round(ends[1] + 6 * unit).astype(int).tolist()
+    _draw_text(canvas, "L", (x, y), unit)
+
+
+def _draw_text(canvas: Bytes, text: str, place: tuple[int, int], unit: float) -> None:
     for tone, stroke in (((0, 0, 0), round(5 * unit)), (_TEXT, max(round(2 * unit), 1))):
-        cv2.putText(canvas, number, place, cv2.FONT_HERSHEY_SIMPLEX, unit, tone, stroke, cv2.LINE_AA)
+        cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, unit, tone, stroke, cv2.LINE_AA)
 
 
 def _line_width(unit: float) -> int:

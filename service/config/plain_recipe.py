@@ -41,3 +41,8 @@ class PlainRecipe:
     parts_apart_mm: float = 0.0
     parts_tries: int = 2
     parameters: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def asked_parts(self) -> tuple[PartToCut, ...]:
+        """All parts that it names, in their order."""
+        return self.parts if self.part is None else (self.part,)

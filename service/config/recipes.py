@@ -10,6 +10,7 @@ from contour.errors import ParameterError
 from contour.placement.pose import MOST_STEPS, Turns
 from contour.placement.several import MOST_TRIES
 from contour.polygon.start_vertex import Start
+from contour.ribbon.ribbon import Ribbon
 from contour.tracing.trace import Method
 from service.config.plain_recipe import PlainRecipe
 from service.config.values import FilePath, Model, Number, Point
@@ -70,6 +71,11 @@ class PartToCut(Model):
         description="Direction of the core's ribbon in the machine frame, degrees from x counter-clockwise: the "
         "drawing's x axis comes to lie along it, either way round; none = it does not matter.",
     )
+    ribbon_from_picture: bool = Field(
+        False,
+        description="That direction is read from each picture; ribbon_angle_deg is for those that do not tell it, "
+        "which are refused without.",
+    )
     ribbon_tolerance_deg: float = Field(2, ge=0, le=90, description="How far from it the part may be turned, degrees.")
 
     @property
@@ -78,6 +84,28 @@ class PartToCut(Model):
         steps = {"free": None, "fixed": 1}.get(str(self.rotation), self.rotation)
         turns = Turns.free() if steps is None else Turns.steps(int(steps))
         return turns if self.ribbon_angle_deg is None else turns.along(self.ribbon_angle_deg, self.ribbon_tolerance_deg)
+
+    def on(self, ribbon: Ribbon | None) -> Self:
+        """The same for a block whose ribbon was read from its picture, where that is asked for; raise ParameterError
+        where it was not told well enough and no angle is given, or where no turn is left.
+        """
+        if not self.ribbon_from_picture:
+            return self
+        why = "nobody looked" if ribbon is None else ribbon.why
+        if ribbon is not None and ribbon.angle_deg is not None and ribbon.bound_deg is not None:
+            left = self.ribbon_tolerance_deg - ribbon.bound_deg
+            if left >= 0:
+                told = {"ribbon_angle_deg": ribbon.angle_deg, "ribbon_tolerance_deg": left}
+                read: Self = self.model_copy(update=told)
+                assert read.turns.intervals
+                return read
+            why = f"it is told within {ribbon.bound_deg:.1f} degrees only, {self.ribbon_tolerance_deg:g} are allowed"
+        if self.ribbon_angle_deg is None:
+            raise ParameterError(
+                f"Where the core's ribbon runs cannot be read from the picture: {why}. Look where it runs and set "
+                "ribbon_angle_deg, or light the block so that its walls show sharply."
+            )
+        return self
 
     @model_validator(mode="after")
     def _may_be_turned_somehow(self) -> Self:

@@ -131,6 +131,8 @@ class Measurer:
             findings = (*result.findings, *self._guard.findings(picture, camera))
             result = replace(result, findings=tuple(sorted(findings, key=lambda finding: finding[0])))
             watch.lap("guard")
+        if any(part.ribbon_from_picture for part in recipe.asked_parts):
+            result = self.parts.with_ribbon(result, picture, self._calibration)
         if recipe.part is not None:
             result = self.parts.tried(result, recipe.part, self._calibration)
             watch.lap("part")

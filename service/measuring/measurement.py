@@ -17,6 +17,7 @@ from contour.image.overlay import Hidden
 from service.reasons import Reason, Rejection
 
 if TYPE_CHECKING:
+    from service.parts.core_ribbon import CoreRibbon
     from service.parts.fit import PartFit
 
 _STRETCH_FIELDS = ("ring", "from_px", "to_px", "from_mm", "to_mm", "state", "by", "bound_px", "bound_mm")
@@ -31,7 +32,7 @@ class Measurement:
     against it, (N, 2) each. edge: cut, cells or mixed, as the picture shows it. evidence: what the contour rests on,
     stretches along its rings; None where nobody says. part: the recipe's part in it; None where the recipe has none,
     or the contour was refused before it was tried. parts: those of a recipe with several that lie in it; wanted: how
-    many of each were to be laid.
+    many of each were to be laid. ribbon: where the core's runs; None where no part asks for it.
     """
 
     method: str
@@ -48,6 +49,7 @@ class Measurement:
     evidence: tuple[SentStretch, ...] | None = None
     part: PartFit | None = None
     parts: tuple[PartFit, ...] = ()
+    ribbon: CoreRibbon | None = None
     wanted: tuple[int, ...] = ()
     thickness_mm: float | None = None
     aligned: bool = False
@@ -115,6 +117,7 @@ class Measurement:
             "thickness_mm": self.thickness_mm,
             **({} if self.part is None else {"part": self.part.summary()}),
             **({"parts": [part.summary() for part in self.parts]} if self.parts else {}),
+            **({} if self.ribbon is None else {"ribbon": self.ribbon.fields()}),
             "quality": None if self.quality is None else {k: _rounded(v) for k, v in asdict(self.quality).items()},
             "timings_ms": {name: _rounded(value) for name, value in self.timings_ms.items()},
         }

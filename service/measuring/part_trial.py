@@ -7,10 +7,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from contour.calibration.calibration import Calibration
+from contour.errors import ParameterError
+from contour.geometry.arrays import Bytes
 from service.measuring.measurement import Measurement
 from service.reasons import Reason
 
 if TYPE_CHECKING:
+    from contour.ribbon.ribbon import Ribbon
     from service.config.recipes import AnyRecipe, PartToCut
     from service.parts.part import Part
     from service.parts.sure_block import SureBlock
@@ -31,6 +34,22 @@ class PartTrial:
             self._parts[asked] = load_part(asked.file, Asked(asked.units or "", asked.layer))
         return self._parts[asked]
 
+    @staticmethod
+    def with_ribbon(measured: Measurement, picture: Bytes, calibration: Calibration | None) -> Measurement:
+        """The measurement of a block that was accepted, with where its core's ribbon runs, as the picture tells it."""
+        from contour.ribbon.ribbon import Ribbon
+        from service.parts.core_ribbon import CoreRibbon, core_ribbon
+
+        if measured.findings or measured.pixels is None or calibration is None:
+            return measured
+        if measured.pitch_px is None:
+            return replace(measured, ribbon=CoreRibbon(Ribbon(why=f"{measured.method} does not look at cells")))
+        bright, height_mm = measured.polarity == "bright", measured.thickness_mm or 0.0
+        ribbon = core_ribbon(
+            picture, measured.pixels, measured.pitch_px, bright=bright, calibration=calibration, height_mm=height_mm
+        )
+        return replace(measured, ribbon=ribbon)
+
     def tried(self, measured: Measurement, asked: PartToCut, calibration: Calibration | None) -> Measurement:
         """The measurement of a block that was accepted, with where the part lies in it, refused where it does not fit.
 
@@ -42,7 +61,10 @@ class PartTrial:
         if isinstance(begun, Measurement):
             return begun
         (part,), block, known = begun
-        fit = fit_part(part, block, asked)
+        try:
+            fit = fit_part(part, block, asked.on(_told(measured)))
+        except ParameterError as error:
+            return _refused(measured, str(error))
         measured = replace(measured, part=in_picture(fit, known, measured.thickness_mm or 0.0))
         return measured if fit.finding is None else _refused(measured, fit.finding)
 
@@ -54,7 +76,10 @@ class PartTrial:
         if isinstance(begun, Measurement):
             return begun
         parts, block, known = begun
-        wanted = list(zip(parts, recipe.parts, strict=True))
+        try:
+            wanted = [(part, one.on(_told(measured))) for part, one in zip(parts, recipe.parts, strict=True)]
+        except ParameterError as error:
+            return _refused(measured, str(error))
         found = lay_parts(wanted, block, recipe.parts_apart_mm, recipe.parts_tries)
         if not found:
             names = ", ".join(dict.fromkeys(part.path.name for part in parts))
@@ -90,6 +115,10 @@ class PartTrial:
         if block is None:
             return _refused(measured, "No part fits: nowhere in the block is its edge sure enough. Light it better.")
         return parts, block, calibration
+
+
+def _told(measured: Measurement) -> Ribbon | None:
+    return None if measured.ribbon is None else measured.ribbon.told
 
 
 def _refused(measured: Measurement, text: str) -> Measurement:

@@ -32,6 +32,7 @@ from service.measuring.calibration_guard import CalibrationGuard, GuardLimits
 from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
 from service.measuring.table_file import TableFileError, TableRecord, load_table
+from service.parts.core_ribbon import CoreRibbon
 from service.parts.fit import PartFit
 from service.reasons import Reason
 from service.records.archive import DRAFT, PLAIN_FRAME, TABLES, document_of, folder_of
@@ -102,6 +103,12 @@ class ArchivedJob:
     def parts(self) -> tuple[PartFit, ...]:
         """The parts of a recipe with several that were laid."""
         return tuple(PartFit.of_kept(found) for found in self.document["measurement"].get("parts", ()))
+
+    @property
+    def ribbon(self) -> CoreRibbon | None:
+        """Where the core's ribbon runs; None where no part asked for it, as in documents of earlier versions."""
+        found = self.document["measurement"].get("ribbon")
+        return None if found is None else CoreRibbon.of_kept(found)
 
     @cached_property
     def recipe_settings(self) -> dict[str, Any]:
@@ -229,6 +236,7 @@ def _measurement(draft: ArchivedJob) -> Measurement:
         evidence=draft.evidence,
         part=draft.part,
         parts=draft.parts,
+        ribbon=draft.ribbon,
         thickness_mm=known["thickness_mm"],
         aligned=known["aligned"],
         quality=None if quality is None else Quality(**quality),

@@ -132,6 +132,7 @@ def measurement_fields(measurement: Measurement) -> dict[str, Any]:
         "uncertainty": None if measurement.uncertainty is None else asdict(measurement.uncertainty),
         "evidence": measurement.evidence_fields,
         **({} if measurement.part is None else {"part": measurement.part.kept()}),
+        **({} if measurement.ribbon is None else {"ribbon": measurement.ribbon.kept()}),
         "shown_px": [np.round(path, 2).tolist() for path in measurement.shown_px],
         **({"parts": [part.kept() for part in measurement.parts]} if measurement.parts else {}),
         "reasons": [{"code": int(reason), "text": text} for reason, text in measurement.findings],

@@ -32,6 +32,7 @@ def overlay(picture: NDArray[np.uint8], measurement: Measurement) -> NDArray[np.
         shown_px=measurement.shown_px,
         hidden=measurement.hidden,
         parts=[fit.drawn for fit in measurement.laid if fit.drawn is not None],
+        ribbon=None if measurement.ribbon is None else measurement.ribbon.line_px,
     )
 
 
@@ -64,8 +65,10 @@ def caption(measurement: Measurement) -> list[str]:
         found += f", within {measurement.uncertainty_mm:.2f} mm"
     elif measurement.uncertainty_px is not None:
         found += f", within {measurement.uncertainty_px:.1f} px"
+    ribbon = [] if measurement.ribbon is None else [measurement.ribbon.words]
     part = measurement.part
     if part is None:
         laid = [f"part {number}: {laid} of {wanted}" for number, laid, wanted in measurement.laid_of_each]
-        return [verdict, found, *([f"laid: {', '.join(laid)}"] if laid else [])]
-    return [verdict, found, f"{part.part.path.name}: margin {part.margin_mm:.2f} mm, needed {part.needed_mm:.2f} mm"]
+        return [verdict, found, *ribbon, *([f"laid: {', '.join(laid)}"] if laid else [])]
+    laid_one = f"{part.part.path.name}: margin {part.margin_mm:.2f} mm, needed {part.needed_mm:.2f} mm"
+    return [verdict, found, *ribbon, laid_one]

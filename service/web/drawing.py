@@ -56,6 +56,7 @@ def drawing(archived: ArchivedJob) -> Drawing:
         part=_part(archived.part) if measured else None,
         parts=[part for fit in archived.parts if (part := _part(fit)) is not None] if measured else [],
         wanted=_wanted(archived) if measured and archived.parts else [],
+        ribbon=_ribbon(archived) if measured else [],
         size_mm=None if millimetres is None else _size(millimetres),
         sentinels=list(backdrop.sentinels),
         grid=backdrop.grid,
@@ -118,6 +119,11 @@ def _part(fit: PartFit | None) -> LaidPart | None:
         middle=point_within(fit.drawn.outline),
         file=fit.part.path.name,
     )
+
+
+def _ribbon(archived: ArchivedJob) -> list[tuple[float, float]]:
+    seen = archived.ribbon
+    return [] if seen is None or seen.line_px is None else list(seen.line_px)
 
 
 def _wanted(archived: ArchivedJob) -> list[WantedPart]:

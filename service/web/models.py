@@ -290,6 +290,7 @@ class Drawing(Answer):
     part: LaidPart | None
     parts: list[LaidPart] = Field(description="Those of a recipe with several.")
     wanted: list[WantedPart] = Field(description="What such a recipe would have laid.")
+    ribbon: Points = Field(description="Ends of a line along the core's ribbon, read from the picture; empty = not.")
     size_mm: tuple[float, float] | None
     sentinels: list[SentinelMark]
     grid: Grid | None

@@ -23,6 +23,7 @@ SAID_IN = (
     "contour/camera_calibration/view_selection",
     "service/calibrating/teaching",
     "service/measuring/calibration_guard",
+    "contour/ribbon/ribbon",
     *(f"service/web/commission/{name}_actions" for name in ("board", "cell", "machine")),
     *(f"service/web/commission/{name}" for name in ("bench", "board_shots", "score")),
     "service/measuring/part_trial",

@@ -20,6 +20,7 @@ _KEYS = {
     "margin_mm": "margin_mm",
     "rotation": "rotation",
     "ribbon_angle_deg": "ribbon_angle_deg",
+    "ribbon_from_picture": "ribbon_from_picture",
     "ribbon_tolerance_deg": "ribbon_tolerance_deg",
 }
 """Options, and the keys of a recipe's `part` that they change."""
@@ -28,6 +29,11 @@ _KEYS = {
 def add_part_arguments(parser: argparse.ArgumentParser, *, name_the_part: bool = True) -> None:
     """The part's file, but where it is named otherwise, and how it may lie."""
     if name_the_part:
+        parser.add_argument(
+            "--ribbon-from-picture",
+            action=argparse.BooleanOptionalAction,
+            help="read it from the picture; --ribbon-angle-deg where that does not tell",
+        )
         of_recipe = "drawing: .dxf, .svg, .geojson; default the recipe's"
         parser.add_argument("--part", type=Path, metavar="FILE", help=of_recipe)
     parser.add_argument("--part-units", choices=("um", "mm", "cm", "m", "in"), help="where the drawing says none")
@@ -51,7 +57,7 @@ def with_part(recipe: AnyRecipe, args: argparse.Namespace) -> AnyRecipe:
     from service.config.mistakes import describe
     from service.config.recipes import PartToCut
 
-    given = {key: getattr(args, option) for option, key in _KEYS.items() if getattr(args, option) is not None}
+    given = {key: value for option, key in _KEYS.items() if (value := getattr(args, option, None)) is not None}
     if recipe.parts and not given:
         return recipe
     own: dict[str, Any] = {} if recipe.part is None else recipe.part.model_dump()

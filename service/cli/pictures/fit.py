@@ -78,7 +78,7 @@ def _checked_parts(tracing: Tracing) -> list[Path]:
     from service.parts.part import PartFileError
 
     recipe = tracing.recipe
-    asked = recipe.parts if recipe.part is None else (recipe.part,)
+    asked = recipe.asked_parts
     try:
         for part in asked:
             tracing.measurer.parts.part_of(part)
@@ -106,6 +106,7 @@ def _fitted(args: argparse.Namespace, tracing: Tracing, exports: Exports) -> tup
     note += f"  [{', '.join(written)}]" if written else ""
     fits = bool(measurement.laid) and not measurement.findings
     told = measurement.part.sentence if fits and measurement.part else sentence(measurement, args.language)
+    told += f", {measurement.ribbon.words}" if fits and measurement.part and measurement.ribbon else ""
     line = f"{shown(args.image)}: {'fits: ' if fits else ''}{told}{note}"
     return _record(args.image, measurement), line, EXIT_OK if fits else EXIT_REFUSED
 
@@ -124,6 +125,7 @@ def _record(image: Path, measurement: Measurement | None, status: str = "ok", de
         "status": "refused" if measurement.findings else "ok",
         "reasons": [reason.label for reason in measurement.reasons],
         **told,
+        **({} if measurement.ribbon is None else {"ribbon": measurement.ribbon.fields()}),
         **({"parts": _parts(measurement), "not_laid": _not_laid(measurement)} if measurement.parts else {}),
         "uncertainty_mm": measurement.uncertainty_mm,
         "timings_ms": {name: round(value, 3) for name, value in measurement.timings_ms.items()},

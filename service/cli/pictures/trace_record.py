@@ -32,6 +32,8 @@ def sentence(measurement: Measurement, language: str) -> str:
         text += f", within {measurement.uncertainty_mm:.2f} mm"
     elif measurement.uncertainty_px is not None:
         text += f", within {measurement.uncertainty_px:.2f} px"
+    if measurement.ribbon is not None:
+        text += f", {measurement.ribbon.words}"
     if measurement.part is not None:
         text += f", {measurement.part.sentence}"
     if measurement.parts:
@@ -63,6 +65,7 @@ def record_of(image: Path, measurement: Measurement) -> dict[str, Any]:
         "millimetres": _rings(measurement.millimetres),
         "area_mm2": measurement.area_mm2,
         "uncertainty_mm": measurement.uncertainty_mm,
+        **({} if measurement.ribbon is None else {"ribbon": measurement.ribbon.fields()}),
         **({} if measurement.part is None else {"part": measurement.part.fields()}),
         **({"parts": [part.fields() for part in measurement.parts]} if measurement.parts else {}),
         "timings_ms": {name: round(value, 3) for name, value in measurement.timings_ms.items()},

@@ -8,6 +8,7 @@ const STEP = 1.25;
 const MOST = 40;
 const MOST_MARKS = 400; // more vertices than this are a line of dots
 const TEXT_PX = 13;
+const LETTER_PX = 36;
 const MOST_WAIT_MS = 300;
 
 const view = at("view");
@@ -81,8 +82,16 @@ function outline() {
   for (const { covered, points } of drawing.hidden) group.append(draw("path", { class: covered ? "covered" : "bridged", d: line(points) }));
   const corners = rings.flat();
   for (const part of drawing.part ? [drawing.part] : drawing.parts) group.append(drawnPart(part, path, drawing.width, drawing.height, !drawing.part));
+  if (drawing.ribbon.length) group.append(...ribbon(drawing.ribbon));
   if (corners.length <= MOST_MARKS) group.append(draw("path", { class: "vertices", d: corners.map(([x, y]) => `M${x} ${y}h0`).join("") }));
   return group;
+}
+
+/** A line along the core's ribbon, with an L at its end. */
+function ribbon(ends) {
+  const [x, y] = ends[1];
+  const lines = ["ribbon-under", "ribbon"].map((name) => draw("path", { class: name, d: line(ends) }));
+  return [...lines, draw("text", { class: "part-number", x, y, "font-size": LETTER_PX }, "L")];
 }
 
 function axes() {

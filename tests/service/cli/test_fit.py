@@ -95,6 +95,28 @@ def test_margin_and_rotation_are_those_asked_for(part: Path, capsys: pytest.Capt
     assert told(capsys)["needed_mm"] > 100
 
 
+def test_the_ribbon_is_read_from_the_picture(part: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Drawn at 85 degrees, in walls as they are warped."""
+    plain, seen = tmp_path / "plain.png", tmp_path / "seen.png"
+    assert fit("--part", part, "--ribbon-from-picture", "--json", "-", "--overlay", seen) == 0
+    captured = capsys.readouterr()
+    record = json.loads(captured.out)
+    ribbon = record["ribbon"]
+    assert (ribbon["told_by"], ribbon["why"]) == ("walls", None)
+    assert ribbon["angle_deg"] == pytest.approx(85.0, abs=ribbon["bound_deg"])
+    turned = math.remainder(record["pose"]["angle_deg"] - ribbon["angle_deg"], 180.0)
+    assert abs(turned) <= 2.0 - ribbon["bound_deg"] + 1e-6
+    assert "ribbon at 85." in captured.err
+    assert fit("--part", part, "--ribbon-angle-deg", 85, "--json", "-", "--overlay", plain) == 0
+    assert "ribbon" not in told(capsys)
+    white = [(cv2.imread(str(path)) == 235).all(axis=2).sum() for path in (plain, seen)]
+    assert white[1] > white[0] + 300
+    assert fit("--part", part, "--ribbon-from-picture", "--ribbon-tolerance-deg", 0.1, "--json", "-") == 3
+    refused = told(capsys)
+    assert (refused["reasons"], refused["ribbon"]["told_by"]) == (["part_does_not_fit"], "walls")
+    assert "degrees only, 0.1 are allowed" in refused["details"][0]
+
+
 def test_the_overlay_shows_the_part(part: Path, tmp_path: Path) -> None:
     plain, seen = tmp_path / "plain.png", tmp_path / "seen.png"
     assert main(["trace", PICTURE, "--calibration", CALIBRATION, "--overlay", str(plain)]) == 0

@@ -15,11 +15,13 @@ from pydantic import ValidationError
 
 from contour.acceptance.error_budget import ErrorBudget
 from contour.geometry.rings import Contour
+from contour.ribbon.ribbon import Ribbon
 from contour.synthetic import rectangle
 from service.config.recipes import OneOfParts, PartToCut, Recipe
 from service.measuring.calibration_file import load_record
 from service.measuring.measurement import Measurement
 from service.measuring.part_trial import PartTrial
+from service.parts.core_ribbon import CoreRibbon
 from service.parts.fit import PartFit
 from service.reasons import Reason
 
@@ -85,6 +87,60 @@ def test_what_stands_out_is_told_by_how_much(asked: PartToCut) -> None:
     assert "stands out of the block by 12.81 mm" in measured.texts[0]
     # The block is 140 mm by 84: the part's corners stand out by 10 mm and 8 mm.
     assert np.isfinite(measured.part.placement.pose.x)
+
+
+def read(angle_deg: float | None, bound_deg: float = 0.5) -> CoreRibbon:
+    if angle_deg is None:
+        return CoreRibbon(Ribbon(why="too few walls are seen between the cells"))
+    return CoreRibbon(Ribbon(angle_deg, bound_deg, "walls"))
+
+
+def along_picture(asked: PartToCut, **more: Any) -> PartToCut:
+    return PartToCut(**{**asked.model_dump(), "rotation": "free", "margin_mm": 0, "ribbon_from_picture": True, **more})
+
+
+def test_a_part_lies_along_the_ribbon_that_was_read(asked: PartToCut) -> None:
+    fit = PartTrial().tried(seen(ribbon=read(4.0)), along_picture(asked, ribbon_angle_deg=60.0), CALIBRATION).part
+    assert fit is not None
+    # What is not known of the ribbon is taken off the tolerance.
+    assert abs(math.remainder(fit.placement.pose.angle_deg - 4.0, 180.0)) <= 1.5 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("ribbon", "why"),
+    [
+        (read(None), "cannot be read from the picture: too few walls are seen between the cells. Look where it runs"),
+        (read(4.0, 2.5), "it is told within 2.5 degrees only, 2 are allowed"),
+        (None, "nobody looked"),
+    ],
+)
+def test_a_ribbon_that_is_not_told_well_enough_refuses_unless_an_angle_is_given(
+    asked: PartToCut, ribbon: CoreRibbon | None, why: str
+) -> None:
+    refused = PartTrial().tried(seen(ribbon=ribbon), along_picture(asked), CALIBRATION)
+    assert refused.reasons == (Reason.PART_DOES_NOT_FIT,)
+    assert why in refused.texts[0]
+    assert refused.part is None
+    given = PartTrial().tried(seen(ribbon=ribbon), along_picture(asked, ribbon_angle_deg=0.0), CALIBRATION)
+    assert given.part is not None
+    assert abs(math.remainder(given.part.placement.pose.angle_deg, 180.0)) <= 2.0 + 1e-6
+
+
+def test_a_ribbon_that_no_turn_of_the_part_lies_along_is_told(asked: PartToCut, small: PartToCut) -> None:
+    fixed = along_picture(asked, rotation="fixed")
+    assert "none of its 1 angles" in PartTrial().tried(seen(ribbon=read(45.0)), fixed, CALIBRATION).texts[0]
+    recipe = several(small, ribbon_from_picture=True)
+    assert "none of its 1 angles" in PartTrial().laid(seen(ribbon=read(45.0)), recipe, CALIBRATION).texts[0]
+    assert PartTrial().laid(seen(ribbon=read(179.9, 0.1)), recipe, CALIBRATION).findings == ()
+
+
+def test_without_a_pitch_nothing_is_read(asked: PartToCut) -> None:
+    measured = seen(pixels=BLOCK)
+    picture = np.zeros((480, 640), np.uint8)
+    found = PartTrial.with_ribbon(measured, picture, CALIBRATION).ribbon
+    assert found is not None
+    assert (found.told.angle_deg, found.told.why) == (None, "wall-tips does not look at cells")
+    assert PartTrial.with_ribbon(measured, picture, None) is measured
 
 
 def test_what_is_kept_of_a_fit_is_the_fit_again(asked: PartToCut) -> None:

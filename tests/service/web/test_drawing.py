@@ -14,7 +14,9 @@ import yaml
 from contour.geometry.rings import Contour
 from contour.placement.place import Placement
 from contour.placement.pose import Pose
+from contour.ribbon.ribbon import Ribbon
 from service.measuring.calibration_file import load_record
+from service.parts.core_ribbon import CoreRibbon
 from service.parts.fit import PartFit, in_picture
 from service.parts.part import Part
 from service.records.archived_job import ArchivedJob, EvidenceError
@@ -66,6 +68,14 @@ def test_the_part_is_drawn_where_it_lies_with_what_it_needs() -> None:
     assert (shown.fits, shown.margin_mm, shown.asked_mm, shown.needed_mm) == (True, 5.0, 3.0, 4.005)
     length_px = math.dist(*shown.tightest)
     assert shown.px_per_mm == pytest.approx(length_px / 5.0, rel=0.02)
+
+
+def test_a_line_lies_along_the_ribbon_that_was_read() -> None:
+    assert drawing(archived()).ribbon == []
+    document = archived().document["measurement"]
+    kept = CoreRibbon(Ribbon(30.0, 0.5, "walls"), ((10.0, 20.0), (30.5, 40.0))).kept()
+    shown = drawing(archived(measurement={**document, "ribbon": json.loads(json.dumps(kept))}))
+    assert shown.ribbon == [(10.0, 20.0), (30.5, 40.0)]
 
 
 def interpolated(shown: Drawing, grid: Grid, x: float, y: float) -> tuple[float, float]:

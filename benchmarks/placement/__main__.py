@@ -31,6 +31,8 @@ from tests.support.scenes.trials import calibration_for
 
 SECTION = "placement"
 CLOSE_MM = 0.1
+_TIMES = 3
+"""How often each is laid: other work on the machine only adds to what it takes."""
 
 
 @dataclass(frozen=True)
@@ -67,10 +69,13 @@ def laid(seed: int) -> Laid | None:
     if block is None:
         return None
     part = random_part(rendered.truth_mm, seed)
-    started, cpu = time.perf_counter(), time.process_time()
-    placement = best_placement(part, block.measured, Turns.free())
-    bound_mm = block.bound_at(part, placement)
-    seconds, cpu_seconds = time.perf_counter() - started, time.process_time() - cpu
+    spent = []
+    for _ in range(_TIMES):
+        started, cpu = time.perf_counter(), time.process_time()
+        placement = best_placement(part, block.measured, Turns.free())
+        bound_mm = block.bound_at(part, placement)
+        spent.append((time.perf_counter() - started, time.process_time() - cpu))
+    seconds, cpu_seconds = (min(one) for one in zip(*spent, strict=True))
     placed = shape_of(placement.pose.placed(part))
     return Laid(
         seed,
@@ -110,7 +115,7 @@ def report(done: Sequence[Laid], refused: int) -> str:
             "the worst of them, by",
             f"{max((one.margin_mm - one.bound_mm - one.true_mm for one in nearer), default=0.0):.2f} mm",
         ),
-        ("time, median / worst", f"{statistics.median(seconds):.2f} / {max(seconds):.2f} s"),
+        ("time by the clock, median / worst", f"{statistics.median(seconds):.2f} / {max(seconds):.2f} s"),
         ("processor time, median / worst", f"{statistics.median(cpu):.2f} / {max(cpu):.2f} s"),
     ]
     first, last = done[0].seed, done[-1].seed
@@ -118,8 +123,9 @@ def report(done: Sequence[Laid], refused: int) -> str:
         f"## Parts laid into traced blocks\n\nRandom blocks {first} to {last}, {refused} of them refused, each with a "
         "part drawn at random of 8 to 50 % of its area, turned freely (`python -m benchmarks.placement`). Margins are "
         "to the traced outline; the rendered edge is the true one. The bound for parts is "
-        f"{EVERYWHERE:g} times the contour's own, more where the edge near the part is less sure. Processor time is "
-        "what counts where a machine has other work.\n\n" + table(("", "measured"), rows)
+        f"{EVERYWHERE:g} times the contour's own, more where the edge near the part is less sure. Times are the "
+        f"best of {_TIMES} runs each, in two threads, on a machine of two cores that has other work.\n\n"
+        + table(("", "measured"), rows)
     )
 
 

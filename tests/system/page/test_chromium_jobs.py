@@ -134,12 +134,13 @@ def test_the_part_is_drawn_and_the_slider_tells_what_another_margin_would_do(pan
     }  # fmt: skip
 
     def with_part(route: Route) -> None:
-        route.fulfill(json={**route.fetch().json(), "part": part})
+        route.fulfill(json={**route.fetch().json(), "part": part, "ribbon": [[310, 220], [390, 280]]})
 
     page.route("**/drawing", with_part)
     panel.ordered()
     expect(page.locator("#view path.part-outline")).to_have_attribute("d", "M300 200L400 200L400 300L300 300Z")
     expect(page.locator("#view path.part-tightest")).to_have_attribute("d", "M300 250L280 250")
+    expect(page.locator("#view path.ribbon")).to_have_attribute("d", "M310 220L390 280")
     expect(page.locator("#view path.part-margin")).to_have_attribute("stroke-width", "17.5")
     expect(page.locator("#part-told")).to_have_text(
         "The part fits with a margin of 3.0\u00a0mm: 8.00\u00a0mm is there."

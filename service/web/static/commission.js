@@ -121,7 +121,7 @@ function shots() {
 function shotOf(of) {
   const remove = make("button", { type: "button" });
   remove.addEventListener("click", () => act("remove", { shot: of }));
-  return make("li", { "data-shot": of }, make("img", { src: `/api/v1/commission/shots/${of}`, loading: "lazy" }), make("strong"), make("span"), remove);
+  return make("li", { "data-shot": of }, make("img", { src: `/api/v1/commission/shots/${of}` }), make("strong"), make("span"), remove);
 }
 
 function showShot(element, { number: of, flat, serves, corners, why }) {

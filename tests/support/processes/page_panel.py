@@ -78,7 +78,8 @@ def clean_page(browser: Browser, url: str, noise: Sequence[str] = (), **more: An
     page.goto(url)
     yield page
     page.close()
-    assert [one for one in complaints if not any(part in one for part in noise)] == []
+    wrong = [one for one in complaints if not any(part in one for part in noise)]
+    assert not wrong, wrong
     assert [one for one in asked if not one.startswith(url)] == [], "nothing is loaded from elsewhere"
 
 

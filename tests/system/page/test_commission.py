@@ -185,6 +185,10 @@ def pictures_of_the_board(page: Page, bare: BareCell) -> None:
     """As a person takes them, one of which shows no board."""
     boards = bare.boards(VIEWS)
     bare.lies(next(boards))
+    page.locator("#live").click()
+    expect(page.locator("#live-figures")).to_contain_text("sharpest seen")
+    page.locator("#live").click()
+    expect(page.locator("#live-box")).to_be_hidden()
     press(page, "look")
     done(page, "camera")
     page.locator("#square-mm").fill("30")
@@ -196,6 +200,7 @@ def pictures_of_the_board(page: Page, bare: BareCell) -> None:
     bare.lies(bare.table())
     press(page, "shoot")
     expect(page.locator('#shots li[data-kind="refused"]')).to_contain_text("no marker of DICT_5X5_250 is seen")
+    page.wait_for_function("[...document.querySelectorAll('#shots img')].every(one => one.naturalWidth > 0)")
     page.locator('#shots li[data-kind="refused"] button').click()
     expect(page.locator("#shots li")).to_have_count(1)
     expect(page.locator("#running")).to_have_text("")

@@ -61,7 +61,7 @@ class BoardShots:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._seen: dict[str, _Seen] = {}
+        self._seen: dict[tuple[str, int], _Seen] = {}  # by name and time: a name may come again with another picture
         self._by: Board | None = None
 
     def judged(self, go_on: Callable[[], None]) -> Judged:
@@ -72,15 +72,16 @@ class BoardShots:
         board = board_of(asked)
         if board != self._by:
             self._seen, self._by = {}, board
+        before, self._seen = self._seen, {}
         for shot in shots:
-            if shot.path.name not in self._seen:
+            key = shot.path.name, shot.path.stat().st_mtime_ns
+            if key not in before:
                 go_on()
-                self._seen[shot.path.name] = _look(shot, board)
-        return self._together(shots, board)
+            self._seen[key] = before.get(key) or _look(shot, board)
+        return self._together(shots, list(self._seen.values()), board)
 
-    def _together(self, shots: list[Shot], board: Board) -> Judged:
+    def _together(self, shots: list[Shot], seen: list[_Seen], board: Board) -> Judged:
         flat = self._session.flat
-        seen = [self._seen[shot.path.name] for shot in shots]
         size = next(
             (one.size for shot, one in zip(shots, seen, strict=True) if shot == flat), seen[0].size if seen else (0, 0)
         )

@@ -73,6 +73,7 @@ class Notes(_Kept):
 
     board: BoardRequest | None = None
     camera: str = ""
+    newest: int = 0
     look: KeptLook | None = None
     setup: CalibrateRequest = CalibrateRequest()
     calibration: KeptCalibration | None = None
@@ -136,13 +137,13 @@ class Session:
         kept_bytes = sum(shot.path.stat().st_size for shot in shots)
         if kept_bytes + frame.samples.nbytes > MOST_BYTES:
             raise StepRefused(f"the pictures take {kept_bytes / 1e6:.0f} MB, more are not kept. Remove some")
-        number = max((shot.number for shot in shots), default=0) + 1
+        number = max([self.notes.newest, *(shot.number for shot in shots)]) + 1
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             write_picture(self.folder / f"{'flat' if flat else 'view'}-{number:03d}.png", frame.samples)
         except (OSError, PictureFileError) as error:
             raise StepRefused(f"the picture cannot be kept: {error}") from error
-        self.notes.camera = frame.camera
+        self.notes.camera, self.notes.newest = frame.camera, number
         if before is not None:
             before.path.unlink(missing_ok=True)
         self.save()

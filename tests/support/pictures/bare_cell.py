@@ -23,7 +23,7 @@ BLOCK = Scene(
 )
 
 
-MARKS_MM = {3: (14.0, 14.0), 4: (430.0, 310.0)}
+MARKS_MM = {3: (40.0, 40.0), 4: (420.0, 300.0)}
 
 
 def with_marks(pixels: np.ndarray) -> np.ndarray:

@@ -135,6 +135,7 @@ def test_a_cell_is_set_up_to_its_first_accepted_job(
         done(page, "table")
         press(page, "marks")
         done(page, "marks")
+        expect(page.locator('[data-step="marks"] .lines')).to_contain_text("Marks 3, 4 of DICT_4X4_50")
         press(page, "probe")
         done(page, "controller")
 
@@ -207,7 +208,7 @@ def pictures_of_the_board(page: Page, bare: BareCell) -> None:
     for number, board in enumerate(boards, 2):
         bare.lies(board)
         press(page, "shoot")
-        expect(page.locator("#shots li")).to_have_count(number)
+        expect(page.locator('#shots li[data-kind="accepted"]')).to_have_count(number)
     assert page.locator("#coverage rect").count() > 2 * seen
     done(page, "board")
 

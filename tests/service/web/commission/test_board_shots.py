@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import cv2
@@ -67,6 +68,16 @@ def test_each_picture_that_does_not_serve_says_why(session: Session, views: list
         assert why in str(told[number].why), told[number]
         assert not told[number].serves
     assert told[2].serves
+
+
+def test_another_picture_by_the_same_name_is_looked_at_anew(session: Session, views: list[np.ndarray]) -> None:
+    shots, path = BoardShots(session), session.shots[1].path
+    cv2.imwrite(str(path), np.full(views[0].shape, 90, np.uint8))
+    assert not shots.judged(go_on).shots[1].serves
+    path.unlink()
+    cv2.imwrite(str(path), views[1])
+    os.utime(path, ns=(1, 1))  # a coarse clock gives both the same time
+    assert shots.judged(go_on).shots[1].serves
 
 
 def test_another_board_has_all_pictures_looked_at_anew(session: Session) -> None:

@@ -81,6 +81,14 @@ def test_other_files_are_no_pictures_of_the_board(session: Session, name: str) -
     assert session.shots == []
 
 
+def test_a_number_never_comes_again(session: Session) -> None:
+    for _ in range(2):
+        session.add(frame(), flat=False)
+    session.remove(2)
+    session.add(frame(), flat=False)
+    assert [shot.number for shot in Session(session.folder).shots] == [1, 3]
+
+
 def test_a_picture_that_is_not_there_cannot_be_removed(session: Session) -> None:
     with pytest.raises(StepRefused, match="there is no picture 7"):
         session.remove(7)

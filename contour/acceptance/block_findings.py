@@ -129,10 +129,35 @@ def several_blocks(traced: Trace | None, limits: Limits) -> Finding | None:
 
 
 def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | None:
-    """Contour and busy picture farther apart than `limit` pitches, an edge without cells, or a chip's bump or dent."""
+    """Contour and busy picture farther apart than `limit` pitches, or an edge that is none of a block."""
     if traced is None or traced.disagreement is None or limit is None:
         return None
     shown_px = _SHOWN_PITCHES * (traced.trace.pitch_px or 0.0)
+    at_edge = _odd_edge(traced, shown_px)
+    if at_edge is not None:
+        return at_edge
+    apart = traced.disagreement
+    advice = "Look at the overlay; check light and table, and that nothing lies against the block."
+    if apart.pitches > limit:
+        what = "takes for block what looks like table" if apart.claimed else "leaves out what looks like block"
+        x, y = apart.place_px
+        return Finding(
+            Refusal.METHODS_DISAGREE,
+            f"The contour {what} near ({x:.0f}, {y:.0f}) px, by {apart.pitches:.1f} cells, {limit:g} are allowed. "
+            f"{advice}",
+            (around(x, y, shown_px),),
+        )
+    if apart.outside_pitches > _EVERYWHERE * limit:
+        return Finding(
+            Refusal.METHODS_DISAGREE,
+            f"Most of the contour lies outside of what looks like block, by {apart.outside_pitches:.2f} cells, "
+            f"{_EVERYWHERE * limit:g} are allowed. {advice}",
+        )
+    return None
+
+
+def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
+    """A chip's bump or dent, or a part of the edge without cells behind it or with comb beyond it."""
     if traced.narrow is not None:
         narrow = traced.narrow
         what = "stands out of its edge" if narrow.outwards else "goes into its edge"
@@ -153,22 +178,14 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
             "edge, check light and table, or set max_disagreement_pitches: 0 for blocks with filled cells.",
             (around(x, y, shown_px),),
         )
-    apart = traced.disagreement
-    advice = "Look at the overlay; check light and table, and that nothing lies against the block."
-    if apart.pitches > limit:
-        what = "takes for block what looks like table" if apart.claimed else "leaves out what looks like block"
-        x, y = apart.place_px
+    if traced.beyond is not None:
+        x, y = traced.beyond.place_px
         return Finding(
             Refusal.METHODS_DISAGREE,
-            f"The contour {what} near ({x:.0f}, {y:.0f}) px, by {apart.pitches:.1f} cells, {limit:g} are allowed. "
-            f"{advice}",
+            f"Along {traced.beyond.length_pitches:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, comb seems to "
+            "go on beyond it, its walls faint, or something lies against the block there. Look at the overlay; check "
+            "light and exposure, and clear the edge.",
             (around(x, y, shown_px),),
-        )
-    if apart.outside_pitches > _EVERYWHERE * limit:
-        return Finding(
-            Refusal.METHODS_DISAGREE,
-            f"Most of the contour lies outside of what looks like block, by {apart.outside_pitches:.2f} cells, "
-            f"{_EVERYWHERE * limit:g} are allowed. {advice}",
         )
     return None
 

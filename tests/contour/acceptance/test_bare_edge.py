@@ -9,7 +9,7 @@ import shapely
 from numpy.typing import NDArray
 
 from contour.acceptance.acceptance import View, judge
-from contour.acceptance.bare_edge import bare_edge
+from contour.acceptance.bare_edge import comb_at_edge
 from contour.acceptance.disagreement import Disagreement
 from contour.acceptance.findings import Limits, Refusal
 from contour.acceptance.trace_check import CheckedTrace
@@ -45,7 +45,7 @@ def traced(picture: NDArray[np.uint8], outline: shapely.Polygon, *evidence: Stre
 
 
 def found(picture: NDArray[np.uint8], outline: shapely.Polygon, *evidence: Stretch) -> EdgePart | None:
-    return bare_edge(traced(picture, outline, *evidence), PITCH)
+    return comb_at_edge(traced(picture, outline, *evidence), PITCH)[0]
 
 
 @pytest.mark.parametrize("table", [10, 60, 130, 200, 250])
@@ -102,11 +102,69 @@ def test_a_thing_that_stands_out_of_the_edge_is_told() -> None:
     assert one.place_px[0] > 400
 
 
+def test_a_thing_so_deep_that_no_cells_lie_farther_in_either_is_told() -> None:
+    hand = shapely.box(260, 100, 400 + 3 * PITCH, 310)
+    picture = filled(hand)
+    some = np.random.default_rng(1).integers(0, 5, picture.shape, dtype=np.uint8)
+    one = found(picture + cv2.blur(some, (3, 3)) * np.uint8(2), BLOCK | hand)
+    assert one is not None
+    assert one.length_pitches > 12.0
+    assert shapely.Point(one.place_px).distance(hand.exterior) < 1.0
+
+
 @pytest.mark.parametrize(("state", "by"), [("seen", "compound"), ("bridged", "object"), ("covered", "object")])
 def test_what_is_told_to_fill_or_to_hide_the_edge_is_left_out(state: State, by: Hider) -> None:
     whole = float((BLOCK | LABEL).length)
     assert found(filled(LABEL), BLOCK | LABEL, Stretch(0, 0.0, whole, state, by, 1.0)) is None
     assert found(filled(LABEL), BLOCK | LABEL, Stretch(0, 0.0, whole, "seen", None, 1.0)) is not None
+
+
+def beyond(picture: NDArray[np.uint8], outline: shapely.Polygon, *evidence: Stretch) -> EdgePart | None:
+    return comb_at_edge(traced(picture, outline, *evidence), PITCH)[1]
+
+
+def with_faint_rim(walls: int) -> NDArray[np.uint8]:
+    """A block whose last cells on the right show faint walls, on a table as light as its cells."""
+    picture = comb(BLOCK, 60)
+    rim = comb(BLOCK, 60, walls=walls)
+    picture[:, 384:] = rim[:, 384:]
+    return picture
+
+
+SHORT = shapely.box(80, 80, 384, 336)
+
+
+def test_faint_walls_beyond_an_outline_over_more_than_three_cells_are_told_with_their_place() -> None:
+    one = beyond(with_faint_rim(110), SHORT)
+    assert one is not None
+    assert one.length_pitches == pytest.approx(256 / PITCH, abs=3.0)
+    assert one.place_px == pytest.approx((384, 208), abs=2 * PITCH)
+    assert beyond(with_faint_rim(70), SHORT) is None
+    assert beyond(with_faint_rim(110), BLOCK) is None
+    assert beyond(with_faint_rim(110), SHORT, Stretch(0, 0.0, float(SHORT.length), "covered", "object", 1.0)) is None
+
+
+def test_a_speck_beside_the_edge_is_no_comb_nor_is_a_table_that_changes_everywhere() -> None:
+    specks = comb(BLOCK, 60)
+    cv2.rectangle(specks, (406, 200), (412, 220), 200, -1)
+    assert beyond(specks, BLOCK) is None
+    table = (60 + 40 * (np.arange(480) // 8 % 2)).astype(np.uint8)
+    grained = comb(BLOCK, 60)
+    grained[:, 400:] = table[:, None]
+    assert beyond(grained, BLOCK) is None
+
+
+def test_comb_beyond_a_contour_is_refused_with_its_place_where_the_picture_is_asked() -> None:
+    block = traced(comb(BLOCK, 20), BLOCK)
+    agrees = Disagreement(0.1, (0.0, 0.0), True, 0.0)
+    checked = CheckedTrace(block, disagreement=agrees, beyond=EdgePart(4.1, (120.0, 80.0))).moved(np.array([10.0, 0.0]))
+    polygon = Polygon(block.contour, None, 1e4, None, None)
+    findings = judge(polygon, View((480, 480)), Limits(max_disagreement_pitches=2.0), traced=checked)
+    (finding,) = [finding for finding in findings if finding.refusal == Refusal.METHODS_DISAGREE]
+    assert "4.1 cells" in finding.text
+    assert "(130, 80) px" in finding.text
+    free = judge(polygon, View((480, 480)), Limits(), traced=checked)
+    assert not [finding for finding in free if finding.refusal == Refusal.METHODS_DISAGREE]
 
 
 def test_such_a_contour_is_refused_with_the_place_and_the_next_step_where_the_picture_is_asked() -> None:

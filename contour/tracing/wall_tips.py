@@ -95,7 +95,7 @@ def _cut(
     seen, look = looked
     visible = visible_rings(picture, seen, look, rectifier)
     for one in visible:
-        check_against_evidence(one.evidence, one.fitted.ring, seen.pitch_px, rectifier)
+        check_against_evidence(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
     rings = [one.fitted for one in visible]
     exterior = rings[0]
     if exterior.unseen_share > _MOST_UNSEEN:

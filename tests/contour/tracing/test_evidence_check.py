@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
 from contour.tracing.evidence_check import check_against_evidence
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, rectangle, witnesses
 
 BLOCK = rectangle(900.0, 600.0)
@@ -38,9 +39,10 @@ def test_a_long_edge_bent_by_the_lens_by_more_than_half_a_small_cell_passes_none
     flat = witnesses(BLOCK, seed=1, spacing=pitch)
     seen = replace(flat, points=lens.unrectify(flat.points))
     ring = lens.unrectify(BLOCK)
-    check_against_evidence(seen, ring, pitch, lens)
+    on_line = np.ones(len(seen.points), np.bool_)
+    check_against_evidence(seen, ring, on_line, pitch, lens)
     with pytest.raises(NoBlockFound, match="more than half a cell"):
-        check_against_evidence(seen, ring, pitch, None)
+        check_against_evidence(seen, ring, on_line, pitch, None)
 
 
 @pytest.mark.parametrize("pitches", [-0.8, 0.8])
@@ -50,30 +52,53 @@ def test_four_ends_in_a_row_far_off_on_either_side_are_refused_with_their_place(
     moved = evidence.points + np.where(off, pitches * PITCH, 0.0)[:, None] * evidence.normal
     x, y = moved[13]
     with pytest.raises(NoBlockFound, match=rf"near \({x:.0f}, {y:.0f}\) px"):
-        check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
+        check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
 
 
 def test_three_ends_in_a_row_are_missing_cells() -> None:
     evidence = witnesses(BLOCK, seed=2)
     off = np.isin(np.arange(len(evidence.points)), np.arange(10, 13))
     moved = evidence.points - np.where(off, 0.8 * PITCH, 0.0)[:, None] * evidence.normal
-    check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
+    check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
+
+
+def blunt(evidence: RingEvidence) -> RingEvidence:
+    return replace(evidence, kind=np.full_like(evidence.kind, WitnessKind.BLUNT))
 
 
 @pytest.mark.parametrize("is_hole", [False, True])
 def test_two_ends_side_by_side_outside_are_material_that_the_outline_leaves_out_and_one_is_a_chip(
     is_hole: bool,
 ) -> None:
-    evidence = witnesses(BLOCK, seed=2)
+    evidence = blunt(witnesses(BLOCK, seed=2))
     if is_hole:
         evidence = replace(evidence, is_hole=True, normal=-evidence.normal)
     # Inside, two are a cell that is missing.
     for count, pitches in ((1, 0.6), (2, 0.25), (2, -0.8)):
         off = np.isin(np.arange(len(evidence.points)), np.arange(10, 10 + count))
         moved = evidence.points + np.where(off, pitches * PITCH, 0.0)[:, None] * evidence.normal
-        check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
-    moved = (
-        evidence.points + np.where(np.isin(np.arange(len(off)), (10, 11)), 0.4 * PITCH, 0.0)[:, None] * evidence.normal
-    )
+        check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
+    moved = evidence.points + np.where(off, 0.4 * PITCH, 0.0)[:, None] * evidence.normal
     with pytest.raises(NoBlockFound, match="more than a third of a cell"):
-        check_against_evidence(replace(evidence, points=moved), BLOCK, PITCH, None)
+        check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
+
+
+def test_one_clean_end_outside_is_no_chip_but_a_wall_of_the_block() -> None:
+    evidence = witnesses(BLOCK, seed=2)
+    off = np.arange(len(evidence.points)) == 10
+    for pitches, clean in ((0.1, True), (0.25, False), (-0.8, True)):
+        moved = evidence.points + np.where(off, pitches * PITCH, 0.0)[:, None] * evidence.normal
+        check_against_evidence(replace(evidence if clean else blunt(evidence), points=moved), BLOCK, ~off, PITCH, None)
+    moved = evidence.points + np.where(off, 0.25 * PITCH, 0.0)[:, None] * evidence.normal
+    with pytest.raises(NoBlockFound, match="more than a sixth of a cell"):
+        check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
+
+
+@pytest.mark.parametrize("pitches", [-0.4, 0.4])
+def test_an_outline_that_cuts_off_the_end_of_an_edge_that_it_was_laid_through_is_refused(pitches: float) -> None:
+    evidence = blunt(witnesses(BLOCK, seed=2))
+    off = np.arange(len(evidence.points)) == 10
+    moved = evidence.points + np.where(off, pitches * PITCH, 0.0)[:, None] * evidence.normal
+    check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
+    with pytest.raises(NoBlockFound, match="more than a third of a cell"):
+        check_against_evidence(replace(evidence, points=moved), BLOCK, off | ~off, PITCH, None)

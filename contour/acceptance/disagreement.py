@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from contour.acceptance.block_level import exclusive_levels
+from contour.acceptance.block_level import exclusive_levels, table_activity
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median, quantile
 from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.opencv import fewer_vertices, pieces_and_areas
@@ -32,10 +32,9 @@ _OPENING_PITCHES = 2.2
 _SCRATCH_PITCHES = 1.8
 # How far the busy region reaches beyond the block's edge: half of the window it is averaged over.
 _BLUR_PITCHES = 0.5
-# So far inside walls may be faint: there they differ from the table by so much, of what it usually shows and of most.
-# In the middle of holes it is 1.1 times the usual, of faded walls 1.5 (row noise) to 11; and 0.08 of what it is in comb
-# there, 0.17 or more here.
-_FAR_INSIDE_PITCHES, _FAINT, _FAINT_OVER, _FAINTEST = 3.0, 1.6, 0.95, 0.12
+# So far inside walls may be faint: there they are so busy of what comb is. In the middle of holes it is 0.08 of that,
+# of faded walls 0.17 or more; and nothing is a hole that is busier than the table and so much of what comb is.
+_FAR_INSIDE_PITCHES, _FAINTEST, _FAINTEST_IN_HOLES = 3.0, 0.12, 0.06
 # A corner is cut off where both turns are more than the first, and together less than the second; and the edges on both
 # sides so long. A piece so wide lies there, so near the tip; the contour is followed so closely.
 _BEVEL, _SIDE_PITCHES, _EVEN_PITCHES = (np.radians(15.0), np.radians(125.0)), 3.0, 0.3
@@ -82,7 +81,7 @@ def disagreement(
     small_pitch_px = pitch_px / shrink
     activity = _activity(small, small_pitch_px)
     busy = _without_small_gaps(_busy(activity, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
-    ours = _drawn(contour, busy.shape[:2], shrink)
+    ours = _drawn(contour.rings, busy.shape, shrink)
     if flat is not None and flat.any():
         there = cv2.resize(flat, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
         filled = cv2.dilate(there, _disc(_BLUR_PITCHES * small_pitch_px * 2)) > 0
@@ -101,15 +100,18 @@ def disagreement(
     only_block, only_table = (_opened(mask, _square(_SCRATCH_PITCHES * small_pitch_px)) for mask in exclusive)
     theirs = _touched(_opened(_but(busy, only_table), _disc(_SCRATCH_PITCHES * small_pitch_px)), ours)
     busy = np.asarray(cv2.bitwise_or(busy, only_block), np.uint8)
-    busy[_faint_walls(activity, ours, around, small_pitch_px)] = 255
+    of_table, of_comb = table_activity(activity, around), median(activity[::2, ::2][ours[::2, ::2] > 0])
+    busy[_faint_walls(activity, ours, max(of_table, _FAINTEST * of_comb), small_pitch_px)] = 255
     # The picture's border is no block, and block ends there.
     outside = np.asarray(cv2.distanceTransform(_inverted(busy), cv2.DIST_L2, 3), np.float32)
     inside = _distances(theirs)
+    holes = _drawn(contour.holes, ours.shape, shrink)
     points = _reduced_points(contour, pitch_px / _POINTS_A_PITCH, shrink)
     farthest = [
         (*_widest(_but(ours, busy)), True),
         (*_widest(_but(theirs, around)), False),
         (*in_tips, False),
+        (*_faint_holes(activity, holes, max(of_table, _FAINTEST_IN_HOLES * of_comb), small_pitch_px), False),
         (*_farthest(outside, points, 0.0), True),
         (*_farthest(inside, points, _BLUR_PITCHES * small_pitch_px), False),
     ]
@@ -128,17 +130,25 @@ def _activity(small: Bytes, small_pitch_px: float) -> Float32s:
     return np.asarray(cv2.boxFilter(off, cv2.CV_32F, (window, window)), np.float32)
 
 
-def _faint_walls(activity: Float32s, ours: Bytes, around: Bytes, small_pitch_px: float) -> Bools:
-    """Where, far inside the contour, the picture is busier than the table is: walls fade there, and a hole shows the
-    table.
-    """
-    table = activity[::2, ::2][around[::2, ::2] == 0]
-    if not len(table):
-        return np.zeros(ours.shape, np.bool_)
+def _faint_walls(activity: Float32s, ours: Bytes, level: float, small_pitch_px: float) -> Bools:
+    """Where, far inside the contour, the picture is busier than that: walls fade there, and a hole shows the table."""
     far_inside = _distances(ours) > _FAR_INSIDE_PITCHES * small_pitch_px
-    usual = _FAINTEST * median(activity[::2, ::2][ours[::2, ::2] > 0])
-    level = max(usual, _FAINT * median(table), quantile(table, _FAINT_OVER))
     return np.asarray((activity > level) & far_inside, np.bool_)
+
+
+def _faint_holes(activity: Float32s, holes: Bytes, level: float, rim_px: float) -> tuple[float, tuple[float, float]]:
+    """The widest hole that is busier than that within its rim, as `_widest`: walls fade there."""
+    x, y, wide, high = cv2.boundingRect(holes)
+    if not wide:
+        return 0.0, (0.0, 0.0)
+    box = slice(y, y + high), slice(x, x + wide)
+    depth = _distances(holes[box])
+    _, part = cv2.connectedComponents((depth > rim_px).astype(np.uint8), connectivity=4)
+    busy = np.bincount(part[activity[box] > level], minlength=int(part.max()) + 1)
+    faint = busy > 0.5 * np.bincount(part.ravel())
+    faint[0] = False
+    across, (column, row) = _deepest(np.where(faint[part], depth, np.float32(0.0)))
+    return across, (x + column, y + row)
 
 
 def _busy(average: Float32s, small_pitch_px: float) -> Bytes:
@@ -164,9 +174,9 @@ def _opened(mask: Bytes, shape: Bytes) -> Bytes:
     return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, shape), np.uint8)
 
 
-def _drawn(contour: Contour, shape: tuple[int, int], shrink: int) -> Bytes:
+def _drawn(outlines: tuple[Ring, ...], shape: tuple[int, ...], shrink: int) -> Bytes:
     mask = np.zeros(shape, np.uint8)
-    rings = [_fixed_point(samples_of(ring, shrink)) for ring in contour.rings]
+    rings = [_fixed_point(samples_of(ring, shrink)) for ring in outlines]
     cv2.fillPoly(mask, rings, 255, cv2.LINE_8, _FRACTION_BITS)
     return mask
 
@@ -200,7 +210,10 @@ def _distances(mask: Bytes) -> Float32s:
 
 def _widest(difference: Bytes) -> tuple[float, tuple[float, float]]:
     """Diameter of the largest disc inside, in pixels, and its middle (x, y)."""
-    depth = _distances(difference)
+    return _deepest(_distances(difference))
+
+
+def _deepest(depth: Float32s) -> tuple[float, tuple[float, float]]:
     y, x = np.unravel_index(int(depth.argmax()), depth.shape)
     return 2.0 * float(depth[y, x]), (float(x), float(y))
 

@@ -200,6 +200,24 @@ def test_walls_that_fade_far_inside_are_no_table() -> None:
     assert disagreement(faded, scene.truth_px, scene.pitch_px).pitches < 1.3
 
 
+@pytest.mark.parametrize(("left", "is_hole"), [(0.2, False), (0.0, True)])
+def test_a_hole_in_which_walls_are_faint_is_none_and_one_that_shows_the_table_is(left: float, is_hole: bool) -> None:
+    scene = block("rectangle", "easy")
+    table = float(np.median(scene.picture[:30]))
+    x, y = scene.truth_px.exterior.mean(axis=0)
+    rows, columns = np.indices(scene.picture.shape)
+    inside = np.hypot(columns - x, rows - y) < 2.2 * scene.pitch_px
+    noise = np.random.default_rng(3).normal(table, 2.0, scene.picture.shape)
+    faint = np.where(inside, noise + left * (scene.picture - table), scene.picture)
+    hole = shapely.Point(x, y).buffer(2.2 * scene.pitch_px)
+    outline = contour(polygon(scene.truth_px) - hole)
+    found = disagreement(np.clip(faint, 0, 255).astype(np.uint8), outline, scene.pitch_px)
+    assert (found.pitches < LIMIT) == is_hole
+    if not is_hole:
+        assert not found.claimed
+        assert hole.contains(shapely.Point(found.place_px))
+
+
 def test_what_is_flat_and_known_is_no_table_inside_the_contour() -> None:
     """Compound: without cells it looks like table, with its place given it is no disagreement."""
     scene = block("rectangle")

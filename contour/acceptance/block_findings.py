@@ -194,6 +194,14 @@ def vague(traced: Trace | None) -> Finding | None:
     """Whatever the recipe allows: beyond some cells it is not known which of them belong to the block."""
     if traced is None or traced.uncertainty_px is None or not traced.pitch_px:
         return None
+    if traced.untold_px is not None:
+        x, y = traced.untold_px
+        return Finding(
+            Refusal.UNCERTAINTY_TOO_LARGE,
+            f"Near ({x:.0f}, {y:.0f}) px the contour is round, yet at most one wall end tells it from a corner half a "
+            "cell off. Look at the overlay; take away what lies against the block, and check light and focus.",
+            (around(x, y, _SHOWN_PITCHES * traced.pitch_px),),
+        )
     cells = traced.uncertainty_px / traced.pitch_px
     # The edge of material is seen without its cells: there a share of the block tells as well what is gross.
     gross = _SURE_WITHIN_SHARE * area(traced.contour) ** 0.5 if traced.edge in ("cells", "mixed") else 0.0

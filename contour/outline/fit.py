@@ -18,7 +18,7 @@ from contour.outline.labelling import label
 from contour.outline.lines_and_arcs import distance
 from contour.outline.missed_walls import overlooked, with_bounds
 from contour.outline.proposals import FEW, gather, propose, renewed
-from contour.outline.roundings import rounded
+from contour.outline.roundings import rounded, untold
 from contour.outline.runs import Segments, around, fitted, runs
 from contour.outline.spread import Vertices, unseen_share, vertex_sigma
 from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
@@ -43,7 +43,7 @@ class FittedRing:
     outside. spread_px: robust standard deviation of the inliers. unseen_share: share of the outline farther than a
     pitch from every inlier, 0 to 1. vertex_sigma_px: standard deviation of each vertex (across a segment, or of a
     corner's place), shape (M,); it knows random errors only, so add a floor. segments: number of lines, arcs and
-    curves.
+    curves. untold: where it is round though hardly anything seen tells that it is no corner, shape (K, 2), raw pixels.
     """
 
     ring: Ring
@@ -53,6 +53,7 @@ class FittedRing:
     unseen_share: float
     vertex_sigma_px: Float64s
     segments: int
+    untold: Float64s
 
 
 def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifier: Rectifier | None) -> FittedRing:
@@ -103,6 +104,8 @@ def _fitted(
     for chain in chains:
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
+    in_chains = np.isin(np.arange(len(segments)), [k for chain in chains for k in chain.segments])
+    doubtful = untold(witnesses, replace(segments, bend=segments.bend & ~in_chains), found, inlier)
     found = bevelled(witnesses, segments, found, inlier, material[:, 0] + 1j * material[:, 1])
     vertices = _vertices(witnesses, segments, found, chains)
     if len(vertices.ring) < 3:
@@ -113,11 +116,15 @@ def _fitted(
     spread = _spread(residual[inlier], wall_px)
     given = _given_leverage(segments, inlier, arcs, chains)
     sigma = vertex_sigma(witnesses, segments, inlier, vertices, given=given, spread=spread)
-    ring = np.column_stack([vertices.ring.real, vertices.ring.imag])
-    if rectifier is not None:
-        ring = rectifier.unrectify(ring)
+    ring, places = (_raw(points, rectifier) for points in (vertices.ring, doubtful))
     pieces = len(segments) - sum(len(chain.segments) - 1 for chain in chains)
-    return FittedRing(ring, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces)
+    return FittedRing(ring, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces, places)
+
+
+def _raw(points: Complexes, rectifier: Rectifier | None) -> Float64s:
+    """Points of the fitting plane, (N,), as raw pixels, (N, 2)."""
+    flat = np.column_stack([points.real, points.imag])
+    return flat if rectifier is None else rectifier.unrectify(flat)
 
 
 def _given_leverage(segments: Segments, inlier: Bools, arcs: Bools, chains: list[Chain]) -> Float64s:

@@ -45,6 +45,7 @@ class Trace:
     `reaches_frame`: its walls go on to the last pixels of what was looked at.
     `evidence`: what the contour rests on, stretches without gaps along each ring, and `look` what lies about it; None
     where the method does not say.
+    `untold_px`: where (x, y) it is round though hardly anything seen tells that it is no corner; None where nowhere.
     """
 
     method: Method
@@ -59,9 +60,11 @@ class Trace:
     reaches_frame: bool = False
     evidence: tuple[Stretch, ...] | None = None
     look: TableLook | None = field(default=None, compare=False, repr=False)
+    untold_px: tuple[float, float] | None = None
 
     def moved(self, first: Float64s) -> Trace:
         """The trace in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
         others = tuple(piece.moved(x, y) for piece in self.others)
-        return replace(self, contour=shifted(self.contour, first), others=others)
+        untold = None if self.untold_px is None else (self.untold_px[0] + x, self.untold_px[1] + y)
+        return replace(self, contour=shifted(self.contour, first), others=others, untold_px=untold)

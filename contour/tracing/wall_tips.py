@@ -119,9 +119,9 @@ def _cut(
         for number, (ring, one) in enumerate(zip(contour.rings, visible, strict=True))
         for stretch in ring_evidence(number, ring, one, look, rectifier, bounds[number])
     )
-    return replace(
-        _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px), edge="cut", evidence=evidence, look=look
-    )
+    untold = next(((float(x), float(y)) for one in rings for x, y in one.untold), None)
+    found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
+    return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold)
 
 
 def visible_rings(

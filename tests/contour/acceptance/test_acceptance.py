@@ -201,6 +201,14 @@ def test_a_contour_that_is_not_sure_within_a_quarter_of_a_cell_is_refused_whatev
     assert "sure within 7.2 px only, 0.3 cells, 0.25 are allowed" in finding.text
 
 
+def test_a_corner_that_may_as_well_be_round_is_refused_with_its_place() -> None:
+    whole = traced(uncertainty_px=1.0, untold_px=(100.0, 80.0)).moved(np.array([20.0, 10.0]))
+    (finding,) = judge(GOOD, FRAME, LIMITS, traced=whole)
+    assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
+    assert "(120, 90) px" in finding.text
+    assert len(finding.shown_px) == 1
+
+
 def test_the_ring_that_the_polygon_was_made_of_must_keep_off_the_frame_too() -> None:
     bulge = np.insert(GOOD.pixels.exterior, 1, [0.0, 150.0], axis=0)
     (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(contour=Contour(bulge)))

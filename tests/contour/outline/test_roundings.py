@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from contour.outline.fit import FittedRing, fit_ring
-from contour.walls.wall_evidence import RingEvidence
+from contour.walls.wall_evidence import RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, blob, distances, errors, rectangle, witnesses
 
 
@@ -37,6 +39,42 @@ def test_corners_rounded_by_a_cell_or_two_are_drawn_round(pitches: float, seed: 
     truth = with_round_corners(rectangle(12.0 * PITCH, 9.0 * PITCH), pitches * PITCH)
     found = fitted(witnesses(truth, seed=seed))
     assert errors(found.ring, truth).max() < 0.25 * PITCH
+
+
+def one_round_corner(pitches: float) -> NDArray[np.float64]:
+    """A square of 24 pitches with a quarter circle in its first corner."""
+    low, high, radius = 300.0, 300.0 + 24.0 * PITCH, pitches * PITCH
+    angle = np.linspace(-np.pi, -np.pi / 2, 40)
+    arc = low + radius * (1.0 + np.column_stack([np.cos(angle), np.sin(angle)]))
+    return np.vstack([[[high, low], [high, high], [low, high]], arc])
+
+
+def on_the_arc(evidence: RingEvidence, pitches: float) -> NDArray[np.bool_]:
+    return np.asarray((evidence.points < 300.0 + 0.9 * pitches * PITCH).all(axis=1))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3, 6, 7])  # of which the fit makes a round corner
+def test_an_arc_of_its_own_radius_that_one_end_alone_tells_from_a_corner_is_untold(seed: int) -> None:
+    evidence = witnesses(one_round_corner(1.6), seed=seed, sigma=0.25)
+    round_ = on_the_arc(evidence, 1.6)
+    assert np.count_nonzero(round_) >= 2
+    first = int(np.argmax(round_))
+    outermost = round_ & (np.arange(len(round_)) != first)
+    kind = np.where(outermost, WitnessKind.OUTERMOST, evidence.kind).astype(np.int8)
+    (place,) = fitted(replace(evidence, kind=kind)).untold
+    assert np.hypot(*(place - 300.0)) < 1.6 * PITCH
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("pitches", [3.0, 5.0])
+def test_an_arc_that_several_ends_tell_is_no_corner(pitches: float, seed: int) -> None:
+    assert not len(fitted(witnesses(one_round_corner(pitches), seed=seed, sigma=0.25)).untold)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_small_arcs_that_are_alike_tell_each_other(seed: int) -> None:
+    truth = with_round_corners(rectangle(12.0 * PITCH, 9.0 * PITCH), 1.5 * PITCH)
+    assert not len(fitted(witnesses(truth, seed=seed, sigma=0.25)).untold)
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -13,7 +13,7 @@ from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 _FAR_OFF_PITCHES = 0.5
 # Cells are lost, and leave ends inside; but nothing puts two ends side by side outside of a block: one may be a chip.
-# Chips have no clean ends: of 690 right outlines none leaves one outside by more than an eighth of a cell.
+# A clean end outside is a chip, or a streak that a wall's side makes, only where the outline meets the ends beside it.
 _FAR_OUTSIDE_PITCHES, _CLEAN_OUTSIDE_PITCHES = 1.0 / 3.0, 1.0 / 6.0
 _IN_A_ROW, _IN_A_ROW_OUTSIDE = 4, 2
 
@@ -22,8 +22,8 @@ def check_against_evidence(
     evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
 ) -> None:
     """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side, or leaves
-    two in a row outside by more than a third or a clean one by more than a sixth, or lies more than a third off one of
-    those that it was laid through, `inlier`, shape (N,).
+    two in a row outside by more than a third, or a clean one by more than a sixth beside another one that it passes, or
+    lies more than a third off one of those that it was laid through, `inlier`, shape (N,).
 
     A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
     picture a lens bends a long edge by more than a small cell.
@@ -33,13 +33,14 @@ def check_against_evidence(
     depth = -into_ring if evidence.is_hole else into_ring
     # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
     inside, outside = depth / pitch_px, -depth[ends] / pitch_px
+    passed = ~(np.roll(inlier, 1) & np.roll(inlier, -1))
     # An edge whose own ends lie beyond its corner was cut off there, or drawn past it.
     apart = np.abs(inside) > _FAR_OUTSIDE_PITCHES
     for off, points, most, how_far in (
         (inside > _FAR_OFF_PITCHES, evidence.points, _IN_A_ROW, "half a cell"),
         (outside > _FAR_OFF_PITCHES, evidence.points[ends], _IN_A_ROW, "half a cell"),
         (outside > _FAR_OUTSIDE_PITCHES, evidence.points[ends], _IN_A_ROW_OUTSIDE, "a third of a cell"),
-        (clean & (inside < -_CLEAN_OUTSIDE_PITCHES), evidence.points, 1, "a sixth of a cell"),
+        (clean & passed & (inside < -_CLEAN_OUTSIDE_PITCHES), evidence.points, 1, "a sixth of a cell"),
         (apart & ends & inlier, evidence.points, 1, "a third of a cell"),
     ):
         in_a_row = np.all([np.roll(off, shift) for shift in range(most)], axis=0)

@@ -83,15 +83,22 @@ def test_two_ends_side_by_side_outside_are_material_that_the_outline_leaves_out_
         check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
 
 
-def test_one_clean_end_outside_is_no_chip_but_a_wall_of_the_block() -> None:
+def test_a_clean_end_outside_is_a_chip_or_a_streak_alone_and_a_wall_beside_another_end_that_is_passed() -> None:
     evidence = witnesses(BLOCK, seed=2)
     off = np.arange(len(evidence.points)) == 10
-    for pitches, clean in ((0.1, True), (0.25, False), (-0.8, True)):
+    alone, beside = ~off, ~np.isin(np.arange(len(off)), (10, 11))
+    for pitches, clean, on_line in (
+        (0.6, True, alone),
+        (0.1, True, beside),
+        (0.25, False, beside),
+        (-0.8, True, beside),
+    ):
         moved = evidence.points + np.where(off, pitches * PITCH, 0.0)[:, None] * evidence.normal
-        check_against_evidence(replace(evidence if clean else blunt(evidence), points=moved), BLOCK, ~off, PITCH, None)
+        seen = replace(evidence if clean else blunt(evidence), points=moved)
+        check_against_evidence(seen, BLOCK, on_line, PITCH, None)
     moved = evidence.points + np.where(off, 0.25 * PITCH, 0.0)[:, None] * evidence.normal
     with pytest.raises(NoBlockFound, match="more than a sixth of a cell"):
-        check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
+        check_against_evidence(replace(evidence, points=moved), BLOCK, beside, PITCH, None)
 
 
 @pytest.mark.parametrize("pitches", [-0.4, 0.4])

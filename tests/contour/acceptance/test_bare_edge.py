@@ -134,7 +134,7 @@ def with_faint_rim(walls: int) -> NDArray[np.uint8]:
 SHORT = shapely.box(80, 80, 384, 336)
 
 
-def test_faint_walls_beyond_an_outline_over_more_than_three_cells_are_told_with_their_place() -> None:
+def test_faint_walls_beyond_an_outline_over_more_than_four_cells_are_told_with_their_place() -> None:
     one = beyond(with_faint_rim(110), SHORT)
     assert one is not None
     assert one.length_pitches == pytest.approx(256 / PITCH, abs=3.0)

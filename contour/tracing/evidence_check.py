@@ -23,7 +23,7 @@ def check_against_evidence(
 ) -> None:
     """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side, or leaves
     two in a row outside by more than a third, or a clean one by more than a sixth beside another one that it passes, or
-    lies more than a third off one of those that it was laid through, `inlier`, shape (N,).
+    one of those that it was laid through: `inlier`, shape (N,).
 
     A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
     picture a lens bends a long edge by more than a small cell.
@@ -33,15 +33,16 @@ def check_against_evidence(
     depth = -into_ring if evidence.is_hole else into_ring
     # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
     inside, outside = depth / pitch_px, -depth[ends] / pitch_px
-    passed = ~(np.roll(inlier, 1) & np.roll(inlier, -1))
-    # An edge whose own ends lie beyond its corner was cut off there, or drawn past it.
-    apart = np.abs(inside) > _FAR_OUTSIDE_PITCHES
+    missed, own = ends & ~inlier, ends & inlier
+    passed = np.roll(missed, 1) | np.roll(missed, -1)
     for off, points, most, how_far in (
         (inside > _FAR_OFF_PITCHES, evidence.points, _IN_A_ROW, "half a cell"),
         (outside > _FAR_OFF_PITCHES, evidence.points[ends], _IN_A_ROW, "half a cell"),
         (outside > _FAR_OUTSIDE_PITCHES, evidence.points[ends], _IN_A_ROW_OUTSIDE, "a third of a cell"),
         (clean & passed & (inside < -_CLEAN_OUTSIDE_PITCHES), evidence.points, 1, "a sixth of a cell"),
-        (apart & ends & inlier, evidence.points, 1, "a third of a cell"),
+        # An edge whose own ends lie beyond its corner was cut off there, or drawn past it.
+        (own & (inside > _FAR_OFF_PITCHES), evidence.points, 1, "half a cell"),
+        (own & (inside < -_FAR_OUTSIDE_PITCHES), evidence.points, 1, "a third of a cell"),
     ):
         in_a_row = np.all([np.roll(off, shift) for shift in range(most)], axis=0)
         if in_a_row.any():

@@ -57,7 +57,7 @@ STEPS = {
     "edge checks": (
         "contour.acceptance.trace_check:narrow_feature",
         "contour.acceptance.trace_check:alike_edge",
-        "contour.acceptance.trace_check:bare_edge",
+        "contour.acceptance.trace_check:comb_at_edge",
     ),
     "polygon, verdict": ("service.measuring.measure:cutting_polygon", "service.measuring.measure:judge"),
 }

@@ -10,7 +10,7 @@ import pytest
 
 from service.web.guard import CONTENT_POLICY
 from tests.support.processes.cell import Cell
-from tests.support.processes.page_client import OTHER_TOKEN, TOKEN, Client, Reply
+from tests.support.processes.page_client import OTHER_TOKEN, THIRD_TOKEN, TOKEN, Client, Reply
 from tests.support.processes.processes import until
 
 BODIES: dict[str, dict[str, Any]] = {
@@ -53,7 +53,7 @@ def halted(client: Client) -> Iterator[Client]:
     assert ordered(client, "halt").status == 200
     yield client
     settled(client)
-    assert ordered(client, "resume", take_over="it goes on").status in (200, 409)
+    assert ordered(client, "resume", THIRD_TOKEN, take_over="it goes on").status in (200, 409)
     until(lambda: client.get("/api/v1/state").json["state"] == "Ready", what="Ready")
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sqlite3
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from typing import Any
 
 import pytest
@@ -121,6 +123,17 @@ def test_one_person_at_a_time_and_each_is_in_the_journal(halted: Client) -> None
     notes = halted.get("/api/v1/audit?limit=5", Authorization=f"Bearer {TOKEN}").json["notes"]
     assert [(one["who"], one["action"], one["result"]) for one in notes[:1]] == [("oleg", "commission height", "30 mm")]
     assert notes[0]["detail"] == '{"thickness_mm":30.0}'
+
+
+def test_what_cannot_be_noted_is_not_done(halted: Client, cell: tuple[Cell, Client]) -> None:
+    before = settled(halted)["thickness_mm"]
+    with closing(sqlite3.connect(cell[0].journal, isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        refused = act(halted, "height", thickness_mm=77, take_over="to try")
+        other.execute("ROLLBACK")
+    assert refused.status == 503
+    assert "the journal cannot be written" in refused.json["error"]
+    assert settled(halted)["thickness_mm"] == before
 
 
 @pytest.mark.parametrize(

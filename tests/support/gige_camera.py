@@ -28,7 +28,7 @@ from drivers.camera.genicam.binding import INSTALL, aravis
 from tests.support.real_parts import missing
 
 ROOT = Path(__file__).resolve().parents[2]
-READY_S = 20.0
+READY_S = 120.0
 WIDTH, TRIGGER_SOFTWARE, USER_NAME = 0x100, 0x30C, 0x00E8
 # Value of PixelFormat: GenICam's Pixel Format Naming Convention.
 EXTRA_FORMATS = {

@@ -201,7 +201,8 @@ def pictures_of_the_board(page: Page, bare: BareCell) -> None:
     bare.lies(bare.table())
     press(page, "shoot")
     expect(page.locator('#shots li[data-kind="refused"]')).to_contain_text("no marker of DICT_5X5_250 is seen")
-    page.wait_for_function("[...document.querySelectorAll('#shots img')].every(one => one.naturalWidth > 0)")
+    shown = "[...document.querySelectorAll('#shots img')].every(one => one.naturalWidth > 0)"
+    until(lambda: page.evaluate(shown), what="the pictures")
     page.locator('#shots li[data-kind="refused"] button').click()
     expect(page.locator("#shots li")).to_have_count(1)
     expect(page.locator("#running")).to_have_text("")

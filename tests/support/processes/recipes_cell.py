@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -97,3 +99,15 @@ def started(folder: Path, *names: str) -> RecipesCell:
 
 
 WHO = [f"person{number}" for number in range(12)]
+
+
+@contextmanager
+def served_recipes(folder: Path) -> Iterator[RecipesCell]:
+    """The same, after a job of each picture."""
+    built = started(folder, *WHO)
+    try:
+        ended = built.jobs(PICTURES, WHO[0])
+        assert [job["outcome"] for job in ended] == ["accepted"] * PICTURES
+        yield built
+    finally:
+        built.cell.stop()

@@ -11,34 +11,10 @@ from playwright.sync_api import Browser, Page
 from tests.support.interop.programs import node_modules
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import Client
+from tests.support.processes.page_faults import AXE, FAULTS
 from tests.support.processes.page_states import WIDTHS, play, states, tell
 
 BIG_PX = 56  # of letters, on a screen of 1920 × 1080, that are read from two metres
-# What is wrong with what is drawn now, in words.
-FAULTS = """() => {
-  const wrong = [];
-  if (document.documentElement.scrollWidth > innerWidth) wrong.push(`${document.documentElement.scrollWidth} px wide`);
-  for (const one of document.querySelectorAll("button, select, input, summary, a")) {
-    if (!one.checkVisibility()) continue;
-    const name = one.getAttribute("aria-label") || one.textContent.trim() || one.labels?.[0]?.textContent;
-    if (!name) wrong.push(`no name: ${one.outerHTML}`);
-    const box = one.getBoundingClientRect();
-    const inStrip = one.closest("#strip");
-    if (!inStrip && (box.left < 0 || box.right > innerWidth + 0.5)) wrong.push(`out of sight: ${one.outerHTML}`);
-  }
-  for (const id of ["last-word", "state"]) {
-    const one = document.getElementById(id);
-    if (!one) continue;
-    if (one.scrollWidth > one.clientWidth + 1) wrong.push(`cut off: ${one.textContent}`);
-  }
-  for (const id of ["last-word", "state", "trigger", "halt", "resume"]) {
-    const one = document.getElementById(id);
-    if (!one) continue;
-    const seen = ["halt", "resume"].includes(id) ? !one.hidden : true;
-    if (seen && !one.textContent.trim()) wrong.push(`no words: ${id}`);
-  }
-  return wrong;
-}"""
 CUT = """() => [...document.querySelectorAll("#live-values dd")]
   .filter((one) => one.scrollWidth > one.clientWidth || !one.clientWidth).map((one) => `cut off: ${one.textContent}`)"""
 # A capital letter's height, as the font draws it.
@@ -47,11 +23,6 @@ CAPITALS = """(id) => {
   const context = document.createElement("canvas").getContext("2d");
   context.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
   return context.measureText("H").actualBoundingBoxAscent;
-}"""
-AXE = """async () => {
-  const told = await axe.run(document, { resultTypes: ["violations"] });
-  return told.violations.filter(({ impact }) => ["serious", "critical"].includes(impact))
-    .map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.target).join(" ")}`);
 }"""
 
 

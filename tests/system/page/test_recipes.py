@@ -15,18 +15,13 @@ import pytest
 from service.web.recipes.models import RecipeList, TrialAnswer
 from tests.support.processes.page_client import Client
 from tests.support.processes.processes import until
-from tests.support.processes.recipes_cell import PICTURES, WHO, RecipesCell, started, token
+from tests.support.processes.recipes_cell import WHO, RecipesCell, served_recipes, started, token
 
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RecipesCell]:
-    built = started(tmp_path_factory.mktemp("recipes"), *WHO)
-    try:
-        ended = built.jobs(PICTURES, WHO[0])
-        assert [job["outcome"] for job in ended] == ["accepted"] * PICTURES
+    with served_recipes(tmp_path_factory.mktemp("recipes")) as built:
         yield built
-    finally:
-        built.cell.stop()
 
 
 def test_where_the_outline_changes_both_are_told_apart_in_millimetres(served: RecipesCell) -> None:

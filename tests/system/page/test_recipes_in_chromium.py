@@ -9,20 +9,16 @@ import pytest
 from playwright.sync_api import Browser, Page, Route, expect, sync_playwright
 
 from tests.support.interop.programs import node_modules
+from tests.support.processes.page_faults import AXE, FAULTS
 from tests.support.processes.page_panel import EXPECTED_NOISE, chromium, clean_page
 from tests.support.processes.page_states import WIDTHS
-from tests.support.processes.recipes_cell import BETWEEN, PICTURES, WHO, RecipesCell, started, token
+from tests.support.processes.recipes_cell import BETWEEN, PICTURES, RecipesCell, served_recipes, token
 
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RecipesCell]:
-    built = started(tmp_path_factory.mktemp("recipes"), *WHO)
-    try:
-        ended = built.jobs(PICTURES, WHO[0])
-        assert [job["outcome"] for job in ended] == ["accepted"] * PICTURES
+    with served_recipes(tmp_path_factory.mktemp("recipes")) as built:
         yield built
-    finally:
-        built.cell.stop()
 
 
 @pytest.fixture(scope="module")
@@ -141,22 +137,8 @@ def test_the_form_has_a_control_of_its_kind_for_each_key_and_sends_what_differs(
     assert sent == [{"changes": expected, "jobs": 20}]
 
 
-FAULTS = """() => {
-  const wrong = [];
-  if (document.documentElement.scrollWidth > innerWidth) wrong.push(`${document.documentElement.scrollWidth} px wide`);
-  for (const one of document.querySelectorAll("button, select, input, a")) {
-    if (!one.checkVisibility()) continue;
-    const name = one.getAttribute("aria-label") || one.textContent.trim() || one.labels?.[0]?.textContent;
-    if (!name) wrong.push(`no name: ${one.outerHTML}`);
-    if (one.offsetHeight < 24) wrong.push(`too small: ${one.outerHTML}`);
-  }
-  return wrong;
-}"""
-AXE = """async () => {
-  const told = await axe.run(document, { resultTypes: ["violations"] });
-  return told.violations.filter(({ impact }) => ["serious", "critical"].includes(impact))
-    .map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.target).join(" ")}`);
-}"""
+TOO_SMALL = """() => [...document.querySelectorAll("button, select, input, a")]
+  .filter((one) => one.checkVisibility() && one.offsetHeight < 24).map((one) => `too small: ${one.outerHTML}`)"""
 
 
 @pytest.mark.parametrize("language", ["en", "ru"])
@@ -177,7 +159,7 @@ def test_the_page_is_whole_and_axe_core_finds_nothing_serious(
     wrong = {}
     for width, height in WIDTHS.items():
         page.set_viewport_size({"width": width, "height": height})
-        if faults := page.evaluate(FAULTS) + page.evaluate(AXE):
+        if faults := page.evaluate(FAULTS) + page.evaluate(TOO_SMALL) + page.evaluate(AXE):
             wrong[width] = faults
     context.close()
     assert wrong == {}

@@ -151,3 +151,19 @@ def mark_boxes(dictionary: str, number: int, lower_left_mm: Float64s, side_mm: f
         runs += [(first, count - row - 1, last, count - row) for first, last in edges.reshape(-1, 2)]
     x, y = lower_left_mm
     return np.asarray(np.array(runs, dtype=np.float64) * (side_mm / count) + np.array([x, y, x, y]))
+
+
+def described_board(
+    kind: Kind,
+    squares: tuple[int, int],
+    square_mm: float,
+    marker_mm: float | None = None,
+    dictionary: str | None = None,
+) -> Board:
+    """The board that somebody describes, `squares` across and up; what they leave out (None) of a ChArUco board's
+    markers is usual. Raise ParameterError.
+    """
+    if kind == "charuco":
+        dictionary = DEFAULT_DICTIONARY if dictionary is None else dictionary
+        marker_mm = round(DEFAULT_MARKER_SHARE * square_mm, 3) if marker_mm is None else marker_mm
+    return Board(kind, *squares, square_mm, marker_mm or 0.0, dictionary or "")

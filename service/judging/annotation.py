@@ -26,11 +26,11 @@ from drivers.camera.files.decode import read_picture
 from drivers.camera.files.folder import shown
 from service.judging.truth_file import Truth, TruthFileError, parsed_truth, read_object, save_truth, truth_path
 from service.measuring.measurement import Measurement
-from service.web.api import Endpoint, problem, with_problems
+from service.web.api import problem, with_problems
 from service.web.commands import RequestRefused
 from service.web.guard import Guard
 from service.web.html import TYPES
-from service.web.requests import body
+from service.web.requests import Endpoint, body
 
 LARGEST_BODY = 1_000_000
 MOST_VERTICES = 20_000

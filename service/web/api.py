@@ -6,7 +6,6 @@ import asyncio
 import json
 import logging
 import math
-from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
@@ -35,9 +34,7 @@ from service.web.looks.live_looks import LiveLooks
 from service.web.openapi import PREFIX, document
 from service.web.operations_table import MOST_JOBS, MOST_NOTES, OPERATIONS
 from service.web.recipes.endpoints import RecipeEndpoints
-from service.web.requests import address_of, body, holder_of, job_number, truth, whole_number
-
-Endpoint = Callable[[Request], Awaitable[Response]]
+from service.web.requests import Endpoint, address_of, body, holder_of, job_number, truth, whole_number
 
 log = logging.getLogger("combtrace.page")
 
@@ -54,7 +51,7 @@ class Api:
         self.live = Live(daemon)
         self._looks = LiveLooks(daemon.sources.looks)
         self._recipes = RecipeEndpoints(daemon, commands)
-        self._commission = CommissionEndpoints(daemon, commands)
+        self._commission = CommissionEndpoints(daemon, commands, self._pictures)
         if daemon.sources.archive is not None:
             daemon.sources.archive.on_stored = self._stored
         self._document = json.dumps(document(OPERATIONS, version), ensure_ascii=False).encode()

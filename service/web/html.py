@@ -9,7 +9,6 @@ import hashlib
 import html
 import json
 import re
-from collections.abc import Awaitable, Callable
 from importlib.resources import files
 from typing import Any, Literal
 
@@ -20,6 +19,7 @@ from starlette.routing import Route
 from service.details import russian
 from service.reasons import Language, Reason
 from service.web.daemon_access import DaemonAccess, DaemonSilent
+from service.web.requests import Endpoint
 
 TYPES = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml", "json": "application/json"}
 OWN = ("commission", "recipes")  # pages beside the operator's, each with its words in a file of its name
@@ -49,7 +49,10 @@ class Pages:
         self._files = {one.name: one.read_bytes() for one in folder.iterdir() if not one.name.endswith(".html")}
         self._tags = {name: f'"{hashlib.sha256(data).hexdigest()[:16]}"' for name, data in self._files.items()}
         self._texts: dict[str, dict[str, str]] = json.loads(self._files["texts.json"])
-        shared = {"symbols": self._files["symbols.svg"].decode(), "dialogs": _template("dialogs")}
+        shared = {
+            **{name: _template(name) for name in ("head", "dialogs")},
+            "symbols": self._files["symbols.svg"].decode(),
+        }
         self._templates: dict[tuple[str, str], str] = {}
         for name in ("page", *OWN):
             own: dict[str, dict[str, str]] = json.loads(self._files[f"{name}.json"]) if name in OWN else {}
@@ -86,7 +89,7 @@ class Pages:
         kiosk = ' data-view="kiosk"' if "kiosk" in request.query_params else ""
         return self._answer("page", language, theme, view=kiosk, **self._banner(state, language))
 
-    def _own(self, name: str) -> Callable[[Request], Awaitable[Response]]:
+    def _own(self, name: str) -> Endpoint:
         """A page that asks for all it shows itself."""
 
         async def answer(request: Request) -> Response:

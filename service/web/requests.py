@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 from starlette.requests import Request
+from starlette.responses import Response
 
 from service.link.job_numbers import LARGEST_JOB
 from service.web.commands import Commands, RequestRefused
 from service.web.guard import plain_address
+
+Endpoint = Callable[[Request], Awaitable[Response]]
 
 M = TypeVar("M", bound=BaseModel)
 

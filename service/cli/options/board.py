@@ -22,15 +22,11 @@ def add_board_arguments(parser: argparse._ArgumentGroup | argparse.ArgumentParse
 
 def board_of(args: argparse.Namespace) -> Board:
     """The board that the arguments describe; raise UserError."""
-    from contour.camera_calibration.board import DEFAULT_DICTIONARY, DEFAULT_MARKER_SHARE, Board
+    from contour.camera_calibration.board import described_board
     from contour.errors import ParameterError
 
-    marker_mm, dictionary = args.marker_mm, args.dictionary
-    if args.board == "charuco":
-        dictionary = DEFAULT_DICTIONARY if dictionary is None else dictionary
-        marker_mm = round(DEFAULT_MARKER_SHARE * args.square_mm, 3) if marker_mm is None else marker_mm
     try:
-        return Board(args.board, args.squares[0], args.squares[1], args.square_mm, marker_mm or 0.0, dictionary or "")
+        return described_board(args.board, args.squares, args.square_mm, args.marker_mm, args.dictionary)
     except ParameterError as error:
         raise UserError(str(error)) from error
 

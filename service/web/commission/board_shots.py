@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from contour.camera_calibration.board import DEFAULT_DICTIONARY, DEFAULT_MARKER_SHARE, Board
+from contour.camera_calibration.board import Board, described_board
 from contour.camera_calibration.board_detection import BoardView, find_board
 from contour.camera_calibration.coverage_zones import COLUMNS, ROWS, covered_zones
 from contour.camera_calibration.view_selection import ViewsSoFar, judge_so_far
@@ -97,11 +97,9 @@ class BoardShots:
 
 def board_of(asked: BoardRequest) -> Board:
     """The board that was told; raise StepRefused."""
-    is_charuco = asked.kind == "charuco"
-    marker_mm = (asked.marker_mm or round(DEFAULT_MARKER_SHARE * asked.square_mm, 3)) if is_charuco else 0.0
-    dictionary = DEFAULT_DICTIONARY if is_charuco else ""
+    marker_mm = asked.marker_mm or None if asked.kind == "charuco" else None
     try:
-        return Board(asked.kind, asked.squares_x, asked.squares_y, asked.square_mm, marker_mm, dictionary)
+        return described_board(asked.kind, (asked.squares_x, asked.squares_y), asked.square_mm, marker_mm)
     except ParameterError as error:
         raise StepRefused(str(error)) from error
 

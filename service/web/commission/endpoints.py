@@ -6,7 +6,6 @@ import asyncio
 import base64
 import hashlib
 import logging
-from collections.abc import Awaitable, Callable
 from functools import partial
 
 from starlette.requests import Request
@@ -23,7 +22,7 @@ from service.web.commission.session import StepRefused
 from service.web.daemon_access import DaemonAccess
 from service.web.evidence_files import NoPicture, Pictures, tag_of
 from service.web.openapi import Operation, Parameter
-from service.web.requests import address_of, body, whole
+from service.web.requests import Endpoint, address_of, body, holder_of, whole
 
 log = logging.getLogger("combtrace.page")
 
@@ -35,8 +34,6 @@ REPORT_POLICY = (
     "frame-ancestors 'none'"
 )
 """A report is one file, with its style and pictures in it: these and nothing else may apply."""
-
-Endpoint = Callable[[Request], Awaitable[Response]]
 
 _NOT_NOW = {
     401: "No token, or a wrong one; a PIN is not enough.",
@@ -92,19 +89,18 @@ BEGIN = Action("board", models.ActionRequest, False, _nothing)
 class CommissionEndpoints:
     """The endpoints."""
 
-    def __init__(self, daemon: DaemonAccess, commands: Commands) -> None:
+    def __init__(self, daemon: DaemonAccess, commands: Commands, pictures: Pictures) -> None:
         self._daemon = daemon
         self._commands = commands
         self._bench = Bench(daemon)
         self._actions = actions(self._bench)
-        self._pictures = Pictures()
+        self._pictures = pictures
         self._running: str | None = None
         self._task: asyncio.Task[None] | None = None
 
     def close(self) -> None:
         """Let go of threads; an action ends at its next step."""
         self._bench.close()
-        self._pictures.close()
 
     def gets(self) -> dict[str, Endpoint]:
         """What is looked at, by path."""
@@ -151,7 +147,7 @@ class CommissionEndpoints:
     async def act(self, name: str, action: Action, request: Request) -> Response:
         """Begin an action; what becomes of it is asked for."""
         address = address_of(request)
-        who = await self._commands.holder(request.headers.get("authorization"), address, by_pin=False)
+        who = await holder_of(request, self._commands, by_pin=False)
         asked = await body(request, action.asked)
         self._check_free(action)
         self._running = name

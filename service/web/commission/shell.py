@@ -26,15 +26,15 @@ class Shell:
     def commands(self) -> dict[str, str]:
         """By step."""
         folder, height_mm = self._session.folder, self._session.notes.thickness_mm
-        at_height = f" --thickness-mm {height_mm:g}" if height_mm else ""
+        at_height, calibrate = f" --thickness-mm {height_mm:g}" if height_mm else "", self._calibrate()
         told = {
             "camera": f"focus {self._at}",
             "board": f"grab {self._at} --output {folder}/view-001.png",
-            "calibration": self._calibrate(),
+            "calibration": calibrate,
             "height": f"trigger {self._at}{at_height}",
             "alignment": f"align --points {self._session.points_file} --calibration {self._calibration_file}",
             "table": f"teach-table {self._at}",
-            "marks": f"{self._calibrate()} --sentinels DICT_4X4_50",
+            "marks": f"{calibrate} --sentinels DICT_4X4_50",
             "controller": f"probe {self._at} --write",
             "job": f"trigger {self._at}{at_height}",
         }

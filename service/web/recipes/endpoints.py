@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable
 
 from pydantic import BaseModel
 from starlette.requests import Request
@@ -22,12 +21,10 @@ from service.web.daemon_access import DaemonAccess
 from service.web.recipes import models
 from service.web.recipes.listing import listed
 from service.web.recipes.trials import Asked, Trials, key_changes, last_jobs
-from service.web.requests import address_of, body, holder_of, whole
+from service.web.requests import Endpoint, address_of, body, holder_of, whole
 
 LARGEST_RECIPE = 65_535
 NONE_ADOPTED = "nothing is adopted"
-
-Endpoint = Callable[[Request], Awaitable[Response]]
 
 
 class RecipeEndpoints:

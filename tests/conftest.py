@@ -6,6 +6,7 @@ Of the hundreds of processes that tests start, this one too, each may leave its 
 thread for numpy's algebra: its others wait busily while it starts. Most are forked from one.
 
 Tests that mostly wait for processes come first: while they wait others compute, and nobody waits alone at the end.
+Files that use the GigE camera, of which loopback has room for one, lie far apart: else one worker waits for another.
 
 Every test fails that leaves a descriptor or a thread open, or a task in its event loop.
 """
@@ -22,7 +23,14 @@ from tests.support.processes import forked
 
 __all__ = ["no_task_is_left", "nothing_is_left", "pytest_collection_modifyitems"]
 
-WAITING = ("tests/soak/", "tests/system/", "tests/hil/", "tests/controllers/")
+FIRST = (
+    "tests/contracts/test_camera_contract.py",
+    "tests/system/",
+    "tests/hil/",
+    "tests/soak/",
+    "tests/controllers/",
+    "tests/drivers/camera/genicam/",
+)
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
@@ -43,4 +51,6 @@ settings.load_profile("same")
 
 @pytest.hookimpl(specname="pytest_collection_modifyitems")
 def pytest_begin_with_those_that_wait(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: not item.nodeid.startswith(WAITING))
+    items.sort(
+        key=lambda item: next((place for place, one in enumerate(FIRST) if item.nodeid.startswith(one)), len(FIRST))
+    )

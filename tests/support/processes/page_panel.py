@@ -23,6 +23,7 @@ PANEL = {"width": 1280, "height": 800}
 FRAME = "#view image:not([visibility])"  # not the one that is still to come
 EXPECTED_NOISE = (  # of requests that a test has refused, held or broken off
     "ERR_CONNECTION_REFUSED",
+    "ERR_CONNECTION_RESET",
     "ERR_FAILED",
     "ERR_INCOMPLETE_CHUNKED_ENCODING",
     "401",

@@ -30,7 +30,7 @@ from contour.synthetic import Rendered, render, render_empty_table
 from service.config.recipes import Recipe
 from service.measuring.measure import Measurer
 from service.measuring.table_file import TableRecord
-from tests.support.scenes.shop_floor_scenes import GUARDS, KINDS, ShopFloorScene, shop_floor_scene
+from tests.support.scenes.shop_floor_scenes import GUARDS, KINDS, LATER, ShopFloorScene, shop_floor_scene
 from tests.support.scenes.trials import calibration_for
 
 FIRST = 500_000
@@ -223,9 +223,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--list", action="store_true", help="a line for each picture as well")
     parser.add_argument("--save", type=Path, metavar="DIR", help="overlays of wrong outlines go here")
     options = parser.parse_args(arguments)
-    usual = STRUCTURED if options.taught else tuple(KINDS)
+    usual = STRUCTURED if options.taught else (*KINDS, *LATER)
     kinds = options.kinds.split(",") if options.kinds else usual
-    known = KINDS | GUARDS
+    known = KINDS | LATER | GUARDS
     unknown = [kind for kind in kinds if kind not in known]
     if unknown:
         parser.error(f"unknown kinds {', '.join(unknown)}; expected some of {', '.join(known)}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.acceptance.findings import Finding, Limits, Refusal, around, closed, runs_where
+from contour.acceptance.findings import SHOWN_PITCHES, Finding, Limits, Refusal, around, closed, runs_where
 from contour.acceptance.quality import QualityLimits, lost_in_noise
 from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.rings import Ring, area
@@ -21,8 +21,6 @@ _SURE_WITHIN_PITCHES = 0.25
 _SURE_WITHIN_SHARE = 0.01
 # Of two blocks whose areas differ by less than this the larger one is a matter of chance.
 _EQUAL_SHARE = 0.8
-# How large a circle shows a place.
-_SHOWN_PITCHES = 2.0
 # Narrower than so many cells a piece is a strip that was cut off, however long: no block is.
 _STRIP_PITCHES = 4.5
 
@@ -132,7 +130,7 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
     """Contour and busy picture farther apart than `limit` pitches, or an edge that is none of a block."""
     if traced is None or traced.disagreement is None or limit is None:
         return None
-    shown_px = _SHOWN_PITCHES * (traced.trace.pitch_px or 0.0)
+    shown_px = SHOWN_PITCHES * (traced.trace.pitch_px or 0.0)
     at_edge = _odd_edge(traced, shown_px)
     if at_edge is not None:
         return at_edge
@@ -200,7 +198,7 @@ def vague(traced: Trace | None) -> Finding | None:
             Refusal.UNCERTAINTY_TOO_LARGE,
             f"Near ({x:.0f}, {y:.0f}) px the contour is round, yet at most one wall end tells it from a corner half a "
             "cell off. Look at the overlay; take away what lies against the block, and check light and focus.",
-            (around(x, y, _SHOWN_PITCHES * traced.pitch_px),),
+            (around(x, y, SHOWN_PITCHES * traced.pitch_px),),
         )
     cells = traced.uncertainty_px / traced.pitch_px
     # The edge of material is seen without its cells: there a share of the block tells as well what is gross.

@@ -8,8 +8,9 @@ from itertools import groupby
 
 import numpy as np
 
-from contour.acceptance.findings import Finding, Limits, Refusal
+from contour.acceptance.findings import SHOWN_PITCHES, Finding, Limits, Refusal, around
 from contour.acceptance.sent_evidence import ToMillimetres
+from contour.acceptance.trace_check import CheckedTrace
 from contour.edge.stretches import Stretch
 from contour.geometry.ring_lengths import RingLengths
 from contour.tracing.trace import Trace
@@ -82,6 +83,23 @@ def edge_covered(traced: Trace | None, to_mm: ToMillimetres | None, limits: Limi
     what, advice = _HIDERS[worst.by]
     more = f", and {len(runs) - 1} more" if runs[1:] else ""
     return Finding(Refusal.EDGE_COVERED, f"{what} over {worst}{more}: {worst.objection(limits)}. {advice}")
+
+
+def border_goes_on(traced: CheckedTrace | None, to_mm: ToMillimetres | None) -> Finding | None:
+    """An edge of the outline that goes on past its corner as a border on the table."""
+    if traced is None or traced.runs_on is None:
+        return None
+    x, y = traced.runs_on.place_px
+    place = f"({x:.0f}, {y:.0f}) px"
+    if to_mm is not None:
+        x_mm, y_mm = to_mm(np.array([[x, y]]))[0]
+        place = f"{place}, ({x_mm:.1f}, {y_mm:.1f}) mm"
+    return Finding(
+        Refusal.EDGE_COVERED,
+        f"An edge of the contour goes on past its corner near {place} as a border on the table: walls may end there "
+        "because something lies over them. Take it away, or turn the block off lines on the table.",
+        (around(x, y, SHOWN_PITCHES * (traced.trace.pitch_px or 0.0)),),
+    )
 
 
 def _hidden_runs(traced: Trace, evidence: Sequence[Stretch], to_mm: ToMillimetres | None) -> list[_Run]:

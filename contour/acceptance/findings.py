@@ -13,6 +13,9 @@ from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.rings import Ring
 
+SHOWN_PITCHES = 2.0
+"""How large a circle shows a place, cell pitches."""
+
 
 class Refusal(IntEnum):
     """Why a contour is refused; names and codes are the protocol's reject reasons."""

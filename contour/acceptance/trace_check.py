@@ -11,6 +11,7 @@ from contour.acceptance.disagreement import Disagreement, disagreement
 from contour.acceptance.edge_contrast import alike_edge
 from contour.acceptance.narrow_features import NarrowFeature, narrow_feature
 from contour.acceptance.quality import Quality, block_quality
+from contour.edge.border_beyond import border_beyond
 from contour.edge.edge_parts import EdgePart
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
@@ -29,7 +30,8 @@ class CheckedTrace:
     `quality` says how well its walls are seen. `disagreement` is the widest one with the busy part of the picture, None
     without a pitch. `narrow`: its deepest bump or dent that is no wider than a chip. `alike`: the longest part of its
     edge along which the table is as light as the walls. `bare`: the longest part of its edge without cells behind it;
-    `beyond`: the longest with comb beyond it.
+    `beyond`: the longest with comb beyond it. `runs_on`: a border on the table with which one of its edges goes on past
+    its corner.
     """
 
     trace: Trace
@@ -39,11 +41,12 @@ class CheckedTrace:
     alike: EdgePart | None = None
     bare: EdgePart | None = None
     beyond: EdgePart | None = None
+    runs_on: EdgePart | None = None
 
     def moved(self, first: Float64s) -> CheckedTrace:
         """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
-        said = {name: getattr(self, name) for name in ("disagreement", "narrow", "alike", "bare", "beyond")}
+        said = {name: getattr(self, name) for name in ("disagreement", "narrow", "alike", "bare", "beyond", "runs_on")}
         moved = {name: one.moved(x, y) for name, one in said.items() if one is not None}
         return replace(self, trace=self.trace.moved(first), **moved)
 
@@ -71,14 +74,15 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
 
 def _checked_edge(
     picture: Bytes, traced: Trace, pitch_px: float
-) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None, EdgePart | None]:
-    """What is narrow, alike, bare and overrun of an edge, and only where it was cut: closed cells are serrated."""
+) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None, EdgePart | None, EdgePart | None]:
+    """What is narrow, alike, bare, overrun and runs on of an edge, only where it was cut: closed cells are serrated."""
     if traced.evidence is None:
-        return None, None, None, None
+        return None, None, None, None, None
     return (
         narrow_feature(traced.contour, pitch_px),
         alike_edge(picture, traced.contour, pitch_px, dark=traced.polarity == "dark"),
         *comb_at_edge(traced, pitch_px),
+        border_beyond(traced.light, traced.contour, pitch_px),
     )
 
 

@@ -31,7 +31,7 @@ from contour.synthetic import (
     signed_distance,
     thick_line,
 )
-from tests.support.scenes.shop_floor_scenes import KINDS, shop_floor_scene
+from tests.support.scenes.shop_floor_scenes import KINDS, LATER, shop_floor_scene
 
 CAMERA = camera_above(320, 240, 1.0, distance_mm=900.0, plane_mm=0.0)
 OUTLINE = rectangle((160.0, 120.0), 180.0, 120.0)
@@ -48,7 +48,7 @@ PLAIN = Scene(
     light=Light(shadow=0.0),
     sensor=Sensor(blur_px=0.0, shot_noise=0.0, read_noise=0.0),
 )
-HIDING = {"tape", "clamp", "hand_or_cable"}
+HIDING = {"tape", "sheet", "clamp", "hand_or_cable"}
 
 
 def with_things(*things, scene=PLAIN):
@@ -83,7 +83,7 @@ def undisturbed():
     return render(small("undisturbed", 5))
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "undisturbed"])
+@pytest.mark.parametrize("kind", [kind for kind in (*KINDS, *LATER) if kind != "undisturbed"])
 def test_every_kind_changes_the_picture_and_hides_the_edge_or_not(undisturbed, kind):
     plain, done = undisturbed, render(small(kind, 5))
     before, after = (p if p.ndim == 2 else p.mean(axis=2) for p in (plain.picture, done.picture))

@@ -50,6 +50,9 @@ GUARDS: dict[str, light.Drawn] = {
 }
 """Tables that nothing is tuned on: they tell whether what was learnt on others holds. Never a second kind."""
 
+LATER: dict[str, light.Drawn] = {"sheet": covers.sheet}
+"""Kinds that were thought of later: never a second kind, so that all other scenes stay what they were."""
+
 _LIGHT = {"gamma", "blown_out", "dim", "coloured", "light_table", "wood", "brushed", "slots", "old_cuts", *GUARDS}
 """Kinds that change in what light and on what table other things are seen: they come first, for levels to be drawn."""
 
@@ -73,7 +76,7 @@ def shop_floor_scene(kind: str, seed: int, *, alone: bool = False) -> ShopFloorS
     kinds = [kind]
     if not alone and kind != "undisturbed" and rng.random() < 0.25:
         kinds.append(str(rng.choice([name for name in KINDS if name not in _alike(kind)])))
-    scene, drawn = shop_floor_block(seed), KINDS | GUARDS
+    scene, drawn = shop_floor_block(seed), KINDS | LATER | GUARDS
     for name in sorted(kinds, key=lambda name: name not in _LIGHT):
         scene = drawn[name](rng, scene)
     return ShopFloorScene(scene, tuple(kinds))

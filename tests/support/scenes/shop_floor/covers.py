@@ -1,4 +1,4 @@
-"""What hides the edge: tape, clamps, cables, hands."""
+"""What hides the edge: tape, sheets, clamps, cables, hands."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from contour.synthetic import (
     rectangle,
     thick_line,
 )
-from tests.support.scenes.shop_floor.places import a_colour, a_level, a_place, extent, with_things
+from tests.support.scenes.shop_floor.places import a_colour, a_level, a_level_like, a_place, extent, with_things
 
 
 def tape(rng: np.random.Generator, scene: Scene) -> Scene:
@@ -42,6 +42,19 @@ def tape(rng: np.random.Generator, scene: Scene) -> Scene:
             bar = rectangle((0.0, row * wide), float(rng.uniform(0.3, 0.85)) * (deep + beyond), 0.07 * wide)
             printed.append(Cover(moved(moved(bar, (0.0, 0.0), turn), centre), ink, texture=0.0))
     return with_things(scene, tape, *printed)
+
+
+def sheet(rng: np.random.Generator, scene: Scene) -> Scene:
+    """Paper, film or long tape over the edge, mostly wider than the block is there; some hardly told from the table."""
+    pitch, place = scene.cells.pitch_mm, a_place(rng, scene)
+    deep, wide = float(rng.uniform(1.0, 6.0)) * pitch, float(rng.uniform(8.0, 60.0)) * pitch
+    beyond = float(rng.uniform(2.0, 15.0)) * pitch
+    centre = place.point(float(rng.uniform(-0.4, 0.4)) * wide, 0.5 * (beyond - deep))
+    faint = rng.random() < 0.5
+    level = a_level_like(rng, scene) if faint else a_level(rng, scene)
+    area = rectangle(centre, deep + beyond, wide, place.out_deg + float(rng.normal(0.0, 15.0)))
+    texture = float(rng.uniform(0.0, 0.06))
+    return with_things(scene, Cover(area, level, a_colour(rng, 0.02 if faint else 0.2), texture=texture))
 
 
 def clamp(rng: np.random.Generator, scene: Scene) -> Scene:

@@ -1,4 +1,4 @@
-"""Places, levels and colours for what lies about. No thing looks just like the table under it."""
+"""Places, levels and colours for what lies about. No thing looks just like the table under it, but what is asked to."""
 
 from __future__ import annotations
 
@@ -60,6 +60,14 @@ def a_level(rng: np.random.Generator, scene: Scene, low: float = 0.02, high: flo
         if not below - NEAR < seen < above + NEAR:
             return level
     return _level_of(scene, near[-1])
+
+
+def a_level_like(rng: np.random.Generator, scene: Scene) -> float:
+    """A level whose grey is a third of `NEAR` to all of it away from the table's, in the scene's light."""
+    grey = 255.0 * min(1.0, scene.light.level * scene.table.level) ** scene.sensor.gamma
+    off = NEAR * float(rng.uniform(1.0 / 3.0, 1.0))
+    lighter = rng.random() < 0.5 or grey < off + 3.0
+    return _level_of(scene, grey + off if lighter and grey + off < 250.0 else grey - off)
 
 
 def _level_of(scene: Scene, grey: float) -> float:

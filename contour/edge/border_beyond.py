@@ -1,0 +1,179 @@
+"""Borders of light on the table that go on where an edge of the outline ends.
+
+Walls end at the border of a tape or a sheet that lies over a block as they do at its cut edge. What is as light as the
+table, or takes a whole edge away, is told from it by nothing else: but its border mostly is longer than the block is
+wide there, and runs on past the corner that the outline makes. A table has no reason to change just there, along just
+that line. A block's own shadow has where light comes along an edge: then it is what lies on the other side that is
+darker than beside most of the block.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.edge.edge_parts import EdgePart, light_beside
+from contour.geometry.arrays import Bools, Bytes, Complexes, Float64s, Indices, median, rolled
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import Contour, Ring, signed_area
+from contour.geometry.signed_distance import depth_inside
+from contour.image.pixel_sampling import sample_at
+
+# Places along a ring, pitches apart; a corner is where it turns by more between its chords before and behind, degrees,
+# so many places long and away from it, and most among its neighbours.
+_SPACING, _CHORD, _SKIP, _CORNER_DEG, _NEIGHBOURS = 0.1, 20, 2, 25.0, 8
+# Pitches beyond the corner at which a ray begins, where the block's next edge is so far out of the way; its parts.
+_NEAREST, _FREE, _PARTS, _OF_PART = 0.6, 0.75, 5, 5
+# Pitches across the ray, and how far from each place its two sides are; so near to the ray a border is the edge's own,
+# so far from it another one; by how much it may turn from the edge.
+_ACROSS, _SIDES, _OWN, _ANOTHER = 0.05 * np.arange(-38, 39), (2, 8), 0.3, 0.7
+_TURNS = np.tan(np.radians(np.arange(-8.0, 9.0, 2.0)))
+# The block is no nearer than that, pitches, looked at every so many places.
+_CLEAR, _EVERY = 0.35, 4
+# A step of light in the weakest part of a border: times the largest of others, times the noise, and grey levels.
+_OVER_OTHERS, _OVER_NOISE, _LEAST = 2.0, 2.5, 1.5
+# Light on beside the border is that along the edge, within a share of the step; where it is looked at, pitches.
+_SAME, _BESIDE, _ALONG = 0.3, np.array([0.4, 0.5, 0.6]), np.arange(-3.0, -0.4, 0.1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Edges of a ring, going on past its corners: the corner and the ray's origin, unit vectors along it and out of
+    the material across it, (R, 2) each, and the length from which on it is free, (R,). All in pixels.
+    """
+
+    corner: Float64s
+    origin: Float64s
+    along: Float64s
+    across: Float64s
+    begin: Float64s
+
+    def at(self, ahead: Float64s, out: Float64s) -> Float64s:
+        """Places so far along the rays and out across them, (R, ...) both, shape (R, ..., 2)."""
+        shape = (len(self.begin), *[1] * (ahead.ndim - 1), 2)
+        parts = ahead[..., None] * self.along.reshape(shape) + out[..., None] * self.across.reshape(shape)
+        return np.asarray(self.origin.reshape(shape) + parts)
+
+
+def border_beyond(light: Bytes, contour: Contour, pitch_px: float) -> EdgePart | None:
+    """The clearest border in `light`, (H, W), that goes on from an edge of the contour past its corner: the length
+    looked at, and the corner. None where there is none.
+
+    The contour's holes run the other way around than its exterior.
+    """
+    side = float(np.sign(signed_area(contour.exterior)))
+    found = [one for ring in contour.rings for one in _borders(light, ring, side, pitch_px)]
+    if not found:
+        return None
+    return EdgePart(_SPACING * _PARTS * _OF_PART, max(found)[1])
+
+
+def _borders(light: Bytes, ring: Ring, side: float, pitch_px: float) -> list[tuple[float, tuple[float, float]]]:
+    """How far borders past corners of a ring stand out of the noise, and the corners."""
+    rays = _rays(ring, side, pitch_px)
+    if not len(rays.begin):
+        return []
+    part = _SPACING * pitch_px * np.arange(_PARTS * _OF_PART)
+    ahead, out = rays.begin[:, None] + part, _ACROSS * pitch_px
+    shape = (len(rays.begin), len(out), len(part))
+    places = rays.at(np.broadcast_to(ahead[:, None], shape), np.broadcast_to(out[:, None], shape))
+    parts = sample_at(light, places[..., 0], places[..., 1]).reshape(*shape[:2], _PARTS, _OF_PART).mean(axis=3)
+    middle = ahead.reshape(len(ahead), _PARTS, _OF_PART).mean(axis=2)
+    hole = float(np.sign(signed_area(ring))) != side
+    clear = _clear(rays, ring, middle, pitch_px, inside=hole)
+    step, at, turn, other = _clearest(parts, clear, middle / pitch_px)
+    noise = np.abs(np.diff(parts, axis=1)).mean(axis=(1, 2))
+    over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
+    line = at[:, None] * pitch_px + turn[:, None] * ahead
+    outer, inner = (_mean_light(light, rays, ahead, line, sign * pitch_px) for sign in (1.0, -1.0))
+    edge = np.broadcast_to(_ALONG * pitch_px, (len(rays.begin), len(_ALONG)))
+    own = _mean_light(light, rays, edge, np.zeros_like(edge), pitch_px)
+    usual = _usual_light(light, ring, side * pitch_px)
+    shadow = (inner < outer) & (np.abs(inner - usual) > np.abs(outer - usual))
+    chosen = (over > 1.0) & (np.abs(outer - own) < _SAME * np.abs(outer - inner)) & ~shadow
+    corners = rays.corner.tolist()
+    return [(float(over[k]), (corners[k][0], corners[k][1])) for k in np.flatnonzero(chosen).tolist()]
+
+
+def _usual_light(light: Bytes, ring: Ring, out_px: float) -> float:
+    """Median light beside a ring; out_px: the pitch, negative where material lies to the right of its direction."""
+    lengths = RingLengths.of(ring)
+    at = np.arange(0.0, lengths.length, abs(out_px))
+    return median(light_beside(light, lengths.at(at), out_px * lengths.normals(at, abs(out_px)), _BESIDE))
+
+
+def _rays(ring: Ring, side: float, pitch_px: float) -> _Rays:
+    """Both edges of each corner of a ring. side: 1.0 where the contour's exterior has a positive area, or -1.0."""
+    lengths = RingLengths.of(ring)
+    points = lengths.at(np.arange(0.0, lengths.length, _SPACING * pitch_px))
+    count = len(points)
+    if count < 3 * _CHORD:
+        empty = np.empty((0, 2))
+        return _Rays(empty, empty, empty, empty, np.empty(0))
+    place: Complexes = points[:, 0] + 1j * points[:, 1]
+    before = rolled(place, _SKIP) - rolled(place, _SKIP + _CHORD)
+    behind = rolled(place, -_SKIP - _CHORD) - rolled(place, -_SKIP)
+    turn = np.abs(np.angle(behind * before.conj()))
+    most = np.max([rolled(turn, k) for k in range(-_NEIGHBOURS, _NEIGHBOURS + 1)], axis=0)
+    corners = np.flatnonzero((turn == most) & (turn > np.radians(_CORNER_DEG)))
+    index: Indices = np.concatenate([corners, corners])
+    way = np.repeat([1, -1], len(corners))
+    heading: Complexes = np.where(way > 0, before[index], -behind[index])
+    heading = heading / np.maximum(np.abs(heading), 1e-9)
+    near = place[(index[:, None] - way[:, None] * np.arange(_SKIP + 1, _SKIP + _CHORD + 1)) % count].mean(axis=1)
+    origin = near + heading * ((place[index] - near) * heading.conj()).real
+    across: Complexes = -1j * side * way * heading
+    sine = np.sin(np.minimum(turn[index], 0.5 * np.pi))
+    begin = pitch_px * np.maximum(_NEAREST, _FREE / np.maximum(sine, 1e-3))
+    return _Rays(points[index], _pairs(origin), _pairs(heading), _pairs(across), begin)
+
+
+def _pairs(places: Complexes) -> Float64s:
+    return np.column_stack([places.real, places.imag])
+
+
+def _clear(rays: _Rays, ring: Ring, middle: Float64s, pitch_px: float, *, inside: bool) -> Bools:
+    """Whether each place across the rays (R, O) is away from the block in each part, (R, O, K)."""
+    out = _ACROSS[::_EVERY] * pitch_px
+    shape = (len(middle), len(out), _PARTS)
+    places = rays.at(np.broadcast_to(middle[:, None], shape), np.broadcast_to(out[:, None], shape))
+    depth = depth_inside(ring, places.reshape(-1, 2)).reshape(shape)
+    clear = (depth if inside else -depth) > _CLEAR * pitch_px
+    return np.repeat(clear, _EVERY, axis=1)[:, : len(_ACROSS)]
+
+
+def _clearest(parts: Float64s, clear: Bools, middle: Float64s) -> tuple[Float64s, Float64s, Float64s, Float64s]:
+    """The largest step across lines near each ray, where that line begins and how it turns, and the largest step across
+    other lines, (R,) each. A line's step is that of its weakest part.
+
+    parts: light in each part of the rays, (R, O, K). middle: how far along the parts lie, (R, K), pitches.
+    """
+    near, far = _SIDES
+    total = np.concatenate([np.zeros_like(parts[:, :1]), np.cumsum(parts, axis=1)], axis=1)
+    index = np.arange(far, parts.shape[1] - far)
+    above = total[:, index + far + 1] - total[:, index + near]
+    below = total[:, index - near + 1] - total[:, index - far]
+    steps = (above - below) / (far - near + 1)
+    free = clear[:, index - far] & clear[:, index] & clear[:, index + far]
+    steps = np.where(free, steps, np.nan)
+    at = _ACROSS[index]
+    shift = np.rint(_TURNS[:, None, None] * middle / (_ACROSS[1] - _ACROSS[0])).astype(np.intp)
+    rows = np.arange(len(at))[:, None] + shift[:, :, None]
+    inner = (rows >= 0) & (rows < len(at))
+    taken = np.take_along_axis(steps[None], np.clip(rows, 0, len(at) - 1), axis=2)
+    taken = np.where(inner, taken, np.nan)
+    weakest = np.maximum(taken.min(axis=3), (-taken).min(axis=3))  # nan where a part is nan
+    weakest = np.where(np.isnan(weakest), 0.0, weakest)
+    own = np.where(np.abs(at) <= _OWN, weakest, 0.0).transpose(1, 0, 2)
+    other = np.where(np.abs(at) >= _ANOTHER, weakest, 0.0).max(axis=(0, 2))
+    best = own.reshape(len(own), -1).argmax(axis=1)
+    turn, place = np.unravel_index(best, own.shape[1:])
+    step = np.asarray(own[np.arange(len(own)), turn, place])
+    return step, np.asarray(at[place]), np.asarray(_TURNS[turn]), np.asarray(other)
+
+
+def _mean_light(light: Bytes, rays: _Rays, ahead: Float64s, out: Float64s, beside_px: float) -> Float64s:
+    """Mean light beside lines along the rays, (R,); ahead, out: places on the lines, (R, T), pixels."""
+    places = rays.at(ahead[:, None] + 0.0 * _BESIDE[:, None], out[:, None] + beside_px * _BESIDE[:, None])
+    return np.asarray(sample_at(light, places[..., 0], places[..., 1]).mean(axis=(1, 2)))

@@ -256,7 +256,10 @@ def _loaded(path: Path, job_id: int) -> ArchivedJob:
     except (ValueError, KeyError, TypeError) as error:
         raise EvidenceError(f"{path}: is no document of a job ({error}). Restore it") from error
     if version != VERSION or number != job_id:
-        raise EvidenceError(f"{path}: version {version} of job {number}, expected version {VERSION} of job {job_id}")
+        raise EvidenceError(
+            f"{path}: version {version} of job {number}, expected version {VERSION} of job {job_id}. "
+            "Where the version is another, it was written by another version of combtrace: use that one"
+        )
     return ArchivedJob(job_id, path, document)
 
 

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc bench-camera bench bench-link bench-daemon bench-page bench-start profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc test-deb deb release bench-camera bench bench-link bench-daemon bench-page bench-start profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -29,6 +29,20 @@ test-camera: install
 # Contours driven by a real CNC controller, in simulation (Debian's linuxcnc-uspace).
 test-linuxcnc: install
 	COMBTRACE_LINUXCNC=1 $(BIN)/python -m pytest tests/linuxcnc
+
+# Wheel, source distribution and Debian packages, in dist/.
+deb:
+	sh packaging/deb.sh dist
+
+# They are built twice, which must be the same, and installed, run, upgraded and removed in a clean machine. As root.
+test-deb: install
+	rm -rf dist
+	sh packaging/reproduce.sh dist
+	COMBTRACE_DEB=dist $(BIN)/python -m pytest tests/deb
+
+# All that a version is handed out as, in dist/, if the tree is fit for it; says how to tag it and publishes nothing.
+release: check
+	sh packaging/release.sh dist
 
 # FRAMES=100000: how memory fares over that many, half an hour.
 bench-camera: install

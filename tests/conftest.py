@@ -43,6 +43,8 @@ forked.begin()
 collect_ignore = [] if os.environ.get("COMBTRACE_CAMERA_GUEST") else ["camera_guest"]
 # Those run a CNC controller for a minute: `make test-linuxcnc`.
 collect_ignore += [] if os.environ.get("COMBTRACE_LINUXCNC") else ["linuxcnc"]
+# Those install packages that are built first, in a clean machine: `make test-deb`.
+collect_ignore += [] if os.environ.get("COMBTRACE_DEB") else ["deb"]
 
 settings.register_profile("same", deadline=None, derandomize=True)
 settings.register_profile("explore", deadline=None, max_examples=1000)

@@ -22,6 +22,7 @@ __all__ = [
     "bounding_box",
     "contour_defect",
     "densified",
+    "farthest",
     "hausdorff",
     "is_simple",
     "largest_loop",
@@ -200,6 +201,14 @@ def densified(ring: Ring, spacing: float) -> Ring:
 
 def hausdorff(a: Ring, b: Ring, spacing: float) -> float:
     """Two-sided Hausdorff distance between two closed curves, low by at most `spacing` / 2 (points are that dense)."""
-    there = distances_to_ring(densified(a, spacing), b)
-    back = distances_to_ring(densified(b, spacing), a)
-    return float(max(there.max(), back.max()))
+    return farthest(Contour(a), Contour(b), spacing)[0]
+
+
+def farthest(a: Contour, b: Contour, spacing: float) -> tuple[float, Float64s]:
+    """As `hausdorff`, of all rings together, and the point (2,) of either that lies so far from the other."""
+    found = []
+    for one, other in ((a, b), (b, a)):
+        points = np.concatenate([densified(ring, spacing) for ring in one.rings])
+        near = np.min([distances_to_ring(points, ring) for ring in other.rings], axis=0)
+        found.append((float(near.max()), points[near.argmax()]))
+    return max(found, key=lambda place: place[0])

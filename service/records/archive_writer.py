@@ -25,11 +25,12 @@ from service.low_priority import go_last
 from service.malloc import give_back
 from service.measuring.table_file import TableRecord, table_bytes
 from service.records.archive import DRAFT, PLAIN_FRAME, Archive, ArchiveError
-from service.records.archived_job import EvidenceError, drafted_evidence, load_draft
+from service.records.archived_job import drafted_evidence, load_draft
 from service.records.evidence import (
     FRAME,
     OVERLAY,
     Evidence,
+    EvidenceError,
     document,
     document_bytes,
     frame_bytes,

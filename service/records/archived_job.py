@@ -36,14 +36,10 @@ from service.parts.core_ribbon import CoreRibbon
 from service.parts.fit import PartFit
 from service.reasons import Reason
 from service.records.archive import DRAFT, PLAIN_FRAME, TABLES, document_of, folder_of
-from service.records.evidence import FRAME, VERSION, Evidence
+from service.records.evidence import FRAME, VERSION, Evidence, EvidenceError, Flaw
 from service.records.job import Job
 
 LARGEST_DOCUMENT = 200_000_000
-
-
-class EvidenceError(Exception):
-    """A job's evidence is not there or cannot be used: seen, expected, next step."""
 
 
 @dataclass(frozen=True)
@@ -121,12 +117,13 @@ class ArchivedJob:
         try:
             data = np.frombuffer(path.read_bytes(), np.uint8)
         except OSError as error:
-            raise EvidenceError(f"{path}: cannot be read: {error.strerror}") from error
+            raise _unreadable(path, error) from error
         decoded = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
         samples: NDArray[np.generic] = np.zeros(0, np.uint8) if decoded is None else decoded
         known = self.document["frame"]
         if list(samples.shape) != known["shape"] or _sha256(samples) != known["sha256"]:
-            raise EvidenceError(f"{path}: is not the frame that was archived. Restore it, or replay another job")
+            told = f"{path}: is not the frame that was archived. Restore it, or replay another job"
+            raise EvidenceError(told, Flaw.FRAME_DAMAGED)
         return looked_at(samples)[0]
 
     def measurer(self, calibration: Path | None = None, limits: dict[str, Any] | None = None) -> Measurer:
@@ -152,7 +149,7 @@ class ArchivedJob:
             else:
                 record = record_of(known["content"], str(self.path))
         except CalibrationFileError as error:
-            raise EvidenceError(str(error)) from error
+            raise EvidenceError(str(error), Flaw.CALIBRATION) from error
         values = {**({} if known is None else known["limits"]), **limits}
         taken_at = self.taken_at
         return CalibrationGuard(record, GuardLimits(**values), now=lambda: taken_at)
@@ -165,7 +162,7 @@ class ArchivedJob:
         try:
             return load_table(path)
         except TableFileError as error:
-            raise EvidenceError(f"job {self.job_id}: {error}") from error
+            raise EvidenceError(f"job {self.job_id}: {error}", Flaw.TABLE) from error
 
 
 def load_archived(archive: Path, job_id: int) -> ArchivedJob:
@@ -173,11 +170,11 @@ def load_archived(archive: Path, job_id: int) -> ArchivedJob:
     try:
         path = document_of(archive, job_id)
     except OSError as error:
-        raise EvidenceError(f"{archive}: cannot be looked at: {error.strerror}. Check its permissions") from error
+        told = f"{archive}: cannot be looked at: {error.strerror}. Check its permissions"
+        raise EvidenceError(told, Flaw.STORAGE) from error
     if path is None:
-        raise EvidenceError(
-            f"{archive}: holds nothing of job {job_id}. It was let go, or was never kept: see archive.max_bytes"
-        )
+        told = f"{archive}: holds nothing of job {job_id}. It was let go, or was never kept: see archive.max_bytes"
+        raise EvidenceError(told, Flaw.MISSING)
     return _loaded(path, job_id)
 
 
@@ -252,13 +249,15 @@ def _loaded(path: Path, job_id: int) -> ArchivedJob:
         document = json.loads(path.read_bytes())
         version, number = document["version"], document["job"]["job_id"]
     except OSError as error:
-        raise EvidenceError(f"{path}: cannot be read: {error.strerror}") from error
+        raise _unreadable(path, error) from error
     except (ValueError, KeyError, TypeError) as error:
         raise EvidenceError(f"{path}: is no document of a job ({error}). Restore it") from error
     if version != VERSION or number != job_id:
+        later = isinstance(version, int) and version > VERSION
         raise EvidenceError(
             f"{path}: version {version} of job {number}, expected version {VERSION} of job {job_id}. "
-            "Where the version is another, it was written by another version of combtrace: use that one"
+            "Where the version is another, it was written by another version of combtrace: use that one",
+            Flaw.LATER_VERSION if later else Flaw.DOCUMENT_DAMAGED,
         )
     return ArchivedJob(job_id, path, document)
 
@@ -273,7 +272,12 @@ def recipe_with(archived: ArchivedJob, changes: dict[str, Any]) -> Recipe:
         return Recipe.model_validate(settings)
     except ValidationError as error:
         mistakes = "; ".join(f"recipe.{line}" for line in describe(error, Recipe))
-        raise EvidenceError(f"job {archived.job_id}: {mistakes}") from error
+        raise EvidenceError(f"job {archived.job_id}: {mistakes}", Flaw.SETTINGS) from error
+
+
+def _unreadable(path: Path, error: OSError) -> EvidenceError:
+    flaw = Flaw.MISSING if isinstance(error, FileNotFoundError) else Flaw.STORAGE
+    return EvidenceError(f"{path}: cannot be read: {error.strerror}", flaw)
 
 
 def _sha256(samples: NDArray[np.generic]) -> str:

@@ -11,6 +11,7 @@ import importlib.metadata
 import json
 from concurrent.futures import Future
 from dataclasses import asdict, dataclass
+from enum import StrEnum
 from typing import Any, Protocol
 
 import cv2
@@ -35,6 +36,29 @@ OVERLAY = "overlay.jpg"
 OVERLAY_PX = 1600  # the longer side: enough to look at, a tenth of the frame's bytes
 JPEG_QUALITY = 85
 PNG_LEVEL = 1  # on photographs higher levels take four times as long for 3 % less
+
+
+class Flaw(StrEnum):
+    """Why a job cannot be done again, by kind."""
+
+    NOTHING_MEASURED = "nothing_measured"
+    MISSING = "missing"
+    STORAGE = "storage"
+    FRAME_DAMAGED = "frame_damaged"
+    DOCUMENT_DAMAGED = "document_damaged"
+    LATER_VERSION = "later_version"
+    CALIBRATION = "calibration"
+    TABLE = "table"
+    SETTINGS = "settings"
+    NOT_MEASURABLE = "not_measurable"
+
+
+class EvidenceError(Exception):
+    """A job's evidence is not there or cannot be used: seen, expected, next step."""
+
+    def __init__(self, message: str, flaw: Flaw = Flaw.DOCUMENT_DAMAGED) -> None:
+        super().__init__(message)
+        self.flaw = flaw
 
 
 @dataclass(frozen=True)

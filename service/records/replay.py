@@ -12,15 +12,15 @@ import cv2
 import numpy as np
 
 from contour.errors import ContourError
-from contour.geometry.rings import Contour, hausdorff
+from contour.geometry.rings import Contour, farthest
 from drivers.controller.errors import ContourTooLarge, MailboxError
 from drivers.controller.mailbox.pages import HEADER_FIELDS, Page
 from drivers.controller.mailbox.words import Unpacking, WordOrder
 from service.link.contour_message import Envelope, contour_pages
 from service.measuring.measurement import Measurement
 from service.reasons import Reason
-from service.records.archived_job import ArchivedJob, EvidenceError, recipe_with
-from service.records.evidence import measurement_fields
+from service.records.archived_job import ArchivedJob, recipe_with
+from service.records.evidence import EvidenceError, Flaw, measurement_fields
 
 COMPARED = ("method", "polarity", "pitch_px", "vertices", "area_mm2", "uncertainty_mm", "thickness_mm")
 COMPARED_AT_MM = 0.5  # spacing of the places at which two outlines are compared
@@ -52,7 +52,10 @@ class Change:
 
 @dataclass(frozen=True)
 class Apart:
-    """The largest distance between the outline as it was and as it is now, in `unit`; 0 = the same to the last bit."""
+    """The largest distance between the outlines as they were and as they are now, holes too, in `unit`.
+
+    0 = the same to the last bit.
+    """
 
     distance: float
     unit: str
@@ -93,14 +96,15 @@ def replay(archived: ArchivedJob, settings: Settings) -> Replayed:
     """The job measured again and put into pages again; raise EvidenceError where that cannot be done."""
     if not archived.replayable:
         outcome = archived.document["job"]["outcome"]
-        raise EvidenceError(f"job {archived.job_id} {outcome} before a frame was measured: there is nothing to replay")
+        told = f"job {archived.job_id} {outcome} before a frame was measured: there is nothing to replay"
+        raise EvidenceError(told, Flaw.NOTHING_MEASURED)
     recipe = recipe_with(archived, settings.recipe)
     thickness_mm = recipe.thickness_mm if "thickness_mm" in settings.recipe else archived.document["thickness_mm"]
     measurer = archived.measurer(settings.calibration, settings.limits)
     try:
         seen = measurer.measure(archived.frame(), recipe, thickness_mm, archived.document["frame"]["camera"])
     except ContourError as error:
-        raise EvidenceError(f"job {archived.job_id}: {error}") from error
+        raise EvidenceError(f"job {archived.job_id}: {error}", Flaw.NOT_MEASURABLE) from error
     pages, refusal = _pages(seen, archived.envelope)
     known = archived.document["measurement"]
     were = tuple(Reason(entry["code"]) for entry in known["reasons"]) or _refused_pages(archived)
@@ -180,7 +184,12 @@ def _apart(archived: ArchivedJob, seen: Measurement) -> Apart | None:
     was, now, unit = _frames(archived, seen)
     if was is None or now is None:
         return None
-    return Apart(0.0 if _same(was, now) else hausdorff(was.exterior, now.exterior, COMPARED_AT_MM), unit)
+    return apart_of(was, now, unit)
+
+
+def apart_of(was: Contour, now: Contour, unit: str) -> Apart:
+    """How far two outlines are apart."""
+    return Apart(0.0 if _same(was, now) else farthest(was, now, COMPARED_AT_MM)[0], unit)
 
 
 def _outlines(archived: ArchivedJob, seen: Measurement, apart: Apart | None) -> Iterator[Change]:

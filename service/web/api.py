@@ -17,8 +17,8 @@ from starlette.routing import Route
 
 from service.link.job_numbers import LARGEST_JOB
 from service.reasons import Language, Reason
-from service.records.archived_job import EvidenceError, load_archived
-from service.records.evidence import FRAME, Evidence, job_fields
+from service.records.archived_job import load_archived
+from service.records.evidence import FRAME, Evidence, EvidenceError, job_fields
 from service.records.job import Job
 from service.records.journal_reader import JobFilter, JournalUnreadable, reading
 from service.web import models

@@ -24,7 +24,8 @@ from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, area
 from service.measuring.calibration_file import CalibrationFileError, CalibrationRecord, record_of
 from service.parts.fit import PartFit
-from service.records.archived_job import ArchivedJob, EvidenceError
+from service.records.archived_job import ArchivedJob
+from service.records.evidence import EvidenceError
 from service.web.models import Axis, Drawing, Grid, HiddenPart, LaidPart, SentinelMark, WantedPart
 
 GRID_COLUMNS, GRID_ROWS = 33, 25  # a browser interpolates between them: docs/how-to/operators-guide.md says how well

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from service.config.recipes import Recipe
-from service.records.archived_job import ArchivedJob, EvidenceError, load_archived
-from service.records.evidence import measurement_fields
+from service.records.archived_job import ArchivedJob, load_archived
+from service.records.evidence import EvidenceError, measurement_fields
 from service.records.replay import Replayed, Settings, replay
 from service.web.drawing import drawing
 from service.web.recipes.models import LeftOut, TriedJob

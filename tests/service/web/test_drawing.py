@@ -19,7 +19,8 @@ from service.measuring.calibration_file import load_record
 from service.parts.core_ribbon import CoreRibbon
 from service.parts.fit import PartFit, in_picture
 from service.parts.part import Part
-from service.records.archived_job import ArchivedJob, EvidenceError
+from service.records.archived_job import ArchivedJob
+from service.records.evidence import EvidenceError
 from service.web.drawing import drawing, nice_step
 from service.web.models import Drawing, Grid
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 
 import cv2
@@ -16,6 +18,7 @@ from contour.walls import cell_scale
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
 from tests.support.processes.cell import SAMPLES
+from tests.support.processes.processes import ROOT
 
 
 def test_each_runs_while_the_other_does_and_their_thread_ends() -> None:
@@ -36,6 +39,16 @@ def test_what_either_raises_comes_through_once_both_have_ended() -> None:
     with pytest.raises(NoBlockFound, match="no cells"):
         side_by_side(lambda: ended.append("one"), fails)
     assert ended == ["other", "one"]
+
+
+def test_a_process_that_keeps_to_one_thread_starts_none() -> None:
+    told = (
+        "import threading, cv2; from contour.image.side_by_side import *; keep_to_one_thread();"
+        "one, other = side_by_side(threading.get_ident, threading.get_ident);"
+        "print(one == other, cv2.getNumThreads())"
+    )
+    ran = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert ran.stdout.split() == ["True", "1"]
 
 
 @pytest.mark.parametrize("sample", ["1-rectangle.jpg", "4-with-holes.jpg"])

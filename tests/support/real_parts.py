@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
+from types import ModuleType
 from typing import NoReturn
 
 import pytest
+
+CLUSTER = "pip install 'combtrace[cluster]'"
 
 
 def missing(reason: str) -> NoReturn:
@@ -14,6 +18,14 @@ def missing(reason: str) -> NoReturn:
     if os.environ.get("CI", "").lower() == "true":
         pytest.fail(reason, pytrace=False)
     pytest.skip(reason)
+
+
+def need_module(name: str, install: str) -> ModuleType:
+    """The module `name`; without it the test skips with the command that installs it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        missing(f"{error.name} is not here. Install it: {install}")
 
 
 def need_program(name: str, install: str) -> str:

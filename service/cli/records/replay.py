@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from service.cli.errors import EXIT_OK, EXIT_REFUSED, EXIT_UNUSABLE, UserError
 from service.cli.options.jobs import add_config_argument, add_filter_arguments, config_of, filter_of, job_number
 from service.cli.records.jobs import local
+from service.cli.records.replay_archives import add_archive_arguments, wants_table, write_table
 
 if TYPE_CHECKING:
     from service.config.config import Config
@@ -31,8 +32,13 @@ list the jobs whose verdict flips. Nothing is sent and nothing is written.
 Settings: recipe.KEY, recipe.parameters.KEY, calibration.file,
 calibration.max_age_days, .sentinel_tolerance_px, .sentinels_required.
 
-Exit status: 0 all came out as they were (with --set: done), 3 something did not,
-2 nothing to replay, a job named that cannot be, or wrong usage."""
+With --output, whole archives, also in buckets, by many processes or a Dask cluster:
+a row a job as a Parquet table, a report, and conditions to fail on. What was broken
+off goes on with the same command. Needs combtrace[cluster]; see the documents.
+
+Exit status: 0 all came out as they were (with --set or --against: done), 3 something
+did not, or a condition of --fail-on is met, 2 nothing to replay, a job named that
+cannot be, wrong usage, or with --output jobs or workers that were left out."""
 
 LIMITS = ("max_age_days", "sentinel_tolerance_px", "sentinels_required")
 BAR = 30
@@ -49,16 +55,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="changes", help="e.g. recipe.tolerance_mm=0.2"
     )
     parser.add_argument("--json", action="store_true", help="JSON Lines, one object a job")
+    add_archive_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Replay, tell, and say by the exit status whether all came out as it was."""
-    from service.records.archived_job import EvidenceError, load_archived
+    from service.records.archived_job import load_archived
+    from service.records.evidence import EvidenceError
     from service.records.replay import replay
 
     settings = settings_of(args.changes)
+    if wants_table(args):
+        return write_table(args, settings, lambda config: chosen_numbers(args, config))
     config = config_of(args)
-    numbers = _numbers(args, config)
+    numbers = chosen_numbers(args, config)
     done: list[Replayed] = []
     left_out: dict[str, list[int]] = {}
     for job_id in _with_bar(numbers):
@@ -138,7 +148,7 @@ def _check_limits(limits: dict[str, Any]) -> None:
         raise UserError("; ".join(f"--set calibration.{line}" for line in describe(error, Calibration))) from error
 
 
-def _numbers(args: argparse.Namespace, config: Config) -> list[int]:
+def chosen_numbers(args: argparse.Namespace, config: Config) -> list[int]:
     """Job numbers given, or those of the journal that are wanted and of which evidence is kept."""
     from service.records.archive import document_of
     from service.records.journal_reader import JournalUnreadable, reading

@@ -16,6 +16,7 @@ import pytest
 from service.cli.main import main
 from tests.support.processes.cell import SAMPLES, Cell
 from tests.support.processes.processes import called, lines, until
+from tests.support.real_parts import CLUSTER, need_module
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +118,15 @@ def test_other_settings_tried_on_the_archive_tell_which_verdicts_flip(cell: Cell
     table = run(cell, "replay", "#1", "#2", "#5", "--set", "recipe.max_area_mm2=50000").stdout
     assert "3 jobs, 2 verdicts flip: 2 sent -> refused" in table
     assert "112 area_out_of_limits" in table
+
+
+def test_jobs_of_the_journal_become_a_table(cell: Cell, tmp_path: Path) -> None:
+    output = tmp_path / "rows.parquet"
+    tried = run(cell, "replay", "--since", "1h", "--outcome", "refused", "--output", str(output))
+    assert tried.returncode == 0, tried.stderr
+    found = need_module("pyarrow.parquet", CLUSTER).read_table(output).to_pylist()
+    assert numbered(cell, "#5") in [str(row["job_id"]) for row in found]
+    assert {(row["cell"], row["reason_after"], row["identical"]) for row in found} == {("archive", 110, True)}
 
 
 def test_what_changes_is_told_field_by_field(cell: Cell) -> None:

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc test-deb deb release bench-camera bench bench-link bench-daemon bench-page bench-start profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc test-deb deb release bench-camera bench bench-link bench-daemon bench-page bench-start bench-replays profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -64,6 +64,10 @@ bench-page: install
 # A command's start and a first trace, over what they cannot be without.
 bench-start: install
 	$(BIN)/python -m benchmarks.start --write
+
+# An archive of 2,000 jobs done again by one process, two, a Dask cluster, from a bucket, and under kills (JOBS=200: fewer).
+bench-replays: install
+	$(BIN)/python -m benchmarks.replays $(if $(JOBS),--jobs $(JOBS),--write)
 
 # Times, passes over the picture, arrays and the largest of them, step by step, at 2, 12 and 48 MP; outlines a second.
 profile: install

@@ -113,6 +113,15 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "replay": (
         ("combtrace replay 418", "Whether it comes out as it did."),
         ("combtrace replay --since 1d --set recipe.max_uncertainty_mm=0.4", "Whose verdict another limit would flip."),
+        ("combtrace replay --output year.parquet --workers 8 --report year.html", "The whole archive, in a table."),
+        (
+            "combtrace replay --archive s3://plant/line-1 --scheduler tcp://host:8786 --output year.parquet",
+            "The same from a bucket, by a Dask cluster.",
+        ),
+        (
+            "combtrace replay --against /opt/combtrace/venv --output upgrade.parquet --fail-on 'sent_to_refused>0'",
+            "What the version installed there says, beside this one.",
+        ),
     ),
     "status": (
         ("combtrace status", "Of the daemon whose config.yaml lies here."),

@@ -5,17 +5,17 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import zipfile
-from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryDirectory, TemporaryFile
-from typing import Any, Self
+from tempfile import TemporaryFile
+from typing import Any, Final, Self
 
 from service.config.recipes import Recipe
 from service.records.replay import Settings
 from service.replays import other_version
 from service.replays.errors import ReplayError
 from service.replays.rows import Side, Versions
+
+END_S: Final = 10.0  # the job that it is at, at most
 
 
 class OtherVersionError(Exception):
@@ -29,36 +29,28 @@ class OtherVersion:
 
     def __init__(self, given: Path) -> None:
         """given: a wheel, or the folder of a virtual environment; raise ReplayError where neither can be started."""
-        self._kept = ExitStack()
-        self._unpacked = self._kept.enter_context(TemporaryDirectory(prefix="combtrace-other-"))
-        self._said = self._kept.enter_context(TemporaryFile())  # noqa: SIM115 - the stack closes it
+        self._said = TemporaryFile()  # noqa: SIM115 - closed with the process
         try:
-            command = self._command(given)
             self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, text=True
+                _command(given), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said, text=True
             )
-        except (OSError, zipfile.BadZipFile, ReplayError) as error:
-            self._kept.close()
+        except (OSError, ReplayError) as error:
+            self._said.close()
             raise ReplayError(f"--against {given}: {error}") from error
         assert self._process.stdout is not None
         first = self._process.stdout.readline()
         try:
             self.versions = Versions(**json.loads(first))
         except (ValueError, TypeError) as error:
+            self._process.kill()
             why = self._last_said()
             self.close()
             raise ReplayError(f"--against {given}: no combtrace that could be started there: {why}") from error
 
-    def _command(self, given: Path) -> list[str]:
-        script = other_version.__file__
-        if given.suffix == ".whl":
-            with zipfile.ZipFile(given) as wheel:
-                wheel.extractall(self._unpacked)
-            return [sys.executable, "-I", script, self._unpacked]  # goes before what is installed here
-        python = given / "bin" / "python"
-        if not python.exists():
-            raise ReplayError("expected a wheel (.whl) or the folder of a virtual environment with bin/python")
-        return [str(python), "-I", script]
+    @property
+    def alive(self) -> bool:
+        """False where it has ended by itself."""
+        return self._process.poll() is None
 
     def measured(self, archive: Path, job_id: int, settings: Settings) -> Side:
         """What it makes of the job; raise OtherVersionError."""
@@ -83,6 +75,8 @@ class OtherVersion:
             self._process.stdin.flush()
             return dict(json.loads(self._process.stdout.readline()))
         except (OSError, ValueError) as error:
+            self._process.kill()
+            self._process.wait()
             raise OtherVersionError(f"the other version has ended: {self._last_said()}") from error
 
     def _last_said(self) -> str:
@@ -91,16 +85,32 @@ class OtherVersion:
         return lines[-1] if lines else "it said nothing"
 
     def close(self) -> None:
-        """End it."""
-        self._process.kill()
-        self._process.communicate()
-        self._kept.close()
+        """Have it end: it does so by itself, once nobody asks any more."""
+        try:
+            self._process.communicate(timeout=END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.communicate()
+        self._said.close()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _command(given: Path) -> list[str]:
+    """What starts it; raise ReplayError."""
+    script = other_version.__file__
+    if given.suffix == ".whl":
+        if not given.is_file():
+            raise ReplayError("there is no such wheel")
+        return [sys.executable, "-I", script, str(given)]
+    python = given / "bin" / "python"
+    if not python.exists():
+        raise ReplayError("expected a wheel (.whl) or the folder of a virtual environment with bin/python")
+    return [str(python), "-I", script]
 
 
 def _defaults() -> dict[str, Any]:

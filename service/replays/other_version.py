@@ -1,7 +1,7 @@
 """Run by the interpreter of another version of combtrace, not imported: measures jobs as that version does.
 
 A line of JSON in, a line out; the first line out says which versions are at work. It keeps to names that versions have
-in common, and knows nothing of the version that asks. Arguments: folders that come first where modules are looked for.
+in common, and knows nothing of the version that asks. Argument: a wheel, else what is installed is asked.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ import dataclasses
 import importlib.metadata
 import json
 import sys
+import zipfile
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 
@@ -58,8 +60,18 @@ def _leave_out_later(recipe: dict[str, Any], defaults: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    """Answer until nobody asks."""
-    sys.path[:0] = sys.argv[1:]
+    """Answer until nobody asks, with what a wheel has before what is installed, where one is named."""
+    with TemporaryDirectory(
+        prefix="combtrace-other-"
+    ) as folder:  # goes with this process, also where the asker is killed
+        for wheel in sys.argv[1:]:
+            zipfile.ZipFile(wheel).extractall(folder)
+            sys.path.insert(0, folder)
+        answer_all()
+
+
+def answer_all() -> None:
+    """Say which versions are at work, then a line for each line."""
     import cv2
     import numpy
 

@@ -73,18 +73,19 @@ class Run:
         self._workers = workers
         self._tell = tell
         self._now = now
-        missing = files.missing()
-        self._waiting = deque(Task(number, tuple(files.batch(number))) for number in missing)
+        self._missing = deque(files.missing())
+        self._urgent: deque[Task] = deque()
+        self._put_off: deque[Task] = deque()
         self._rows: dict[int, dict[JobName, Row]] = {}  # of batches that are not whole
-        to_do = sum(len(task.names) for task in self._waiting)
-        self.progress = Progress(len(files.names), len(files.names) - to_do)
+        to_do = sum(map(files.size, self._missing))
+        self.progress = Progress(files.jobs, files.jobs - to_do)
 
     def carry_out(self) -> None:
         """Do all that is missing; raise ReplayError."""
         begun, flying = self._now(), 0
-        while self._waiting or flying:
-            while self._waiting and flying < self._workers.room:
-                self._workers.begin(self._waiting.popleft())
+        while self._left or flying:
+            while self._left and flying < self._workers.room:
+                self._workers.begin(self._next())
                 flying += 1
             ended = self._workers.ended(WAIT_S)
             self.progress.elapsed_s = self._now() - begun
@@ -96,12 +97,24 @@ class Run:
                     self._take(ended.task, ended.done)
             self._tell(self.progress)
 
+    @property
+    def _left(self) -> int:
+        return len(self._urgent) + len(self._missing) + len(self._put_off)
+
+    def _next(self) -> Task:
+        if self._urgent:
+            return self._urgent.popleft()
+        if self._missing:
+            number = self._missing.popleft()
+            return Task(number, tuple(self._files.batch(number)))
+        return self._put_off.popleft()
+
     def _again(self, task: Task) -> None:
         """The task's worker ended: again, then job by job; a job that always ends its worker is left out."""
         if task.tries + 1 < MOST_TRIES:
-            self._waiting.appendleft(Task(task.batch, task.names, task.tries + 1))
+            self._urgent.append(Task(task.batch, task.names, task.tries + 1))
         elif len(task.names) > 1:
-            self._waiting.extendleft(Task(task.batch, (name,)) for name in task.names)
+            self._urgent.extend(Task(task.batch, (name,)) for name in task.names)
         else:
             (name,) = task.names
             told = f"job {name.job_id}: its worker ended {MOST_TRIES} times. Is there memory enough?"
@@ -117,7 +130,7 @@ class Run:
         rows = dict(zip(task.names, done.rows, strict=True))
         silent = tuple(name for name, row in rows.items() if row["left_out"] == Flaw.STORAGE)
         if silent and task.tries + 1 < MOST_TRIES and len(self._rows) < MOST_PUT_OFF:
-            self._waiting.append(Task(task.batch, silent, task.tries + 1))
+            self._put_off.append(Task(task.batch, silent, task.tries + 1))
             rows = {name: row for name, row in rows.items() if name not in silent}
         self._keep(task, rows)
 
@@ -127,7 +140,6 @@ class Run:
         known.update(rows)
         self.progress.done += len(rows)
         self.progress.left_out.update(row["left_out"] for row in rows.values() if row["left_out"] is not None)
-        names = self._files.batch(task.batch)
-        if len(known) == len(names):
-            self._files.put(task.batch, [known[name] for name in names])
+        if len(known) == self._files.size(task.batch):
+            self._files.put(task.batch, [known[name] for name in self._files.batch(task.batch)])
             del self._rows[task.batch]

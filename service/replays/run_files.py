@@ -46,7 +46,7 @@ class RunFiles:
         self.parts = output.with_name(f"{output.name}.parts")
         self._terms = json.loads(json.dumps(terms))
         self._lock: IO[bytes] | None = None
-        self.names: list[JobName] = []
+        self._plan: pa.Table | None = None  # of a million jobs 25 MB; as objects it would be a hundred and more
         for path in (output, self.parts / PLAN):
             if path.exists():
                 self._check_terms(path)
@@ -81,26 +81,35 @@ class RunFiles:
             if not self.begun:
                 columns = {key: [getattr(name, key) for name in names] for key in ("place", "job_id", "ended")}
                 self._write(PLAN, pa.table(columns).replace_schema_metadata(self._metadata()))
-            plan = pq.read_table(self.parts / PLAN).to_pydict()
+            self._plan = pq.read_table(self.parts / PLAN)
         except BlockingIOError as error:
             raise ReplayError(f"{self.output}: another run writes it. Wait for it, or name another file") from error
         except OSError as error:
             raise ReplayError(f"{self.parts}: cannot be written: {error.strerror}. Name another --output") from error
-        self.names = [JobName(*values) for values in zip(plan["place"], plan["job_id"], plan["ended"], strict=True)]
+
+    @property
+    def jobs(self) -> int:
+        """How many there are to do, done or not."""
+        return 0 if self._plan is None else len(self._plan)
 
     @property
     def batch_size(self) -> int:
         """Jobs of a batch: the same each time, for the plan is."""
-        return max(1, min(MOST_A_BATCH, len(self.names) // BATCHES))
+        return max(1, min(MOST_A_BATCH, self.jobs // BATCHES))
+
+    def size(self, number: int) -> int:
+        """How many jobs a batch has."""
+        return min(self.batch_size, self.jobs - number * self.batch_size)
 
     def batch(self, number: int) -> list[JobName]:
         """The jobs of a batch."""
-        return self.names[number * self.batch_size : (number + 1) * self.batch_size]
+        assert self._plan is not None
+        return [JobName(**name) for name in self._plan.slice(number * self.batch_size, self.batch_size).to_pylist()]
 
     @property
     def batches(self) -> range:
         """Numbers of all batches."""
-        return range(-(-len(self.names) // self.batch_size))
+        return range(-(-self.jobs // self.batch_size))
 
     def missing(self) -> list[int]:
         """Batches that are still to be done."""

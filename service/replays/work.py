@@ -35,7 +35,7 @@ class Lost(StrEnum):
     DEFECT = "defect"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class JobName:
     """A job: the number of its place, its own number, and the end that its document's name says."""
 
@@ -132,9 +132,13 @@ def left_out(kind: Flaw | Lost, text: str) -> Row:
 
 
 def other_version(given: Path) -> OtherVersion:
-    """The process of the other version: one for each process that works, started when it is first needed."""
-    if given not in _others:
-        _others[given] = OtherVersion(given)
+    """The process of the other version: one for each process that works, started where there is none, or none alive."""
+    known = _others.get(given)
+    if known is not None and known.alive:
+        return known
+    if known is not None:
+        known.close()
+    _others[given] = OtherVersion(given)
     return _others[given]
 
 

@@ -15,6 +15,7 @@ from service.records.replay import Settings, replay
 from service.replays.places import Place
 from service.replays.rows import COLUMNS, OF_THE_RUN, Row
 from service.replays.work import JobName, Lost, Work
+from tests.support.processes.processes import ROOT
 from tests.support.service.archives import changed_document, frame_of, write_archive
 
 
@@ -193,5 +194,8 @@ def test_a_job_of_an_unknown_end_is_not_looked_for_in_a_bucket() -> None:
         pass
 
 
-def test_columns_of_the_run_are_columns() -> None:
-    assert set(OF_THE_RUN) <= set(COLUMNS)
+def test_the_reference_names_each_column_and_those_of_the_run() -> None:
+    page = (ROOT / "docs" / "reference" / "replay-table.md").read_text(encoding="utf-8")
+    told = [line for line in page.splitlines() if line.startswith("| `")]
+    assert told == [f"| `{name}` | {kind} | {meaning} |" for name, (kind, meaning) in COLUMNS.items()]
+    assert all(f"`{name}`" in page.partition("| column")[0] for name in OF_THE_RUN)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.support.processes.processes import ROOT, free_port
+from tests.support.processes.processes import ROOT, free_port, until
 from tests.support.real_parts import CLUSTER, need_module
 
 ANOTHER_OPENCV = 'import cv2; cv2.__version__ = "4.13.0"'  # what a worker with it would say
@@ -24,7 +24,8 @@ class DaskCluster:
         self._folder = folder
         self._environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
         self._started: list[subprocess.Popen[bytes]] = []
-        self._start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port))
+        command = ("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port))
+        self.scheduler = self._start(*command).pid
 
     def add_worker(self, *, another_opencv: bool = False) -> subprocess.Popen[bytes]:
         """One more worker, which nobody starts again when it ends."""
@@ -32,6 +33,11 @@ class DaskCluster:
         preload.write_text(ANOTHER_OPENCV)
         more = ("--preload", str(preload)) if another_opencv else ()
         return self._start("distributed.cli.dask_worker", self.url, "--nthreads", "1", "--no-nanny", *more)
+
+    def wait_for(self, workers: int) -> None:
+        """Return once so many have made themselves known."""
+        logs = [self._folder / f"dask-{number}.log" for number in range(1, len(self._started))]
+        until(lambda: sum("Registered to" in log.read_text() for log in logs) >= workers, 60, f"{workers} workers")
 
     def _start(self, *command: str) -> subprocess.Popen[bytes]:
         with (self._folder / f"dask-{len(self._started)}.log").open("wb") as log:

@@ -20,8 +20,6 @@ from pathlib import Path
 from statistics import median
 from textwrap import fill
 
-import pyarrow.parquet as pq
-
 from benchmarks.page_section import put_section, table
 from benchmarks.replays.runs import Took, carried_out, cpu_a_job_s, rows
 from service.replays.cluster import Cluster
@@ -95,6 +93,8 @@ def measured(folder: Path, jobs: int, kills: int, seed: int) -> Measured:
 def cost(folder: Path, took: dict[str, Took]) -> Cost:
     """Of a job of larger frames, by one process."""
     _say("large")
+    import pyarrow.parquet as pq
+
     archive = folder / "large"
     write_archive(archive, LARGE_JOBS, width=LARGE[0], height=LARGE[1])
     size = sum(path.stat().st_size for path in archive.rglob("*") if path.is_file()) / LARGE_JOBS

@@ -12,8 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
-
 from service.replays.places import Place
 from service.replays.rows import OF_THE_RUN
 from service.replays.run import Progress, Run
@@ -123,6 +121,8 @@ def _cpu_s(process: int | None) -> float:
 
 def rows(output: Path) -> list[dict[str, Any]]:
     """The rows of a table, without what is another each time."""
+    import pyarrow.parquet as pq
+
     return [
         {key: value for key, value in row.items() if key not in OF_THE_RUN} for row in pq.read_table(output).to_pylist()
     ]

@@ -14,10 +14,10 @@ CLUSTER = "pip install 'combtrace[cluster]'"
 
 
 def missing(reason: str) -> NoReturn:
-    """Skip the test for `reason`, or fail it where CI=true: there nothing may be left out in silence."""
+    """Skip the test, or file, for `reason`, or fail it where CI=true: there nothing may be left out in silence."""
     if os.environ.get("CI", "").lower() == "true":
         pytest.fail(reason, pytrace=False)
-    pytest.skip(reason)
+    pytest.skip(reason, allow_module_level=True)
 
 
 def need_module(name: str, install: str) -> ModuleType:

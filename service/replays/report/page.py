@@ -28,9 +28,10 @@ if TYPE_CHECKING:
 
 OWN_STYLE = """
 svg .bar { fill: var(--strong); } svg .middle { text-anchor: middle; font-size: 11px; }
-figure { display: inline-block; margin: 4px 8px 8px 0; vertical-align: top; max-width: 100%; }
+figure { display: inline-block; margin: 4px 8px 8px 0; vertical-align: top; width: 590px; max-width: 100%; }
 figure img { display: inline-block; width: 190px; max-width: 100%; margin-right: 4px; vertical-align: top; }
 figcaption { font-size: 14px; }
+td:first-child { white-space: nowrap; }
 """
 _CODES = {int(reason) for reason in Reason}
 

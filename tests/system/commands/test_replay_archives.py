@@ -136,3 +136,28 @@ def test_a_wrong_question_is_answered_by_what_is_expected(
     assert answer.returncode == 2
     assert told in answer.stderr
     assert os.listdir(tmp_path) == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("module", "words"),
+    [
+        ("pyarrow", ("--archive", "a")),
+        ("fsspec.core", ("--archive", "s3://plant/a")),
+        ("distributed", ("--archive", "{archive}", "--scheduler", "tcp://127.0.0.1:9")),
+    ],
+)
+def test_without_the_extra_it_says_how_to_install_it(
+    module: str, words: tuple[str, ...], archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    given = [word.format(archive=archive) for word in words]
+    answer = called("replay", "--output", tmp_path / "rows.parquet", *given)
+    assert answer.returncode == 2
+    assert "which is not here. Install: pip install 'combtrace[cluster]'" in answer.stderr
+
+
+def test_without_a_scheduler_it_says_what_was_expected(archive: Path, tmp_path: Path) -> None:
+    words = ("--archive", archive, "--output", tmp_path / "rows.parquet", "--scheduler", "somewhere://x")
+    answer = called("replay", *words)
+    assert answer.returncode == 2
+    assert "no Dask scheduler answers there" in answer.stderr

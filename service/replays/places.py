@@ -13,6 +13,8 @@ from service.records.archive import DOCUMENT, FOLDER, TABLES, folder_of
 from service.records.evidence import FRAME, EvidenceError, Flaw
 from service.replays.errors import INSTALL, ReplayError
 
+# s3fs tries five times, and below it botocore would try each five times: a minute for what a bucket does not answer.
+_OPTIONS: Final[dict[str, dict[str, Any]]] = {"s3": {"config_kwargs": {"retries": {"total_max_attempts": 1}}}}
 UNKNOWN: Final = ""  # the end of a job of which nothing was found
 
 
@@ -106,7 +108,7 @@ def _opened(address: str) -> tuple[Any, str]:
         from fsspec.core import url_to_fs
 
         # Listings are read once: kept, those of a million jobs would fill the memory.
-        files, path = url_to_fs(address, use_listings_cache=False)
+        files, path = url_to_fs(address, use_listings_cache=False, **_OPTIONS.get(address.partition(":")[0], {}))
     except ImportError as error:
         raise ReplayError(f"{address}: needs {error.name or 'fsspec'}, which is not here. {INSTALL}") from error
     except ValueError as error:

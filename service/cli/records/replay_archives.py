@@ -92,6 +92,8 @@ def _check(args: argparse.Namespace) -> None:
         raise UserError("--workers and --scheduler exclude each other: a cluster has workers of its own")
     if args.output.suffix != ".parquet" or args.output.is_dir():
         raise UserError(f"--output {args.output}: expected a file that ends in .parquet")
+    if args.limit < 0:
+        raise UserError(f"--limit {args.limit}: expected 0 or more")
     if args.archive and (args.since or args.reason):
         raise UserError("--archive and --since or --reason exclude each other: those are for a journal; see --outcome")
 

@@ -122,6 +122,8 @@ def test_against_this_very_version_nothing_differs_and_conditions_pass(archive: 
         (("--output", "r.parquet", "--archive", "odd://x"), "odd://x: Protocol not known: odd"),
         (("--output", "r.parquet", "--archive", "a", "--archive", "b/a"), "there is a cell 'a' already"),
         (("--output", "r.parquet", "--archive", "a", "--since", "1d"), "those are for a journal"),
+        (("--output", "r.parquet", "--archive", "a", "--limit", "-1"), "--limit -1: expected 0 or more"),
+        (("--output", "r.parquet", "--archive", "a"), "no jobs: the archives hold none"),
         (("--output", "r.parquet", "--archive", "a", "--fail-on", "flip>0"), "did you mean flips?"),
         (("--output", "r.parquet", "--archive", "a", "--against", "nowhere"), "expected a wheel (.whl) or the folder"),
         (("--output", "r.parquet", "--archive", "a", "--against", __file__), "expected a wheel (.whl) or the folder"),

@@ -14,7 +14,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, median
-from contour.geometry.rings import Contour, Ring
+from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.opencv import fewer_vertices, pieces_and_areas
 from contour.image.pixel_sampling import sample_at
 from contour.image.side_by_side import side_by_side
@@ -35,7 +35,8 @@ _NEARBY_PITCHES = 0.8
 _SOFT = 0.2
 # The least cell that a faint wall closes, in squares of the pitch.
 _LEAST_CELL = 0.5
-_LEAST_BAY = 0.1
+# And the largest that a cut opens: with its walls a cell is 0.87 of that, and cells of a block are about alike.
+_LARGEST_CELL, _LEAST_BAY = 1.2, 0.1
 # An opening as large as this is a hole, however narrow; broken walls join fewer cells.
 _HOLE = 5.0
 _SIMPLE_PX = 0.25
@@ -102,28 +103,31 @@ def closed_along(material: MaterialEdge, cuts: Float64s, pitch_px: float) -> Mat
 
     `cuts`: where each begins and ends, (N, 2, 2), pixels.
     """
-    region = material.apart.region.copy()
+    shut = material.apart.region.copy()
     for cut in cuts:
         start, end = (tuple(np.rint(place).astype(int).tolist()) for place in cut)
-        cv2.line(region, start, end, 1)
-    region = _without_bays(_filled(region, pitch_px), material.apart, pitch_px)
+        cv2.line(shut, start, end, 1)
+    region = _without_bays(_filled(shut, pitch_px), shut, material.apart, pitch_px)
     return _outlined(replace(material.apart, region=region), cuts)
 
 
-def _without_bays(closed: Bytes, apart: Apart, pitch_px: float) -> Bytes:
-    """A region without what was added to that of material and shows the table, where cells do not."""
+def _without_bays(closed: Bytes, shut: Bytes, apart: Apart, pitch_px: float) -> Bytes:
+    """A region without what cuts added, `shut` by them, to that of material and is larger than a cell, or shows the
+    table where cells do not.
+    """
     away = np.ones((_FROM_WALL_PX,) * 2, np.uint8)
     free = cv2.erode((apart.difference <= apart.level).astype(np.uint8), away) > 0
     cells = apart.difference[(apart.region > 0) & free]
     floor = median(cells.astype(np.float64)) if len(cells) else 0.0
-    if floor < _FLOOR_LEVELS:
-        return closed
-    labels, area = pieces_and_areas(closed & (1 - apart.region), 4)
-    kept = np.ones(len(area), np.uint8)
-    for number in 1 + np.flatnonzero(area[1:] > _LEAST_BAY * pitch_px * pitch_px):
+    labels, area = pieces_and_areas(closed & (1 - shut), 4)
+    bay = area > _LARGEST_CELL * pitch_px * pitch_px
+    bay[0] = False
+    for number in 1 + np.flatnonzero(area[1:] > _LEAST_BAY * pitch_px * pitch_px) if floor >= _FLOOR_LEVELS else ():
         inner = apart.difference[(labels == number) & free]
-        kept[number] = not len(inner) or median(inner.astype(np.float64)) > _LIKE_FLOOR * floor
-    return closed & kept[labels]
+        bay[number] |= len(inner) and median(inner.astype(np.float64)) <= _LIKE_FLOOR * floor
+    # With the cut across its mouth.
+    bays = cv2.dilate(bay.astype(np.uint8)[labels], np.ones((3, 3), np.uint8))
+    return np.where(bays > 0, apart.region, closed)
 
 
 def _outlined(apart: Apart, cuts: Float64s = _NO_CUTS) -> MaterialEdge:
@@ -137,7 +141,7 @@ def _outlined(apart: Apart, cuts: Float64s = _NO_CUTS) -> MaterialEdge:
         for chain, node in zip(chains, hierarchy[0], strict=True)
         if len(chain) >= 8
     ]
-    exterior, widths, _ = max((one for one in found if not one[2]), key=lambda one: abs(_shoelace(one[0])))
+    exterior, widths, _ = max((one for one in found if not one[2]), key=lambda one: abs(signed_area(one[0])))
     holes = [(_turned(ring, 1.0), wide) for ring, wide, hole in found if hole]
     widths = np.concatenate([widths, *(wide for _, wide in holes)])
     contour = Contour(_turned(exterior, -1.0), tuple(ring for ring, _ in holes))
@@ -304,10 +308,5 @@ def _cyclic_mean(points: Float64s, half: int) -> Float64s:
     return np.asarray(total / (2 * half + 1), np.float64)
 
 
-def _shoelace(ring: Ring) -> float:
-    following = np.roll(ring, -1, axis=0)
-    return float(0.5 * (ring[:, 0] * following[:, 1] - following[:, 0] * ring[:, 1]).sum())
-
-
 def _turned(ring: Ring, sign: float) -> Ring:
-    return ring if _shoelace(ring) * sign > 0 else ring[::-1].copy()
+    return ring if signed_area(ring) * sign > 0 else ring[::-1].copy()

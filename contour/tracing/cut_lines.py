@@ -35,11 +35,12 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence) -> MaterialEdge | Non
     """
     ring = seen.rings[0]
     sure = sure_ends(material, ring, seen)
-    cuts = straight_cuts(
+    lines = straight_cuts(
         material, ring.points[sure], ring.normal[sure], seen.pitch_px, open_px=_OPEN_PITCHES * seen.pitch_px
     )
-    if not len(cuts):
+    if not lines:
         return None
+    cuts = np.concatenate(lines)
     closed = closed_along(material, cuts, seen.pitch_px)
     left = ring.points[sure_ends(closed, ring, seen)]
     off = distances_to_tree(left, BoxTree.of_segments(cuts[:, 0], cuts[:, 1])) if len(left) else np.empty(0)
@@ -48,26 +49,26 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence) -> MaterialEdge | Non
 
 def straight_cuts(
     material: MaterialEdge, ends: Float64s, normals: Float64s, pitch_px: float, *, open_px: float
-) -> Float64s:
-    """Straight cuts that `ends` of walls, (N, 2), pixels, lie on, from corner to corner of the material, (K, 2, 2),
-    most ends first.
+) -> list[Float64s]:
+    """Straight cuts that `ends` of walls, (N, 2), pixels, lie on: for each line, most ends first, from corner to corner
+    of the material, (K, 2, 2), more than one where it crosses a dent.
 
     normals: unit vectors outwards at each end, (N, 2). A line that material stands out of is no cut, and a cut ends
     where nothing touches it for `open_px` pixels.
     """
     border = np.concatenate([densified(ring, 0.5) for ring in material.border])
     near = _NEAR_PX + _NEAR_PITCHES * pitch_px
-    cuts: list[Float64s] = []
-    while len(ends) >= (_FEWEST_MORE if cuts else _FEWEST_ENDS):
+    lines: list[Float64s] = []
+    while len(ends) >= (_FEWEST_MORE if lines else _FEWEST_ENDS):
         line = _line(ends, normals, near, _LEAST_APART_PITCHES * pitch_px)
-        if line is None or line.on_it.sum() < (_FEWEST_MORE if cuts else _FEWEST_ENDS):
+        if line is None or line.on_it.sum() < (_FEWEST_MORE if lines else _FEWEST_ENDS):
             break
-        cut = _from_corner_to_corner(border, ends, line, near, open_px)
-        if cut is None:
+        cuts = _from_corner_to_corner(border, ends, line, near, open_px)
+        if not len(cuts):
             break
-        cuts.append(cut)
+        lines.append(cuts)
         ends, normals = ends[~line.on_it], normals[~line.on_it]
-    return np.array(cuts).reshape(-1, 2, 2)
+    return lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,15 +104,23 @@ def _line(ends: Float64s, normals: Float64s, near: float, apart: float) -> _Line
     return _Line(middle, along, outwards * out, on_it)
 
 
-def _from_corner_to_corner(border: Float64s, ends: Float64s, line: _Line, near: float, gap: float) -> Float64s | None:
-    """Where the border, (M, 2), touches the line first and last without `gap` pixels between, (2, 2); None where its
-    ends are not among that, or material stands out of the line there.
+def _from_corner_to_corner(border: Float64s, ends: Float64s, line: _Line, near: float, gap: float) -> Float64s:
+    """Where the border, (M, 2), touches the line first and last without `gap` pixels between, (K, 2, 2); empty where
+    one of its ends is not among that, or material stands out of the line there.
+
+    Where nothing stands out of the line anywhere, all that touches it was cut along it; else what has ends.
     """
     place, off = (border - line.middle) @ line.along, (border - line.middle) @ line.out
     touching = np.sort(place[(off < near) & (off > -near - _ROUND_PX)])
     own = (ends[line.on_it] - line.middle) @ line.along
-    runs = np.split(touching, np.flatnonzero(np.diff(touching) > gap) + 1)
-    run = next((run for run in runs if len(run) and run[0] < own.min() + gap and run[-1] > own.max() - gap), None)
-    if run is None or (off[(place > run[0]) & (place < run[-1])] > near + _OUT_PX).any():
-        return None
-    return np.array([line.middle + run[0] * line.along, line.middle + run[-1] * line.along])
+    beyond = place[off > near + _OUT_PX]
+    cuts, left = [], np.ones(len(own), np.bool_)
+    for run in np.split(touching, np.flatnonzero(np.diff(touching) > gap) + 1):
+        its = (own > run[0] - gap) & (own < run[-1] + gap) if len(run) else left & False
+        if not len(run) or (len(beyond) and not its.any()):
+            continue
+        if ((beyond > run[0]) & (beyond < run[-1])).any():
+            return np.empty((0, 2, 2))
+        left &= ~its
+        cuts.append(line.middle + np.outer([run[0], run[-1]], line.along))
+    return np.empty((0, 2, 2)) if left.any() else np.array(cuts)

@@ -27,7 +27,7 @@ _MOST_TIPS = 0.2
 # Glints look like ends of walls, and teeth of closed triangles stand out like them: what is both, is one. Of 60 closed
 # lattices none has two, of 45 that were then cut along one line all have three.
 _SAME_PITCHES, _FEWEST_ENDS = 0.4, 2
-# Pixels make teeth of fine cells; of 68 closed lattices of larger ones none has a single end.
+# Pixels make teeth of fine cells; of 68 closed lattices of larger ones none has a single end, nor of 28 of triangles.
 _FINE_PITCH_PX = 12.0
 # Of triangles only what a disc half again as wide as a wall does not get into is one, for so many of its radii: into a
 # tooth of 60 degrees it gets to one radius. Of 17 closed lattices none has such an end, of 17 cut along one line 16.
@@ -49,7 +49,8 @@ def edge_kind(material: MaterialEdge, seen: BlockEvidence) -> Edge:
     sides of the block, mixed, where they lie on one, cells, where there are none.
     """
     sure = [ring.position[sure_ends(material, ring, seen)] for ring in seen.rings]
-    if sum(len(ends) for ends in sure) < (_FEWEST_ENDS if seen.pitch_px < _FINE_PITCH_PX else 1):
+    teeth = seen.pitch_px < _FINE_PITCH_PX and not _triangular(seen)
+    if sum(len(ends) for ends in sure) < (_FEWEST_ENDS if teeth else 1):
         return "cells"
     gaps = _gaps(seen, sure[0])
     return "mixed" if gaps.max() > _LONGEST_WITHOUT_ENDS * gaps.sum() else "cut"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float64s, median
+from contour.geometry.arrays import Bytes, Float64s, median, medians
 from contour.geometry.rings import Ring
 from contour.image.opencv import closed_by_disc
 from contour.tracing.closed_cells import MaterialEdge, closed_along
@@ -13,11 +15,11 @@ from contour.tracing.cut_lines import straight_cuts
 from contour.tracing.trace import Edge
 from contour.walls.comb_likeness import Comb
 
-# Webs of a sheet are wider than most walls; its holes are orderly, and round: a circle fills 0.79 of the box around it,
-# a hexagon 0.75 to 0.87, a square of a chessboard all of it.
+# Webs of a sheet are wider than most walls; its holes are orderly.
 _LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID = 0.2, 0.4, 0.93
-# Squares that hang together by their corners fill less than half of theirs.
-_LEAST_BOXED, _MOST_BOXED = 0.7, 0.89
+# And round: of the circle around it a hole of a dozen pixels and more fills 0.88 at least, a hexagon 0.86 at most. Of
+# smaller ones that cannot be told; squares and drawn-out cells fill 0.72 at most, round ones 0.8 at least.
+_ROUND, _MAYBE_ROUND, _FINE_HOLE_PX = 0.87, 0.76, 12.0
 # Webs of fine cells are not told from walls, which look wider than they are.
 _FINE_PITCH_PX, _WIDER_PX = 15.0, 1.5
 # Of what the sheet differs from the table by, what its holes do: they are in shadow. Ink differs from most tables.
@@ -25,10 +27,14 @@ _LIKE_TABLE = 0.45
 # A disc of so many pitches' radius does not get into a hole that was cut open by less than most of it.
 # It does not get into an inner corner, either, over 0.04 squares of the pitch.
 _BAY_PITCHES, _LEAST_BAY, _LARGE_BAY = 0.45, 0.06, 0.12
+# Corners of webs are rounded: what stands out farthest of them within so many pitches lies on the cut.
+_ROUND_PITCHES = 0.2
 # Edges of webs run along the cut itself, so near and so straight.
 _WEB_PX, _ALONG = 3.0, 0.98
 # An opened hole is less than a pitch wide.
 _OPEN_PITCHES = 1.0
+# Holes smaller than this share of the usual are specks, and fewer make no sheet.
+_SPECK, _FEWEST_HOLES = 1.0 / 3.0, 6
 
 
 def like_plate(comb: Comb | None) -> bool:
@@ -42,45 +48,83 @@ def like_plate(comb: Comb | None) -> bool:
     )
 
 
-def plate_edge(material: MaterialEdge, pitch_px: float) -> tuple[MaterialEdge | None, Edge] | None:
+def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | None, Edge] | None:
     """The outline of a perforated sheet, along a straight cut where that opened its holes, and how its border runs: no
     outline, where more than one cut opened them, as webs end all around then.
 
-    None where it is no sheet: its holes are not round or do not show the table.
+    None where it is no sheet: its holes are not round or do not show the table. `wide`: its webs are wider than walls,
+    so that holes too small to tell may be round.
     """
-    boxed, shade = _holes(material, pitch_px)
-    if not _LEAST_BOXED < boxed < _MOST_BOXED or shade > _LIKE_TABLE:
+    holes = _holes(material)
+    if holes is None or not holes.round(wide=wide) or holes.shade > _LIKE_TABLE:
         return None
+    pitch_px = holes.pitch_px
     corners, normals = _bays(material.apart.region, _LEAST_BAY, pitch_px)
     if not len(corners):
         return material, "cells"
-    cuts = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
-    if len(cuts) != 1:
+    corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
+    lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
+    if len(lines) != 1:
         return None, "cut"
-    closed = closed_along(material, _along_webs(material.contour.rings, cuts[0])[None], pitch_px)
+    cuts = np.array([_along_webs(material.contour.rings, cut) for cut in lines[0]])
+    closed = closed_along(material, cuts, pitch_px)
     return (None, "cut") if len(_bays(closed.apart.region, _LARGE_BAY, pitch_px)[0]) else (closed, "mixed")
 
 
-def _holes(material: MaterialEdge, pitch_px: float) -> tuple[float, float]:
-    """Median share of the smallest box around them that holes fill; and what they differ from the table by, over what
-    the sheet does.
+@dataclass(frozen=True)
+class _Holes:
+    """Holes of a sheet: their pitch and diameter, pixels, the share that they fill of the circle around them, and what
+    they differ from the table by, over what the sheet does; medians.
     """
+
+    pitch_px: float
+    diameter_px: float
+    circled: float
+    shade: float
+
+    def round(self, *, wide: bool) -> bool:
+        """Whether they are round, or may be, as holes too small to tell between `wide` webs."""
+        return self.circled > (_MAYBE_ROUND if wide and self.diameter_px < _FINE_HOLE_PX else _ROUND)
+
+
+def _holes(material: MaterialEdge) -> _Holes | None:
+    """The holes in a sheet; None where there are too few."""
     apart = material.apart
     holes = ((apart.region > 0) & (apart.difference <= apart.level)).astype(np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(holes, connectivity=4)
-    large = np.flatnonzero(stats[:, cv2.CC_STAT_AREA] > 0.1 * pitch_px * pitch_px)[1:]
-    if not len(large):
-        return 1.0, 1.0
-    boxed, shades = [], []
-    for number in large[np.linspace(0, len(large) - 1, min(len(large), 64)).astype(int)]:
-        left, top, wide, high, area = stats[number].tolist()
+    _, labels, stats, middles = cv2.connectedComponentsWithStats(holes, connectivity=4)
+    area = stats[1:, cv2.CC_STAT_AREA].astype(np.float64)
+    # Specks are many, but little of all that is free.
+    ascending = np.sort(area)
+    typical = ascending[np.searchsorted(np.cumsum(ascending), 0.5 * ascending.sum())] if len(area) else 0.0
+    large = 1 + np.flatnonzero(area > _SPECK * typical)
+    if len(large) < _FEWEST_HOLES:
+        return None
+    sampled = large[np.linspace(0, len(large) - 1, min(len(large), 64)).astype(int)]
+    figures = []
+    for number in sampled:
+        left, top, wide, high, size = stats[number].tolist()
         one = labels[top : top + high, left : left + wide] == number
         outline, _ = cv2.findContours(one.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        _, size, _ = cv2.minAreaRect(outline[0])
-        boxed.append(area / ((size[0] + 1) * (size[1] + 1)))
-        shades.append(np.quantile(apart.difference[top : top + high, left : left + wide][one], 0.3))
+        _, radius = cv2.minEnclosingCircle(outline[0])
+        shade = np.quantile(apart.difference[top : top + high, left : left + wide][one], 0.3)
+        # The circle runs through the centres of the outermost pixels.
+        figures.append((size / (np.pi * (radius + 0.5) ** 2), shade))
     sheet = median(2.0 * apart.level[(apart.region > 0) & (holes == 0)].astype(np.float64))
-    return median(np.array(boxed)), median(np.array(shades)) / max(sheet, 1.0)
+    away = np.hypot(*(middles[sampled, None] - middles[large]).T)
+    pitch_px = median(np.sort(away, axis=0)[1])
+    circled, shade = medians(np.array(figures), axis=0).tolist()
+    return _Holes(pitch_px, float(np.sqrt(4.0 / np.pi * typical)), circled, shade / max(sheet, 1.0))
+
+
+def _outermost(material: MaterialEdge, corners: Float64s, normals: Float64s, radius: float) -> Float64s:
+    """What of the material's border stands out farthest within a radius of corners, along normals, (N, 2), pixels."""
+    border = np.concatenate(material.border)
+    moved = corners.copy()
+    for number, (corner, out) in enumerate(zip(corners, normals, strict=True)):
+        near = border[np.hypot(*(border - corner).T) < radius]
+        if len(near):
+            moved[number] = near[np.argmax(near @ out)]
+    return moved
 
 
 def _along_webs(rings: tuple[Ring, ...], cut: Float64s) -> Float64s:

@@ -63,7 +63,7 @@ def wall_tips(
         return plate
     if plate is not None:
         seen = plate
-    if may_be_closed(seen):
+    elif may_be_closed(seen):
         closed, kind = _if_closed(solid, seen)
         # Where something hides the border no walls end either.
         if kind != "mixed" or not doubtful(seen.rings[0], look).any():
@@ -75,7 +75,7 @@ def wall_tips(
     try:
         return _cut(picture, light, (seen, look), rectifier, on_stage)
     except NoBlockFound:
-        if settings.edge == "cut":
+        if settings.edge == "cut" or plate is not None:
             raise
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
         closed, _ = _if_closed(solid, seen)
@@ -235,11 +235,14 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
         material = solid.edge
     except NoBlockFound:
         return None, "cut"
-    kind = edge_kind(material, seen)
-    found = {"cells": material, "mixed": with_cuts(material, seen) if kind == "mixed" else None, "cut": None}[kind]
-    if found is None:
-        return None, kind
-    return replace(solid.around(found), comb=cells.comb, edge=kind), kind
+    kind, comb = edge_kind(material, seen), cells.comb
+    sheet = plate_edge(material, wide=False) if kind == "cells" else None
+    if sheet is not None:
+        # Webs of a sheet do not end as walls do.
+        (found, kind), comb = sheet, replace(comb, plate=True)
+    else:
+        found = {"cells": material, "mixed": with_cuts(material, seen) if kind == "mixed" else None, "cut": None}[kind]
+    return None if found is None else replace(solid.around(found), comb=comb, edge=kind), kind
 
 
 def _plate(solid: _Solid, seen: BlockEvidence) -> Trace | BlockEvidence | None:
@@ -250,7 +253,7 @@ def _plate(solid: _Solid, seen: BlockEvidence) -> Trace | BlockEvidence | None:
         return None
     cells, _ = solid.cells, solid.walls
     try:
-        found = plate_edge(solid.edge, cells.pitch_px)
+        found = plate_edge(solid.edge, wide=True)
     except NoBlockFound:
         return None
     if found is None:

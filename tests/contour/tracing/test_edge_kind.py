@@ -78,6 +78,23 @@ def test_teeth_of_closed_triangles_are_no_ends_of_walls(seed: int, border: Borde
     assert agreement(found.contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
 
 
+@pytest.mark.parametrize(
+    ("seed", "cells"),
+    [(1051003, "over-expanded"), (1051006, "hexagonal"), (1051004, "square")],
+    ids=["two arms", "an end in an arm", "a bay larger than a cell"],
+)
+def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
+    one = lattice(seed, cells, "mixed")
+    found = traced(one)
+    assert found.edge == "mixed"
+    assert agreement(found.contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
+
+
+def test_one_end_among_fine_triangles_is_a_cut() -> None:
+    with pytest.raises(EdgeContradicted, match="was cut there"):
+        traced(lattice(1051004, "triangular", "mixed"))
+
+
 def test_a_border_of_both_kinds_does_not_hold_the_promise_that_it_was_cut() -> None:
     with pytest.raises(EdgeContradicted, match="was cut there"):
         traced(drawn("hexagonal", "mixed"), "cut")

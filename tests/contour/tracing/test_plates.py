@@ -12,7 +12,7 @@ from contour.geometry.rings import Contour
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
 from service.reasons import Reason
-from tests.support.scenes.lattices import Border, lattice
+from tests.support.scenes.lattices import Border, Cells, lattice
 
 TABLE, SHEET = 60, 200
 PITCH, RADIUS = 30, 8
@@ -70,3 +70,18 @@ def test_a_sheet_that_was_cut_through_its_holes_is_traced_along_that(seed: int, 
     near = agreement(found.pixels, one.outline)
     assert near.hausdorff_px < 0.3 * one.pitch_px
     assert near.holds(found.uncertainty_px)
+
+
+@pytest.mark.parametrize("seed", [1051003, 1051005, 1051006])
+def test_webs_that_do_not_end_as_walls_do_are_no_closed_border(seed: int) -> None:
+    one = lattice(seed, "round", "mixed")
+    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), "mixed")
+    assert found.pixels is not None
+    assert agreement(found.pixels, one.outline).hausdorff_px < 0.3 * one.pitch_px
+
+
+@pytest.mark.parametrize(("seed", "cells"), [(1051011, "hexagonal"), (1051013, "over-expanded")])
+def test_cells_between_wide_walls_are_no_round_holes(seed: int, cells: Cells) -> None:
+    found = Measurer(None).measure(lattice(seed, cells, "closed").picture, PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), "cells")

@@ -27,6 +27,8 @@ _USUAL_PITCH_PX = 24.0
 _TAIL, _TAIL_PX = 0.04, 1.0
 # What a fifth of normal deviates stay below in size, times what a second difference both ways adds up: 6 deviations.
 _SECOND_OF_NOISE = 0.2533 * 6.0
+# Nothing in cells of fewer pixels is flat: their noise is that of the table beside them.
+_NOWHERE_FLAT_PX = 6.0
 # Steepest rise of a blurred step, and of a blurred line, over their height: 0.40 and 0.61 of 1/sigma.
 _STEEPEST = 0.5
 # Blur that motion or defocus adds to, variance to variance.
@@ -87,6 +89,8 @@ def block_quality(picture: Bytes, light: Bytes, contour: Contour, pitch_px: floa
     tail = min(_TAIL, _TAIL_PX / pitch_px)
     low, high = _tails(tiles, tail)
     noise = _noise(tiles)
+    if pitch_px < _NOWHERE_FLAT_PX:
+        noise = min(noise, _noise(light[None]))
     # Between such tails of nothing but normal noise there is a spread, too.
     of_noise = 2.0 * NormalDist().inv_cdf(1.0 - tail) * noise
     contrast = np.maximum(high - low - np.float32(of_noise), np.float32(0.0))

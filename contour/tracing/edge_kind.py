@@ -24,14 +24,13 @@ _LONGEST_WITHOUT_ENDS = 0.55
 # Walls that stand out of an outline around material, for each pitch of its convex hull: closed borders have 0.14 at
 # most, cut ones 0.25, unless the floor of their cells is told from the table; then the outline is right all the same.
 _MOST_TIPS = 0.2
-# Glints look like ends of walls, and teeth of closed triangles stand out like them: what is both, is one. Of 60 closed
-# lattices none has two, of 45 that were then cut along one line all have three.
-_SAME_PITCHES, _FEWEST_ENDS = 0.4, 2
-# Pixels make teeth of fine cells; of 68 closed lattices of larger ones none has a single end, nor of 28 of triangles.
-_FINE_PITCH_PX = 12.0
+# Glints look like ends of walls, and teeth of closed triangles stand out like them: what is both, is one.
+_SAME_PITCHES = 0.4
 # Of triangles only what a disc half again as wide as a wall does not get into is one, for so many of its radii: into a
-# tooth of 60 degrees it gets to one radius. Of 17 closed lattices none has such an end, of 17 cut along one line 16.
+# tooth of 60 degrees it gets to one radius. Of 28 closed lattices none has such an end, of 28 cut along one line 26. Of
+# other fine cells, whose pixels make ends of corners: into one of 90 degrees it gets to 0.4 of a radius.
 _THIN_WALLS, _THIN_PX, _THIN_RADII = 0.6, 1.0, 1.15
+_FINE_PITCH_PX, _THIN_FINE_RADII = 12.0, 0.7
 
 
 def may_be_closed(seen: BlockEvidence) -> bool:
@@ -49,8 +48,7 @@ def edge_kind(material: MaterialEdge, seen: BlockEvidence) -> Edge:
     sides of the block, mixed, where they lie on one, cells, where there are none.
     """
     sure = [ring.position[sure_ends(material, ring, seen)] for ring in seen.rings]
-    teeth = seen.pitch_px < _FINE_PITCH_PX and not _triangular(seen)
-    if sum(len(ends) for ends in sure) < (_FEWEST_ENDS if teeth else 1):
+    if not any(len(ends) for ends in sure):
         return "cells"
     gaps = _gaps(seen, sure[0])
     return "mixed" if gaps.max() > _LONGEST_WITHOUT_ENDS * gaps.sum() else "cut"
@@ -59,8 +57,8 @@ def edge_kind(material: MaterialEdge, seen: BlockEvidence) -> Edge:
 def sure_ends(material: MaterialEdge, ring: RingEvidence, seen: BlockEvidence) -> Bools:
     """Which witnesses of a ring are ends of walls at the edge of material, too, shape (N,)."""
     tips = np.concatenate([ring_tips(one, seen.pitch_px, seen.wall_px) for one in material.border])
-    if _triangular(seen):
-        tips = tips[_thin(material, tips, seen.wall_px)]
+    if _triangular(seen) or seen.pitch_px < _FINE_PITCH_PX:
+        tips = tips[_thin(material, tips, seen.wall_px, _THIN_RADII if _triangular(seen) else _THIN_FINE_RADII)]
     if not len(tips):
         return np.zeros(len(ring.points), np.bool_)
     return (ring.kind <= WitnessKind.BLUNT) & (nearest(ring.points, tips) < _SAME_PITCHES * seen.pitch_px)
@@ -70,15 +68,15 @@ def _triangular(seen: BlockEvidence) -> bool:
     return seen.comb is not None and seen.comb.triangular
 
 
-def _thin(material: MaterialEdge, tips: Float64s, wall_px: float) -> Bools:
-    """Which tips of material, (N, 2), pixels, are as thin behind as a wall, shape (N,)."""
+def _thin(material: MaterialEdge, tips: Float64s, wall_px: float, radii: float) -> Bools:
+    """Which tips of material, (N, 2), pixels, are as thin as a wall for so many of its `radii` behind, shape (N,)."""
     radius = _THIN_WALLS * wall_px + _THIN_PX
     pad = int(radius) + 2
     region = cv2.copyMakeBorder(material.apart.region, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
     thick = (cv2.distanceTransform(region, cv2.DIST_L2, 5) > radius).astype(np.uint8)
     away = cv2.distanceTransform(1 - thick, cv2.DIST_L2, 5)
     column, row = (np.rint(tips) + pad).astype(int).T
-    return np.asarray(away[row, column] > (1.0 + _THIN_RADII) * radius)
+    return np.asarray(away[row, column] > (1.0 + radii) * radius)
 
 
 def check_promise(promise: str, kind: Edge, *, traced: bool) -> None:

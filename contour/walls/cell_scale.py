@@ -14,13 +14,16 @@ from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s, median, qu
 from contour.image.opencv import pieces_and_areas
 from contour.image.side_by_side import side_by_side
 from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
-from contour.walls.wall_mask import wall_mask
+from contour.walls.wall_mask import FINE_PITCH, wall_mask
 
 _TILE_PX = 512
 _TILES = 4
 _LARGE_PX = 24_000_000
 # First guesses of the pitch; the mask's windows forgive a factor of two either way.
 _GUESSES = (24.0, 70.0, 8.0)
+# Tried where these show no cells, as noise has patches as small; and the least cells counted then, and else, px².
+_FINEST_GUESS = 4.5
+_FINEST_CELL, _LEAST_CELL = 5, 9
 _GOOD_SCORE = 0.2
 _LEAST_SCORE = 0.14
 _LEAST_CELLS = 6
@@ -60,6 +63,11 @@ class CellScale:
         thin = min(1.0, (_WIDEST_WALL - self.wall_px / self.pitch_px) / _WIDE_WALL)
         return self.regularity * self.filled * self.connected * thin * min(1.0, self.count / 12)
 
+    @property
+    def merged(self) -> bool:
+        """Whether these may be finer cells that run into each other."""
+        return self.pitch_px < FINE_PITCH and not self.comb.cellular
+
     @cached_property
     def comb(self) -> Comb:
         """What tells a comb from other things that have patches side by side."""
@@ -95,14 +103,21 @@ def probe(light: Bytes, polarity: str) -> CellScale:
             best = found
         if best.score > _GOOD_SCORE:
             break
-    # Several small blocks in view fill little of a tile, and do not hang together.
-    if best is None or (best.score < _LEAST_SCORE and not surely_comb(best.comb)):
+    if best is None or not _is_comb(best) or best.merged:
+        finest = [_part_cells(tile, senses, (_FINEST_GUESS,), _FINEST_CELL) for tile in _busiest_tiles(light)[:1]]
+        best = max([one for one in (best, *finest) if one is not None], key=lambda one: one.score, default=None)
+    if best is None or not _is_comb(best):
         seen = " and ".join(_shown(light, bright=bright) for bright in senses)
         raise NoBlockFound(
             f"no block found: the most textured part of the picture shows {seen}, "
             "expected a dozen or more of one size. Check that a block lies in view, the light, and the polarity"
         )
     return best
+
+
+def _is_comb(cells: CellScale) -> bool:
+    # Several small blocks in view fill little of a tile, and do not hang together.
+    return cells.score >= _LEAST_SCORE or surely_comb(cells.comb)
 
 
 def _shown(light: Bytes, *, bright: bool) -> str:
@@ -146,13 +161,15 @@ def _busiest_tiles(light: Bytes) -> list[Bytes]:
     return tiles
 
 
-def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> CellScale | None:
+def _part_cells(
+    part: Bytes, senses: list[bool], guesses: tuple[float, ...], least: int = _LEAST_CELL
+) -> CellScale | None:
     """The best reading of a part over first guesses of the pitch and senses of contrast, read once more with its own
     pitch.
     """
     best: CellScale | None = None
     for guess in guesses:
-        for cells in _in_senses(part, guess, senses):
+        for cells in _in_senses(part, guess, senses, least):
             if cells is not None and (best is None or cells.score > best.score):
                 best = cells
         # Good enough in one sense and guess, while the other sense was heard too.
@@ -160,26 +177,29 @@ def _part_cells(part: Bytes, senses: list[bool], guesses: tuple[float, ...]) -> 
             break
     if best is None:
         return None
-    again = cells_of(part, best.pitch_px, bright=best.bright)
+    again = cells_of(part, best.pitch_px, bright=best.bright, least=least)
     # Faint fine cells are seen better through a wide window.
     same = again is None or abs(again.pitch_px - best.pitch_px) < _SAME_PITCH * best.pitch_px
     return best if again is None or (same and again.score < best.score) else again
 
 
-def _in_senses(part: Bytes, guess: float, senses: list[bool]) -> Sequence[CellScale | None]:
+def _in_senses(part: Bytes, guess: float, senses: list[bool], least: int) -> Sequence[CellScale | None]:
     if len(senses) == 1:
-        return [cells_of(part, guess, bright=senses[0])]
-    return side_by_side(lambda: cells_of(part, guess, bright=True), lambda: cells_of(part, guess, bright=False))
+        return [cells_of(part, guess, bright=senses[0], least=least)]
+    return side_by_side(
+        lambda: cells_of(part, guess, bright=True, least=least),
+        lambda: cells_of(part, guess, bright=False, least=least),
+    )
 
 
-def cells_of(light: Bytes, pitch_px: float, *, bright: bool) -> CellScale | None:
-    """Cells enclosed by the wall mask of `light` made for `pitch_px`; None where fewer than six are."""
+def cells_of(light: Bytes, pitch_px: float, *, bright: bool, least: int = _LEAST_CELL) -> CellScale | None:
+    """Cells of `least` pixels enclosed by the wall mask of `light` made for `pitch_px`; None where fewer than six."""
     seen = wall_mask(light, pitch_px, bright=bright)
     mask = seen.mask
     floor = cv2.bitwise_not(mask)
     _, labels, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
     areas, places, numbers = _enclosed(
-        np.asarray(stats[1:], np.int32), np.asarray(centroids[1:], np.float64), mask.shape
+        np.asarray(stats[1:], np.int32), np.asarray(centroids[1:], np.float64), mask.shape, least
     )
     if len(areas) < _LEAST_CELLS:
         return None
@@ -233,11 +253,15 @@ def _without_sheets(mask: Bytes, side: int) -> Bytes:
     return walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
 
 
-def _enclosed(stats: Int32s, centroids: Float64s, shape: tuple[int, ...]) -> tuple[Float64s, Float64s, Indices]:
-    """Areas (N,), centroids (N, 2) and labels (N,) of the pieces that lie within the part and are no slivers."""
+def _enclosed(
+    stats: Int32s, centroids: Float64s, shape: tuple[int, ...], least: int
+) -> tuple[Float64s, Float64s, Indices]:
+    """Areas (N,), centroids (N, 2) and labels (N,) of the pieces of `least` pixels that lie within the part and are no
+    slivers.
+    """
     left, top, wide, high, area = (stats[:, column] for column in range(5))
     within = (left > 0) & (top > 0) & (left + wide < shape[1]) & (top + high < shape[0])
-    compact = (area > 0.3 * wide * high) & (np.maximum(wide, high) < 4 * np.minimum(wide, high)) & (area >= 9)
+    compact = (area > 0.3 * wide * high) & (np.maximum(wide, high) < 4 * np.minimum(wide, high)) & (area >= least)
     chosen = np.flatnonzero(within & compact)
     return area[chosen].astype(np.float64), centroids[chosen], chosen + 1
 

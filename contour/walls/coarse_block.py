@@ -9,7 +9,7 @@ from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Int32s, median
 from contour.image.opencv import closed_by_disc, pieces_and_areas
 from contour.image.pixel_grid import averaged
-from contour.walls.coarse_rings import PAD, CoarseBlock, sides, with_rings
+from contour.walls.coarse_rings import PAD, CoarseBlock, sides, walls_at_frame, with_rings
 
 # About six and a half samples a pitch hold a wall's place and make every later pass cheap.
 _SAMPLES_PER_PITCH = 6.5
@@ -58,12 +58,13 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     kept &= filled
     shade = _padded(averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
     filled = _fill_missing_cells(filled, kept, shade, _HOLE_RADIUS_PITCHES * samples)
-    if len(sides(filled, samples)) == 4:
+    left = sides(filled, walls_at_frame(mask, kept, step), samples)
+    if len(left) == 4:
         raise NoBlockFound(
             "no block found: a pattern of cells runs out of the picture on all four sides, as a table's does. "
             "Check that a block lies in view with table around it"
         )
-    return with_rings(filled, kept, _strands(walls & (1 - kept), samples), step, samples)
+    return with_rings(filled, kept, _strands(walls & (1 - kept), samples), step, samples, leaves=bool(left))
 
 
 def _main_piece(pieces: Pieces, samples: float) -> Bytes:

@@ -14,6 +14,7 @@ from contour.image.pixel_sampling import sample_at
 
 PAD = 8
 """Samples of margin around the coarse grid."""
+_FRAME_PX = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,14 +107,30 @@ class CoarseBlock:
         return samples_of(points, self.step) + PAD
 
 
-def sides(filled: Bytes, samples: float) -> list[int]:
-    """Sides of the picture (top, bottom, left, right as 0…3) that the block meets over more than half a pitch."""
+def sides(filled: Bytes, at_frame: list[bool], samples: float) -> list[int]:
+    """Sides of the picture (top, bottom, left, right as 0…3) that the block meets over more than half a pitch, with
+    walls in its last pixels: a coarse sample may be several of these wide.
+    """
     inner = filled[PAD:-PAD, PAD:-PAD]
     sides = (inner[:2].max(axis=0), inner[-2:].max(axis=0), inner[:, :2].max(axis=1), inner[:, -2:].max(axis=1))
-    return [number for number, side in enumerate(sides) if np.count_nonzero(side) > 0.5 * samples]
+    return [number for number, side in enumerate(sides) if at_frame[number] and np.count_nonzero(side) > 0.5 * samples]
 
 
-def with_rings(filled: Bytes, walls: Bytes, strands: Bytes, step: int, samples: float) -> CoarseBlock:
+def walls_at_frame(mask: Bytes, walls: Bytes, step: int) -> list[bool]:
+    """Whether a wall of the block, `walls` on the coarse grid, lies in the last two pixels of the wall mask (H, W),
+    uint8, for each side of it: top, bottom, left, right.
+    """
+    own = walls[PAD:-PAD, PAD:-PAD]
+    sides = (
+        (mask[:_FRAME_PX].max(axis=0), own[0]),
+        (mask[-_FRAME_PX:].max(axis=0), own[-1]),
+        (mask[:, :_FRAME_PX].max(axis=1), own[:, 0]),
+        (mask[:, -_FRAME_PX:].max(axis=1), own[:, -1]),
+    )
+    return [bool((line[samples.repeat(step)[: len(line)] > 0] > 0).any()) for line, samples in sides]
+
+
+def with_rings(filled: Bytes, walls: Bytes, strands: Bytes, step: int, samples: float, *, leaves: bool) -> CoarseBlock:
     """The block with the rings around what is filled of it; `samples` is the pitch on the coarse grid."""
     chains, hierarchy = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     order = sorted(range(len(chains)), key=lambda i: (hierarchy[0][i][3] >= 0, -len(chains[i])))
@@ -132,7 +149,6 @@ def with_rings(filled: Bytes, walls: Bytes, strands: Bytes, step: int, samples: 
     inside = cv2.distanceTransform(filled, cv2.DIST_L2, 5)
     outside = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
     depth = np.where(filled > 0, inside - 0.5, 0.5 - outside).astype(np.float32) * step
-    leaves = bool(sides(filled, samples))
     nearest = index_of_label[labels]
     return CoarseBlock(tuple(rings), filled, walls, strands, depth.astype(np.float32), nearest, step, leaves)
 

@@ -58,6 +58,11 @@ class Comb:
     triangular: bool = False
     plate: bool = False
 
+    @property
+    def cellular(self) -> bool:
+        """Whether patches are convex as cells, or lie as cells do."""
+        return self.solid >= _CONVEX or self.order >= _LEAST_ORDER
+
 
 def surely_comb(comb: Comb) -> bool:
     """Whether cells are so many, convex and orderly that they make a comb, in however many pieces it lies."""
@@ -81,7 +86,7 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
             f"walls are {100 * _WIDEST_WALL:g} % at most: a board, a print, a perforated plate, or foam whose cells "
             "are closed. Check that a block lies in view, and set edge: cells for a plate or foam"
         )
-    if comb.solid < _CONVEX and comb.order < _LEAST_ORDER:
+    if not comb.cellular:
         return (
             f"patches {comb.pitch_px:.0f} px apart fill {100 * comb.solid:.0f} % of their convex hulls, and "
             f"{100 * comb.order:.0f} % of them have neighbours all around; at least {100 * _CONVEX:.0f} % or "

@@ -11,7 +11,6 @@ from contour.geometry.arrays import Bools, Bytes, Int32s, Int64s
 from contour.geometry.rings import Ring
 from contour.image.opencv import closed_by_disc
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
-from contour.walls.coarse_rings import CoarseBlock
 
 _SAMPLES_PER_PITCH = 6.5
 _WALL_COVERAGE = 0.12
@@ -23,7 +22,6 @@ _CELL_AREAS = (0.25, 6.0)
 _FEWEST_CELLS = 7
 # Bridges an open cell at the border.
 _CLOSING_PITCHES = 0.72
-_FRAME_PX = 2
 # A strip of swarf beside the block has closed cells of its own, and broken walls have none; but of a block that seems
 # to be in two, parts as large as this may be its own. No such strip has less wall, pitches times pixels.
 _LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
@@ -112,18 +110,6 @@ def _boxes(places: tuple[Int64s, Int64s], piece: Int32s, count: int) -> Int64s:
         np.minimum.at(boxes[axis], piece, places[axis])
         np.maximum.at(boxes[2 + axis], piece, places[axis] + 1)
     return boxes
-
-
-def reaches_frame(mask: Bytes, block: CoarseBlock) -> bool:
-    """Whether a wall of the block lies in the last two pixels of its wall mask (H, W), uint8."""
-    walls, step = block.unpadded(block.walls), block.step
-    sides = (
-        (mask[:_FRAME_PX].max(axis=0), walls[0]),
-        (mask[-_FRAME_PX:].max(axis=0), walls[-1]),
-        (mask[:, :_FRAME_PX].max(axis=1), walls[:, 0]),
-        (mask[:, -_FRAME_PX:].max(axis=1), walls[:, -1]),
-    )
-    return any(bool((line[samples.repeat(step)[: len(line)] > 0] > 0).any()) for line, samples in sides)
 
 
 def _at_border(box: tuple[int, int, int, int], shape: tuple[int, ...]) -> bool:

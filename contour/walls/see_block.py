@@ -13,11 +13,11 @@ from contour.geometry.arrays import Bytes
 from contour.image.pixel_grid import averaged, pixels_of
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.coarse_block import coarse_block
-from contour.walls.coarse_rings import CoarseBlock
+from contour.walls.coarse_rings import CoarseBlock, walls_at_frame
 from contour.walls.dark_material import dark_edge, midway_to_table
 from contour.walls.faint_links import with_faint_links
 from contour.walls.lightness import light_from_table
-from contour.walls.pieces import pieces_beside, reaches_frame, without_loose_pieces
+from contour.walls.pieces import pieces_beside, without_loose_pieces
 from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import FINE_PITCH, WallMask, wall_mask, without_specks
 from contour.walls.wall_witnesses import block_evidence
@@ -98,7 +98,7 @@ def see_block(
     others = pieces_beside(every, coarse.rings[0].vertices, cells.pitch_px / scale, scale)
     evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
-    at_frame = reaches_frame(seen.mask, coarse)
+    at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))
     return replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose)
 
 

@@ -63,10 +63,10 @@ def wall_tips(
         return plate
     if plate is not None:
         seen = plate
-    elif may_be_closed(seen):
+    if may_be_closed(seen):
         closed, kind = _if_closed(solid, seen)
-        # Where something hides the border no walls end either.
-        if kind != "mixed" or not doubtful(seen.rings[0], look).any():
+        # A sheet whose holes are open is not closed. And where something hides the border no walls end either.
+        if not (plate is not None and kind == "cells") and (kind != "mixed" or not doubtful(seen.rings[0], look).any()):
             check_promise(settings.edge, kind, traced=closed is not None)
             if closed is not None:
                 return closed

@@ -85,3 +85,11 @@ def test_webs_that_do_not_end_as_walls_do_are_no_closed_border(seed: int) -> Non
 def test_cells_between_wide_walls_are_no_round_holes(seed: int, cells: Cells) -> None:
     found = Measurer(None).measure(lattice(seed, cells, "closed").picture, PlainRecipe(), 0.0)
     assert (found.reasons, found.edge) == ((), "cells")
+
+
+def test_ends_of_walls_are_asked_where_holes_are_too_small_to_tell() -> None:
+    one = lattice(1051303, "hexagonal", "mixed")
+    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), "mixed")
+    assert found.pixels is not None
+    assert agreement(found.pixels, one.outline).hausdorff_px < 0.3 * one.pitch_px

@@ -14,6 +14,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_validator
 from contour.geometry.rings import ring_defect
 from service.config.cameras import Camera
 from service.config.controllers import Controller, ModbusRtu, NoController
+from service.config.plant import Telemetry
 from service.config.recipes import Recipe
 from service.config.triggers import ControllerTrigger, SerialTrigger, Trigger
 from service.config.values import FilePath, Host, MistakeAt, Model, Point, Port
@@ -154,6 +155,7 @@ class Config(Model):
     remnants: RemnantsSettings | None = Field(None, description="What is left of blocks; none = it is not kept.")
     metrics: Metrics | None = Field(None, description="Figures for Prometheus; none = not served.")
     page: Page | None = Field(None, description="The operator's page; none = not served.")
+    telemetry: Telemetry | None = Field(None, description="What a plant's broker is told; none = nothing.")
     log: Log = Field(default_factory=Log, description="The log.")
 
     _written: dict[int, Recipe] = PrivateAttr(default_factory=dict)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 from pydantic import ValidationError
@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from service.config.adopted_recipes import AdoptedError, with_adopted
 from service.config.config import Config, Service
 from service.config.mistakes import Location, describe
+from service.config.plant import Broker
 from service.config.recipes import Recipe
 from service.config.yaml_mistakes import FileLoader, in_words, unreadable
 
@@ -29,7 +30,10 @@ PATH_KEYS = (
     ("page", "people_file"),
     ("page", "certificate"),
     ("page", "key"),
+    ("telemetry", "password_file"),
 )
+TLS_KEYS = ("ca_file", "cert_file", "key_file")
+BrokerSettings = TypeVar("BrokerSettings", bound=Broker)
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -141,10 +145,20 @@ def _resolved(config: Config, folder: Path) -> Config:
         value = getattr(model, key, None)
         if value is not None:
             updates[section] = model.model_copy(update={key: folder / value})
+    if config.telemetry is not None:
+        updates["telemetry"] = with_tls_files(updates.get("telemetry", config.telemetry), folder)
     if config.adopted_recipes is not None:
         updates["adopted_recipes"] = folder / config.adopted_recipes
     updates["recipes"] = tuple(_resolved_recipe(recipe, folder) for recipe in config.recipes)
     return config.model_copy(update=updates)
+
+
+def with_tls_files(broker: BrokerSettings, folder: Path) -> BrokerSettings:
+    """The same with the paths of its TLS files counted from the folder."""
+    if broker.tls is None:
+        return broker
+    paths = {key: folder / path for key in TLS_KEYS if (path := getattr(broker.tls, key)) is not None}
+    return broker.model_copy(update={"tls": broker.tls.model_copy(update=paths)})
 
 
 def _resolved_recipe(recipe: Recipe, folder: Path) -> Recipe:

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from service.config import cameras, config, controllers, recipes, triggers
+from service.config import cameras, config, controllers, plant, recipes, triggers
 from service.config.config_file import config_schema
 
 HEAD = """\
@@ -48,6 +48,8 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`remnants`", (config.RemnantsSettings,)),
     ("`metrics`", (config.Metrics,)),
     ("`page`", (config.Page,)),
+    ("`telemetry`", (plant.Telemetry,)),
+    ("`telemetry.tls`", (plant.Tls,)),
     ("`log`", (config.Log,)),
 )
 TYPES = {

@@ -54,6 +54,13 @@ class Closeable(Protocol):
         """Let it go."""
 
 
+class Telemetry(Closeable, Protocol):
+    """What tells a broker; `service.telemetry.sender.Sender`."""
+
+    def start(self) -> None:
+        """Begin."""
+
+
 class Page(Protocol):
     """The operator's page; `service.web.server.PageServer`."""
 
@@ -85,6 +92,7 @@ class Parts:
     missed: MissedWatch | None = None
     reloader: Reloader | None = None
     metrics: Closeable | None = None
+    telemetry: Telemetry | None = None
     page: Page | None = None
     state_dir: Path | None = None
     opening: Opening | None = None  # a disk refuses writes: all that is to be done is to wait until this succeeds
@@ -202,6 +210,8 @@ class Daemon:
             add("reload", parts.reloader.run)
         if parts.archive is not None:
             parts.archive.start()
+        if parts.telemetry is not None:
+            parts.telemetry.start()
         if parts.link is not None:
             add(LINK_PART, parts.link.run)
             add("link watch", partial(self._watch_link, parts.link))
@@ -326,8 +336,9 @@ class Daemon:
             parts.camera.close()
         if parts.serial_pool is not None:
             await self._freed(parts.serial_pool, "serial port")
-        if parts.metrics is not None:
-            await asyncio.to_thread(parts.metrics.close)
+        for told in (parts.metrics, parts.telemetry):
+            if told is not None:
+                await asyncio.to_thread(told.close)
         if parts.archive is not None:
             await self._freed(parts.archive.drafting, "archive's disk")
             await asyncio.to_thread(parts.archive.close)

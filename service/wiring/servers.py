@@ -1,4 +1,4 @@
-"""What is served beside the jobs: metrics and the operator's page, which have to be installed only then."""
+"""What is told beside the jobs: metrics, telemetry and the operator's page, which have to be installed only then."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from service.config.controllers import NoController
 from service.daemon.daemon import Parts
 from service.jobs.cycle import Cycle
 from service.probing.probe import ProbeFindings, probed
+from service.telemetry.sources import DaemonSources
 from service.wiring.devices import controller_words, make_controller, single_frames
 from service.wiring.errors import WiringError
 
@@ -24,12 +25,37 @@ def add_metrics(config: Config, parts: Parts, cycle: Cycle, opened: ExitStack) -
     if config.metrics is None:
         return
     try:
-        from service.daemon.metrics import MetricsError, MetricsSources, serve
+        from service.telemetry.metrics import MetricsError, serve
     except ImportError as error:
         raise WiringError(
             f"metrics: {error.name} is not installed. Install combtrace[metrics], or remove metrics"
         ) from error
-    sources = MetricsSources(
+    try:
+        metrics, parts.metrics = serve(config.metrics, daemon_sources(parts, cycle))
+    except MetricsError as error:
+        raise WiringError(str(error)) from error
+    opened.callback(parts.metrics.close)
+    parts.executor.on_settled.append(metrics.job_ended)
+
+
+def add_telemetry(config: Config, parts: Parts, cycle: Cycle, opened: ExitStack) -> None:
+    """Tell a broker where the configuration asks for it; raise WiringError."""
+    if config.telemetry is None or parts.opening is not None:
+        return
+    try:
+        from service.telemetry.sender import Sender
+    except ModuleNotFoundError as error:
+        raise WiringError(
+            f"telemetry: {error.name} is not installed. Install combtrace[mqtt], or remove telemetry"
+        ) from error
+    sources = daemon_sources(parts, cycle)
+    parts.telemetry = Sender(config.telemetry, sources, config.journal.path, config.service.state_dir)
+    opened.callback(parts.telemetry.close)
+
+
+def daemon_sources(parts: Parts, cycle: Cycle) -> DaemonSources:
+    """What may be looked at of these parts from any thread."""
+    return DaemonSources(
         importlib.metadata.version("combtrace"),
         parts.health,
         parts.executor,
@@ -37,13 +63,8 @@ def add_metrics(config: Config, parts: Parts, cycle: Cycle, opened: ExitStack) -
         parts.archive,
         parts.storage,
         lambda: cycle.measurer.guard,
+        lambda: cycle.recipes,
     )
-    try:
-        metrics, parts.metrics = serve(config.metrics, sources)
-    except MetricsError as error:
-        raise WiringError(str(error)) from error
-    opened.callback(parts.metrics.close)
-    parts.executor.on_settled.append(metrics.job_ended)
 
 
 def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:

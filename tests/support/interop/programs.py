@@ -58,6 +58,26 @@ def node_modules(packages: tuple[str, ...] = NPM_PACKAGES) -> Path:
     return folder / "node_modules"
 
 
+@functools.cache
+def python_packages(*packages: str) -> Path:
+    """A folder with these packages and what they need, apart from ours; installed once a run."""
+    folder = _folder()
+    command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--target"]
+    done = subprocess.run([*command, str(folder), *packages], capture_output=True, text=True, timeout=120, check=False)
+    if done.returncode:
+        missing(f"pip cannot install {' and '.join(packages)}: {done.stderr.strip()[-300:]}")
+    return folder
+
+
+@contextlib.contextmanager
+def sparkplug_reader(port: int, file: Path, *host: str) -> Iterator[subprocess.Popen[str]]:
+    """pysparkplug on a broker; it needs an older paho-mqtt than ours, so it has packages of its own."""
+    packages = python_packages("pysparkplug>=0.6,<0.7")
+    words = (HERE / "sparkplug_reader.py", str(port), file, *host)
+    with running(sys.executable, *words, PYTHONPATH=str(packages), PYTHONWARNINGS="ignore") as (process, _):
+        yield process
+
+
 def _folder() -> Path:
     folder = tempfile.TemporaryDirectory(prefix="combtrace-interop-")
     _folders.append(folder)

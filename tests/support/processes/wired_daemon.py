@@ -44,7 +44,7 @@ class WiredDaemon:
             {
                 "camera": {"kind": "files", "path": str(folder)},
                 "calibration": {"file": str(folder / "calibration.yaml")},
-                "controller": {**QUICK, **controller},
+                "controller": controller if controller.get("kind") == "none" else {**QUICK, **controller},
                 "triggers": [{"kind": "controller"}],
                 "service": {"state_dir": str(folder / "state")},
                 "journal": {"path": str(folder / "journal.sqlite")},

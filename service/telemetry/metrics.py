@@ -9,21 +9,17 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, start_http_server
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from service.daemon.storage_watch import StorageWatch
-from service.jobs.executor import Executor
-from service.jobs.health import PARTS, Health
+from service.jobs.health import PARTS
 from service.link.link import Link
-from service.measuring.calibration_guard import CalibrationGuard
-from service.records.archive_writer import ArchiveWriter
 from service.records.job import Job
 from service.state import State
+from service.telemetry.sources import DaemonSources
 
 if TYPE_CHECKING:
     from wsgiref.simple_server import WSGIServer
@@ -45,23 +41,10 @@ class MetricsError(Exception):
     """Metrics cannot be served: where, why, what to do."""
 
 
-@dataclass(frozen=True)
-class MetricsSources:
-    """What is looked at in each scrape; None where the daemon has no such part."""
-
-    version: str
-    health: Health
-    executor: Executor
-    link: Link | None = None
-    archive: ArchiveWriter | None = None
-    storage: StorageWatch | None = None
-    guard: Callable[[], CalibrationGuard | None] = lambda: None
-
-
 class Metrics:
-    """The daemon's registry; `job_ended` counts, all else is looked up in `MetricsSources`."""
+    """The daemon's registry; `job_ended` counts, all else is looked up in `DaemonSources`."""
 
-    def __init__(self, sources: MetricsSources, *, now: Callable[[], float] = time.time) -> None:
+    def __init__(self, sources: DaemonSources, *, now: Callable[[], float] = time.time) -> None:
         self.registry = CollectorRegistry()
         self._now = now
         self._jobs = self._counter("combtrace_jobs", "Jobs that have ended", ("outcome", "reason"))
@@ -105,7 +88,7 @@ def _set(gauge: Gauge, value: float | None) -> None:
 class _Moment(Collector):
     """Gauges that are read when they are asked for; called in the server's thread, so it only reads."""
 
-    def __init__(self, sources: MetricsSources) -> None:
+    def __init__(self, sources: DaemonSources) -> None:
         self._sources = sources
 
     def collect(self) -> Iterator[Metric]:
@@ -204,7 +187,7 @@ class MetricsServer:
         self._thread.join()
 
 
-def serve(settings: Any, sources: MetricsSources) -> tuple[Metrics, MetricsServer]:
+def serve(settings: Any, sources: DaemonSources) -> tuple[Metrics, MetricsServer]:
     """Metrics of a daemon, served as `config.Metrics` says."""
     metrics = Metrics(sources)
     return metrics, MetricsServer(metrics, settings.host, settings.port)

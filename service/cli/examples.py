@@ -31,6 +31,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("combtrace report --from 2026-11-21T06:00 --to 2026-11-21T14:00 --language ru", "A shift, in Russian."),
         ("combtrace report --from 7d --recipe 2 --output week.html", "A week of one recipe."),
     ),
+    "fleet": (("combtrace fleet serve --config fleet.yaml", "One page over all cells of a plant, until stopped."),),
     "remnants": (
         ("combtrace remnants", "What is left of blocks that were cut."),
         ("combtrace remnants --fits part.dxf --margin-mm 3", "Into which of it a part fits, the smallest first."),

@@ -28,7 +28,7 @@ MODULES = (  # of this package, in the order of `--help`
     *("pictures.teach_table", "controller.probe"),
     *("records.jobs", "records.replay", "records.report", "records.remnants"),
     *("daemon.status", "daemon.halt", "daemon.resume", "daemon.confirm", "daemon.reset", "daemon.pin"),
-    "daemon.install_service",
+    *("daemon.install_service", "fleet"),
     *("completion", "schema", "reasons", "controller.register_map"),
 )
 COMMANDS = {module.rpartition(".")[2].replace("_", "-"): f"service.cli.{module}" for module in MODULES}

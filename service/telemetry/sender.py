@@ -33,7 +33,7 @@ BEAT_S = 1.0  # a cell that says nothing for some of these is silent
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 8.0  # before the next connection; drawn, for a plant's cells lose it together
 AT_ONCE = 50  # jobs or changes for which one answer is waited for
 SAVE_S = 60.0
-STOP_S = 2.0
+STOP_S = 1.0  # for what is left to tell, and again for taking leave
 PATIENCE_S = 3.0  # for a thread that hangs in a name's lookup; it is left
 
 
@@ -199,8 +199,19 @@ class Sender:
                 self._beat(session)
             beat_s += BEAT_S * due
             self._send_unsent(session)
-        if not session.waiting and self._host_online:
-            self._send_unsent(session)
+        if self._host_online:
+            self._finish(session)
+
+    def _finish(self, session: Session) -> None:
+        """What is left to tell, until that is confirmed too, or it takes too long."""
+        give_up_at = time.monotonic() + STOP_S
+        while time.monotonic() < give_up_at:
+            if not session.waiting:
+                self._send_unsent(session)
+            if self._awaited is None:
+                break
+            session.turn(0.1)
+            self._look_for_answer(session)
 
     def _look_for_answer(self, session: Session) -> None:
         awaited = self._awaited

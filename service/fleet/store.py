@@ -133,7 +133,7 @@ def _drift(now: tuple[int, float | None], before: tuple[int, float | None]) -> D
 def _row(job: dict[str, Value | None]) -> tuple[int, int, str, float | None, float | None]:
     """As the table has it; what does not fit there is not known."""
     figures = [number(job, name) for name in ("Job/Uncertainty mm", "Job/Blur px")]
-    kept = [figure if figure is not None and math.isfinite(figure) else None for figure in figures]
+    kept = [float(figure) if figure is not None and math.isfinite(figure) else None for figure in figures]
     return (_signed(job["Job/Number"]), _signed(job["Job/Settled"]), text(job, "Job/Outcome"), kept[0], kept[1])
 
 

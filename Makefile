@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc test-deb deb release bench-camera bench bench-link bench-daemon bench-page bench-start bench-replays profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc test-deb deb release bench-camera bench bench-link bench-daemon bench-page bench-start bench-replays bench-plant soak-plant profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -61,6 +61,10 @@ bench-daemon: install
 bench-page: install
 	$(BIN)/python -m benchmarks.daemon.page --write
 
+# What telemetry costs a job, how soon it is there, and the fleet page of fifty cells.
+bench-plant: install
+	$(BIN)/python -m benchmarks.daemon.plant --write
+
 # A command's start and a first trace, over what they cannot be without.
 bench-start: install
 	$(BIN)/python -m benchmarks.start --write
@@ -97,6 +101,10 @@ soak: install
 # Software triggers of a GigE Vision camera on loopback that loses packets and is killed (TRIGGERS=10000), minutes.
 soak-camera: install
 	$(BIN)/python -m tests.soak.gige_run $(if $(TRIGGERS),--triggers $(TRIGGERS))
+
+# Fifty cells at one broker that is killed and started again a hundred times, ten minutes.
+soak-plant: install
+	$(BIN)/python -m tests.soak.plant_run
 
 # One daemon for 20,000 jobs: memory, descriptors, archive (JOBS=3000: fewer, and no report).
 soak-daemon: install

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from service.config.cameras import FilesCamera, GenicamCamera
 from service.config.config import Config
+from service.config.plant import Tls
 
 USER = re.compile(r"[a-z_][a-z0-9_-]{0,30}")
 PLAIN = re.compile(r"[A-Za-z0-9/._:@+,=-]+")
@@ -159,6 +160,9 @@ def _read(config: Config) -> Iterable[Path]:
         yield from filter(
             None, (config.page.token_file, config.page.people_file, config.page.certificate, config.page.key)
         )
+    if config.telemetry is not None:
+        tls = config.telemetry.tls or Tls()
+        yield from filter(None, (config.telemetry.password_file, tls.ca_file, tls.cert_file, tls.key_file))
     yield from filter(None, (recipe.gcode.template for recipe in config.recipes))
     yield from (part.file for recipe in config.recipes for part in recipe.asked_parts)
 

@@ -119,10 +119,10 @@ def _default(field: FieldInfo) -> str:
     value = field.get_default(call_default_factory=True, validated_data={})
     if value is PydanticUndefined or isinstance(value, BaseModel):
         return "see below"
-    if isinstance(value, tuple):
-        return "one, named default" if value else "none"
-    if value is None or value == {}:
+    if value is None or value in ({}, ()):
         return "none"
+    if isinstance(value, tuple):
+        return "one, named default" if isinstance(value[0], BaseModel) else ", ".join(f"`{one}`" for one in value)
     if isinstance(value, bool):
         return str(value).lower()
     return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"

@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 from service.config.plant import Telemetry
@@ -31,6 +32,7 @@ log = logging.getLogger("combtrace.telemetry")
 
 BEAT_S = 1.0  # a cell that says nothing for some of these is silent
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 8.0  # before the next connection; drawn, for a plant's cells lose it together
+GAP_S = 0.1  # from a change to its telling: a job that begins or ends has the processor first
 AT_ONCE = 50  # jobs or changes for which one answer is waited for
 SAVE_S = 60.0
 STOP_S = 1.0  # for what is left to tell, and again for taking leave
@@ -75,6 +77,7 @@ class Sender:
         self._host_online, self._host_said_ms = settings.primary_host is None, 0
         self._rebirth = False
         self._awaited: Awaited | None = None
+        self._due_s = inf  # when what is new is to be told
         self._born_ms = 0
         self._begun_s = time.monotonic()
         self._saved_s = 0.0
@@ -104,7 +107,7 @@ class Sender:
     def _changed(self, state: State, reason: str | None) -> None:
         self._state = self._state_values(state, reason)
         self._changes.add(self._now_ms(), self._state)
-        self._waker.wake()
+        self._is_new()
 
     def _state_values(self, state: State, reason: str | None) -> Values:
         first = self._sources.health.first()
@@ -118,7 +121,13 @@ class Sender:
     def _settled(self, job: Job) -> None:
         if job.outcome is not None:
             self._outcomes[job.outcome] += 1
-        self._waker.wake()
+        self._jobs.due = True
+        self._is_new()
+
+    def _is_new(self) -> None:
+        if self._due_s == inf:
+            self._due_s = time.monotonic() + GAP_S
+            self._waker.wake()
 
     # --- in the sender's thread ---------------------------------------------------------------------------------
 
@@ -184,21 +193,23 @@ class Sender:
     def _live(self, session: Session) -> None:
         """From the birth until the end is asked for, or the host that is waited for has gone."""
         self._birth(session)
+        self._due_s = 0.0
         log.info("telemetry: %s:%d takes it", self._settings.host, self._settings.port)
         self._lost = ""
         beat_s = time.monotonic() + BEAT_S
         while self._host_online and not self._stop.is_set():
-            session.turn(max(0.0, beat_s - time.monotonic()))
+            busy = session.waiting or self._awaited is not None
+            session.turn(max(0.0, (beat_s if busy else min(beat_s, self._due_s)) - time.monotonic()))
             self._look_for_answer(session)
             if session.waiting:  # a slow broker: what it has not taken yet is enough
                 continue
-            due = time.monotonic() >= beat_s
-            if due and self._rebirth:
-                self._birth(session)
-            elif due:
+            now_s = time.monotonic()
+            if now_s >= beat_s:
+                beat_s = now_s + BEAT_S
                 self._beat(session)
-            beat_s += BEAT_S * due
-            self._send_unsent(session)
+                self._due_s = now_s if self._jobs.due else self._due_s
+            if now_s >= self._due_s:
+                self._send_unsent(session)
         if self._host_online:
             self._finish(session)
 
@@ -233,9 +244,11 @@ class Sender:
         """
         if self._awaited is not None:
             return
+        self._due_s = inf  # before it is looked for: what comes meanwhile is due anew
         changes, jobs = self._changes.unsent(AT_ONCE), self._jobs.unsent(AT_ONCE)
         if not changes and not jobs:
             return
+        self._due_s = 0.0  # once it is answered there may be more
         now_ms = self._now_ms()
         if changes:
             metrics = [one for change in changes for one in self._metrics(change.values, change.at_ms)]
@@ -267,7 +280,10 @@ class Sender:
         session.publish(self._node.birth(self._told | self._state | job, TYPES, self._born_ms))
 
     def _beat(self, session: Session) -> None:
-        """What has changed since the last one; the time since the start always has."""
+        """All, where somebody has asked for it; else what has changed since the last: the time since the start has."""
+        if self._rebirth:
+            self._birth(session)
+            return
         now = self._now_values()
         changed = {name: value for name, value in now.items() if value != self._told[name]}
         self._told = now

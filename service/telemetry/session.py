@@ -111,7 +111,7 @@ class Session:
             if broker.username is not None:
                 self._client.username_pw_set(broker.username, password_of(broker))
             if broker.tls is not None:
-                self._client.tls_set_context(_tls_context(broker))
+                self._client.tls_set_context(tls_context(broker))
             self._client.connect(broker.host, broker.port, KEEP_ALIVE_S)
         except (OSError, ValueError) as error:
             self.close()
@@ -241,8 +241,8 @@ def password_of(broker: Broker) -> str | None:
     return lines[0]
 
 
-def _tls_context(broker: Broker) -> ssl.SSLContext:
-    """Raise OSError, ValueError."""
+def tls_context(broker: Broker) -> ssl.SSLContext:
+    """By which the broker is judged, and with what one proves to be oneself; raise OSError, ValueError."""
     tls = broker.tls
     assert tls is not None
     context = ssl.create_default_context(cafile=tls.ca_file)

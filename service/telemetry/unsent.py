@@ -73,20 +73,28 @@ class Jobs:
         """confirmed: number of the last job that a broker has taken."""
         self._journal, self._most = journal, most
         self.confirmed = self._sent = self._gone = confirmed
+        self.due = True  # there may be some; set by whoever knows of a new one
         self.dropped = 0
 
     def again(self) -> None:
         """On a new connection: what was not confirmed is to be sent once more."""
         self._sent = max(self.confirmed, self._gone)
+        self.due = True
 
     def unsent(self, most: int) -> list[Job]:
-        """The oldest that are not sent yet; they count as sent. None where the journal cannot be read now."""
+        """The oldest that are not sent yet; they count as sent. None where none is due, or none can be read now."""
+        if not self.due:
+            return []
+        self.due = False
         try:
             with reading(self._journal) as journal:
-                return self._next(journal, most)
+                found = self._next(journal, most)
         except JournalUnreadable as error:
             log.debug("telemetry: %s", error)
+            self.due = True
             return []
+        self.due |= len(found) == most
+        return found
 
     def _next(self, journal: JournalReader, most: int) -> list[Job]:
         query = "SELECT job_id FROM jobs WHERE job_id > ? ORDER BY job_id DESC LIMIT 1 OFFSET ?"

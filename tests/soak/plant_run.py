@@ -72,21 +72,20 @@ class Lines:
             self.all += [json.loads(line) for line in whole.splitlines()]
         return self.all
 
-    def connections(self) -> int:
-        """How many of the reader there have been."""
-        return sum(line["kind"] == "connected" for line in self.newer())
+    def _connections(self) -> list[int]:
+        """Where the reader says that it has connected."""
+        return [k for k, line in enumerate(self.newer()) if line["kind"] == "connected"]
 
     def leave(self) -> None:
         """Its present connection is about to end."""
-        self._left = self.connections()
+        self._left = len(self._connections())
 
     def born_since_connected(self) -> set[str]:
         """Nodes that the reader saw born on its present connection."""
-        lines = self.newer()
-        last = max((k for k, line in enumerate(lines) if line["kind"] == "connected"), default=len(lines))
-        if self.connections() <= self._left:
+        begins = self._connections()
+        if len(begins) <= self._left:
             return set()
-        return {line["node"] for line in lines[last:] if line["kind"] == "NBIRTH"}
+        return {line["node"] for line in self.all[begins[-1] :] if line["kind"] == "NBIRTH"}
 
 
 class Plant:
@@ -129,7 +128,15 @@ class Plant:
             process.wait()
 
 
-def run(folder: Path, cells: int, processes: int, kills: int, period_s: float = 2.0, up_s: float = 1.0) -> Toll:
+def run(
+    folder: Path,
+    *,
+    cells: int,
+    kills: int,
+    period_s: float = 2.0,
+    up_s: float = 1.0,
+    kill_cells_every: int = KILL_CELLS_EVERY,
+) -> Toll:
     """The broker is up for `up_s` after all cells were born, then killed, `kills` times."""
     toll = Toll(cells=cells)
     nodes = {f"cell-{number}" for number in range(cells)}
@@ -139,13 +146,13 @@ def run(folder: Path, cells: int, processes: int, kills: int, period_s: float = 
         opened.callback(broker.kill)
         opened.enter_context(sparkplug_reader(broker.port, folder / "read.jsonl", HOST))
         lines = Lines(folder / "read.jsonl")
-        plant = Plant(folder, broker.port, cells, processes, period_s)
+        plant = Plant(folder, broker.port, cells, max(2, cells // 10), period_s)
         opened.callback(plant.end)
         for number in range(kills):
             until(lambda: lines.born_since_connected() >= nodes, BOUND_S, "a birth of each", 0.1)
             time.sleep(up_s)
-            if number % KILL_CELLS_EVERY == KILL_CELLS_EVERY - 1:
-                _kill_some(plant, number // KILL_CELLS_EVERY, lines)
+            if number % kill_cells_every == kill_cells_every - 1:
+                _kill_some(plant, number // kill_cells_every, lines)
                 toll.cell_kills += 1
             lines.leave()
             broker.kill()
@@ -235,11 +242,10 @@ def main() -> int:
     """1 where anything was wrong."""
     parser = argparse.ArgumentParser(prog="tests.soak.plant_run", description=__doc__)
     parser.add_argument("--cells", type=int, default=50)
-    parser.add_argument("--processes", type=int, default=5)
     parser.add_argument("--kills", type=int, default=100)
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        toll = run(Path(folder), args.cells, args.processes, args.kills)
+        toll = run(Path(folder), cells=args.cells, kills=args.kills)
     print(toll)
     print("\n".join(toll.wrong[:40]))
     return 1 if toll.wrong else 0

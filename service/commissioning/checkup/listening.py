@@ -1,4 +1,4 @@
-"""Whether metrics and the operator's page could listen where they are configured to."""
+"""Whether metrics and page could listen where they are configured to, and telemetry has what it needs."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from collections.abc import Iterator
 
 from service.check_result import CheckResult, fault, ok
 from service.config.config import Config
+from service.config.plant import Telemetry
 from service.daemon.listening_socket import bound
 
 
 def check_listening(config: Config, running: int | None) -> Iterator[CheckResult]:
-    """Metrics' package, and the ports of metrics and page. running: the process that listens there by rights."""
+    """What metrics, telemetry and page need, ports among it. running: the process that listens there by rights."""
     if config.metrics is not None:
         if importlib.util.find_spec("prometheus_client") is None:
             yield fault(
@@ -21,10 +22,27 @@ def check_listening(config: Config, running: int | None) -> Iterator[CheckResult
             yield fault("metrics", why, "Set another metrics.host or metrics.port")
         else:
             yield ok("metrics", f"{config.metrics.host}:{config.metrics.port}")
+    if config.telemetry is not None:
+        yield _telemetry(config.telemetry)
     if config.page is not None:
         why = _why_not(config.page.host, config.page.port, running)
         if why is not None:
             yield fault("page", why, "Set another page.host or page.port")
+
+
+def _telemetry(settings: Telemetry) -> CheckResult:
+    """Whether it could begin; the broker itself may come and go."""
+    if importlib.util.find_spec("paho") is None:
+        return fault("telemetry", "paho-mqtt is not installed", "Install combtrace[mqtt], or remove telemetry")
+    from service.telemetry.session import password_of, tls_context
+
+    try:
+        password_of(settings)
+        if settings.tls is not None:
+            tls_context(settings)
+    except (OSError, ValueError) as error:
+        return fault("telemetry", str(error), "Check telemetry.password_file and telemetry.tls")
+    return ok("telemetry", f"{settings.group}/{settings.node} to {settings.host}:{settings.port}")
 
 
 def _why_not(host: str, port: int, running: int | None) -> str | None:

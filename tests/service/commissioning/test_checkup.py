@@ -341,6 +341,23 @@ def test_metrics_without_their_package_are_a_fault(tmp_path: Path, monkeypatch: 
     assert (found.level, found.text) == (Level.FAULT, "prometheus_client is not installed")
 
 
+def test_telemetry_needs_its_package_and_a_password_that_is_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "secret").write_text("a word\n")
+    (tmp_path / "secret").chmod(0o644)
+    telemetry = "telemetry: {node: cell-1, username: cell-1, password_file: secret}\n"
+    (found,) = check_listening(config(tmp_path, more=telemetry), None)
+    assert found.level is Level.FAULT
+    assert "others may read it" in found.text
+    (tmp_path / "secret").chmod(0o600)
+    (found,) = check_listening(config(tmp_path, more=telemetry), None)
+    assert (found.level, found.text) == (Level.OK, "combtrace/cell-1 to 127.0.0.1:1883")
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    (found,) = check_listening(config(tmp_path, more=telemetry), None)
+    assert (found.level, found.text) == (Level.FAULT, "paho-mqtt is not installed")
+
+
 # --- the operator's page ------------------------------------------------------------------------------------------
 
 

@@ -53,6 +53,8 @@ def test_no_job_is_told_before_one_that_is_still_executed(path: Path) -> None:
     jobs = Jobs(path, 100, confirmed=0)
     assert numbers(jobs) == first
     journal.settle(running.job_id, Outcome.REFUSED, None, None)
+    assert numbers(jobs) == [], "nobody has said that there is one"
+    jobs.due = True
     assert numbers(jobs) == [running.job_id]
     journal.close()
 

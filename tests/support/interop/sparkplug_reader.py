@@ -54,6 +54,6 @@ client.on_connect, client.on_message = connected, came
 for host in HOST:
     client.will_set(f"spBv1.0/STATE/{host}", state(False), 1, True)
 client.reconnect_delay_set(0.05, 0.1)
-client.connect("127.0.0.1", PORT, 10)
+client.connect("127.0.0.1", PORT, 60)
 print("ready", PORT, flush=True)
 client.loop_forever()

@@ -1,4 +1,4 @@
-"""The dashboard: of Grafana's own schema, and a real Prometheus answers each of its questions of a running daemon.
+"""The dashboards, of a cell and of a plant: of Grafana's own schema, and a real Prometheus answers what they ask.
 
 No package of Debian or npm holds a Grafana server, so its published types stand in for it.
 """
@@ -22,15 +22,19 @@ from tests.support.processes.cell import ON_SAMPLES, Cell
 from tests.support.processes.processes import free_port, until
 from tests.support.real_parts import need_program
 
-FILE = Path(__file__).parents[3] / "packaging" / "grafana" / "combtrace-dashboard.json"
-DASHBOARD: dict[str, Any] = json.loads(FILE.read_text())
-PANELS = [panel for panel in DASHBOARD["panels"] if panel["type"] != "row"]
+PACKAGING = Path(__file__).parents[3] / "packaging"
+FILE = PACKAGING / "grafana" / "combtrace-dashboard.json"
+DASHBOARDS: dict[str, dict[str, Any]] = {
+    file.name: json.loads(file.read_text()) for file in (FILE, PACKAGING / "plant" / "combtrace-plant-dashboard.json")
+}
+PANELS = [panel for one in DASHBOARDS.values() for panel in one["panels"] if panel["type"] != "row"]
 QUESTIONS = {(panel["title"], target["expr"]) for panel in PANELS for target in panel["targets"]}
 NAME = re.compile(r"\b((?:combtrace|process)_[a-z0-9_]+)\b")
 PROMETHEUS_INSTALL = "apt-get install prometheus"
 SCHEMA = ("@grafana/schema@13", "typescript@5")
 # What a cell that accepts every block does not count; its calibration says not when it was made.
 UNANSWERED = {"Refused and failed by reason", "Triggers not taken", "Calibration's age"}
+UNANSWERED |= {"Refused of all jobs, an hour", "Refused", "Oldest calibration"}
 TYPES = """
 import type { Dashboard, GraphFieldConfig } from "@grafana/schema";
 import type { Options as Stat } from "@grafana/schema/dist/esm/raw/composable/stat/panelcfg/x/StatPanelCfg_types.gen";
@@ -78,8 +82,9 @@ def compiles() -> Callable[[dict[str, Any]], str]:
     return said
 
 
-def test_the_dashboard_is_of_grafanas_schema(compiles: Callable[[dict[str, Any]], str]) -> None:
-    assert compiles(DASHBOARD) == ""
+@pytest.mark.parametrize("name", DASHBOARDS)
+def test_the_dashboard_is_of_grafanas_schema(compiles: Callable[[dict[str, Any]], str], name: str) -> None:
+    assert compiles(DASHBOARDS[name]) == ""
 
 
 @pytest.mark.parametrize(
@@ -94,8 +99,10 @@ def test_what_is_none_of_grafanas_does_not_compile(
     assert "error TS" in compiles(json.loads(text.replace(right, wrong)))
 
 
-def test_no_two_panels_lie_on_each_other_or_share_a_number() -> None:
-    places = [panel["gridPos"] for panel in DASHBOARD["panels"]]
+@pytest.mark.parametrize("name", DASHBOARDS)
+def test_no_two_panels_lie_on_each_other_or_share_a_number(name: str) -> None:
+    panels = DASHBOARDS[name]["panels"]
+    places = [panel["gridPos"] for panel in panels]
     cells = [
         (x, y)
         for place in places
@@ -104,7 +111,7 @@ def test_no_two_panels_lie_on_each_other_or_share_a_number() -> None:
     ]
     assert len(cells) == len(set(cells))
     assert max(x for x, _ in cells) < 24
-    assert len({panel["id"] for panel in DASHBOARD["panels"]}) == len(DASHBOARD["panels"])
+    assert len({panel["id"] for panel in panels}) == len(panels)
 
 
 # --- the questions ----------------------------------------------------------------------------------------------------

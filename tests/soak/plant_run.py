@@ -105,8 +105,8 @@ class Plant:
             return subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log, env=environment)
 
     def kill_some(self, k: int) -> set[str]:
-        """kill -9 one process, and start it again; its cells."""
-        k %= len(self._running)
+        """kill -9 one process, but for the last, and start it again; its cells."""
+        k %= len(self._running) - 1
         self._running[k].kill()
         self._running[k].wait()
         names = {f"cell-{number}" for number in range(k * self._each, (k + 1) * self._each)}
@@ -217,7 +217,7 @@ def _judge(toll: Toll, folder: Path, nodes: set[str], lines: list[dict[str, Any]
         births = [line["metrics"][0]["value"] for line in lines if (line["kind"], line["node"]) == ("NBIRTH", node)]
         pairs = itertools.pairwise(births)
         toll.wrong += [f"{node}: bdSeq {new} after {old}" for old, new in pairs if not 1 <= (new - old) % 256 <= 3]
-        if node not in killed:  # what a process had in memory dies with it
+        if node not in killed:  # what a process has in memory dies with it
             toll.wrong += _changes_wrong(toll, folder / node / "changes.json", node, lines)
 
 

@@ -30,7 +30,7 @@ def need_module(name: str, install: str) -> ModuleType:
 
 def need_program(name: str, install: str) -> str:
     """The path of program `name`; without it the test skips with the command that installs it."""
-    path = shutil.which(name)
+    path = shutil.which(name) or shutil.which(name, path="/usr/sbin:/sbin")  # where an ordinary user does not look
     if path is None:
         missing(f"{name} is not here. Install it: {install}")
     return path

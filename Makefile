@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: install demo test test-camera test-linuxcnc test-deb deb release bench-camera bench bench-link bench-daemon bench-page bench-start bench-replays bench-plant soak-plant profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
+.PHONY: install demo test test-camera test-linuxcnc test-deb deb release bench-camera bench bench-link bench-daemon bench-page bench-start bench-replays bench-plant soak-plant bench-opcua profile accuracy methods refusals rules soak soak-camera soak-daemon hil check format clean
 
 install: $(STAMP)
 
@@ -64,6 +64,9 @@ bench-page: install
 # What telemetry costs a job, how soon it is there, and the fleet page of fifty cells.
 bench-plant: install
 	$(BIN)/python -m benchmarks.daemon.plant --write
+# What node-opcua sees of 1,000 jobs, and what OPC UA's clients cost a job.
+bench-opcua: install
+	$(BIN)/python -m benchmarks.daemon.opcua --write
 
 # A command's start and a first trace, over what they cannot be without.
 bench-start: install

@@ -42,6 +42,7 @@ def start_logging(level: int, form: Format = "text") -> None:
     logging.basicConfig(handlers=[handler], level=logging.WARNING)
     logging.getLogger("combtrace").setLevel(level)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
+    logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # what counts of it we say ourselves
 
 
 def journald_reads(stream: TextIO, environment: Mapping[str, str] = os.environ) -> bool:

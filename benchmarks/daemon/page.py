@@ -19,12 +19,13 @@ import tempfile
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median, stdev
 from textwrap import fill
+from typing import Protocol
 
 from playwright.sync_api import Response, sync_playwright
 
@@ -147,15 +148,26 @@ class Cost:
     processor_ms: float
 
 
-def viewers_cost(cell: Cell, port: int, rounds: int, viewer: type[Viewer] = Viewer) -> Cost:
+class Beside(Protocol):
+    """Who is there during a round."""
+
+    def close(self) -> None:
+        """End it."""
+
+
+Comes = Callable[[int], Beside]
+
+
+def viewers_cost(cell: Cell, port: int, rounds: int, viewer: Comes = Viewer, instead: Comes | None = None) -> Cost:
     """From jobs of the same picture, in rounds with a viewer and in those without beside them, each first in turn.
 
+    instead: who is there in rounds without a viewer.
     The median of the ratios of every such two jobs; its standard error by drawing rounds anew.
     """
     ratios, used = list[list[float]](), list[float]()
     for number in range(rounds):
         with_viewer = [number % 2 == 1, number % 2 == 0]
-        found = {watched: _round(cell, port, viewer if watched else None) for watched in with_viewer}
+        found = {watched: _round(cell, port, viewer if watched else instead) for watched in with_viewer}
         (seen, seen_ms), (alone, alone_ms) = found[True], found[False]
         ratios.append([one / other for name in seen for one in seen[name] for other in alone.get(name, ())])
         used.append(seen_ms - alone_ms)
@@ -168,7 +180,7 @@ def _cost(ratios: list[list[float]]) -> float:
     return 100 * (median(ratio for of_round in ratios for ratio in of_round) - 1)
 
 
-def _round(cell: Cell, port: int, viewer: type[Viewer] | None) -> tuple[dict[str, list[float]], float]:
+def _round(cell: Cell, port: int, viewer: Comes | None) -> tuple[dict[str, list[float]], float]:
     """Total times of jobs by picture, ms, and processor that the daemon took for one.
 
     viewer: who watches at the page's port.

@@ -163,6 +163,8 @@ def _read(config: Config) -> Iterable[Path]:
     if config.telemetry is not None:
         tls = config.telemetry.tls or Tls()
         yield from filter(None, (config.telemetry.password_file, tls.ca_file, tls.cert_file, tls.key_file))
+    if config.opcua is not None:
+        yield from filter(None, (config.opcua.users_file, config.opcua.certificate, config.opcua.key))
     yield from filter(None, (recipe.gcode.template for recipe in config.recipes))
     yield from (part.file for recipe in config.recipes for part in recipe.asked_parts)
 

@@ -92,6 +92,12 @@ class Metrics(Model):
     port: Port = Field(9771, description="TCP port.")
 
 
+def _certificate_with_key(found: Any) -> Any:
+    if (found.certificate is None) != (found.key is None):
+        raise ValueError("certificate and key: only one of them is given, expected both or none")
+    return found
+
+
 class Page(Model):
     """The operator's page and its REST interface over HTTP; needs the extra combtrace[page]."""
 
@@ -114,11 +120,25 @@ class Page(Model):
     certificate: FilePath | None = Field(None, description="TLS certificate chain, PEM; none = plain HTTP.")
     key: FilePath | None = Field(None, description="Private key of the certificate, PEM.")
 
-    @model_validator(mode="after")
-    def _certificate_with_key(self) -> Self:
-        if (self.certificate is None) != (self.key is None):
-            raise ValueError("certificate and key: only one of them is given, expected both or none")
-        return self
+    _with_key = model_validator(mode="after")(_certificate_with_key)
+
+
+class Opcua(Model):
+    """An OPC UA server by OPC 40100-1 (Machine Vision), signed and encrypted; needs the extra combtrace[opcua]."""
+
+    host: Host = Field("127.0.0.1", description="Address to listen on; anything but loopback is open to the network.")
+    port: Port = Field(4840, description="TCP port.")
+    users_file: FilePath | None = Field(
+        None,
+        description="File of mode 0600, a line 'name password' a user, who may halt and reset; none = nobody may, and "
+        "clients with a trusted certificate read.",
+    )
+    certificate: FilePath | None = Field(
+        None, description="The server's certificate, PEM; none = made at the first start in opcua/ of the state folder."
+    )
+    key: FilePath | None = Field(None, description="Private key of the certificate, PEM, mode 0600.")
+
+    _with_key = model_validator(mode="after")(_certificate_with_key)
 
 
 class Log(Model):
@@ -156,6 +176,7 @@ class Config(Model):
     metrics: Metrics | None = Field(None, description="Figures for Prometheus; none = not served.")
     page: Page | None = Field(None, description="The operator's page; none = not served.")
     telemetry: Telemetry | None = Field(None, description="What a plant's broker is told; none = nothing.")
+    opcua: Opcua | None = Field(None, description="An OPC UA server; none = not served.")
     log: Log = Field(default_factory=Log, description="The log.")
 
     _written: dict[int, Recipe] = PrivateAttr(default_factory=dict)
@@ -238,9 +259,12 @@ class Config(Model):
         return self
 
     @model_validator(mode="after")
-    def _page_and_metrics_have_a_port_each(self) -> Self:
-        if self.page is not None and self.metrics is not None and self.page.port == self.metrics.port:
-            raise ValueError(f"page.port and metrics.port are both {self.page.port}. Give each its own")
+    def _each_listener_has_a_port(self) -> Self:
+        names = [name for name in ("page", "metrics", "opcua") if getattr(self, name) is not None]
+        ports = [getattr(self, name).port for name in names]
+        for k, port in _repeated(ports):
+            first = names[ports.index(port)]
+            raise ValueError(f"{first}.port and {names[k]}.port are both {port}. Give each its own")
         return self
 
     @field_validator("work_area_mm")

@@ -31,6 +31,9 @@ PATH_KEYS = (
     ("page", "certificate"),
     ("page", "key"),
     ("telemetry", "password_file"),
+    ("opcua", "users_file"),
+    ("opcua", "certificate"),
+    ("opcua", "key"),
 )
 TLS_KEYS = ("ca_file", "cert_file", "key_file")
 BrokerSettings = TypeVar("BrokerSettings", bound=Broker)

@@ -50,6 +50,7 @@ SECTIONS: tuple[tuple[str, tuple[type[BaseModel], ...]], ...] = (
     ("`page`", (config.Page,)),
     ("`telemetry`", (plant.Telemetry,)),
     ("`telemetry.tls`", (plant.Tls,)),
+    ("`opcua`", (config.Opcua,)),
     ("`log`", (config.Log,)),
 )
 TYPES = {

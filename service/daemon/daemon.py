@@ -61,8 +61,8 @@ class Telemetry(Closeable, Protocol):
         """Begin."""
 
 
-class Page(Protocol):
-    """The operator's page; `service.web.server.PageServer`."""
+class Served(Protocol):
+    """What is served beside the jobs: the operator's page, OPC UA."""
 
     async def run(self, operations: Operations) -> None:
         """Serve it for ever."""
@@ -93,7 +93,8 @@ class Parts:
     reloader: Reloader | None = None
     metrics: Closeable | None = None
     telemetry: Telemetry | None = None
-    page: Page | None = None
+    page: Served | None = None
+    opcua: Served | None = None
     state_dir: Path | None = None
     opening: Opening | None = None  # a disk refuses writes: all that is to be done is to wait until this succeeds
     begin_anew: bool = False  # it did: the parts have ended, to be built as they should be
@@ -169,8 +170,9 @@ class Daemon:
         triggers = ControlTriggers(parts.executor, parts.journal)
         server = ControlServer(parts.state_dir, operations.commands(), triggers.streams())
         self.supervisor.add(CONTROL_PART, server.run)
-        if parts.page is not None:
-            self.supervisor.add("page", partial(parts.page.run, operations))
+        for name, served in (("page", parts.page), ("opcua", parts.opcua)):
+            if served is not None:
+                self.supervisor.add(name, partial(served.run, operations))
 
     def _before_reset(self) -> None:
         self._ports_are_being_opened()

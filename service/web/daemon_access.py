@@ -205,13 +205,22 @@ class DaemonAccess:
         return await self._asked(work(), PROBE_BOUND_S)
 
     async def _asked(self, work: Coroutine[Any, Any, T], bound_s: float = ANSWER_BOUND_S) -> T:
-        """What `work` gives in the daemon's loop. Once begun it comes to its end there, whoever goes away here."""
-        if self._loop is None or self._loop.is_closed():
-            work.close()
-            raise DaemonSilent("the service has ended")
-        answer = asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, self._loop))
-        try:
-            async with asyncio.timeout(bound_s):
-                return await asyncio.shield(answer)
-        except TimeoutError as error:
-            raise DaemonSilent(f"the service has not answered for {bound_s:g} s. See its log") from error
+        return await answered(self._loop, work, bound_s)
+
+
+async def answered(
+    loop: asyncio.AbstractEventLoop | None, work: Coroutine[Any, Any, T], bound_s: float = ANSWER_BOUND_S
+) -> T:
+    """What `work` gives in the daemon's loop, asked from another; raise DaemonSilent.
+
+    Once begun it comes to its end there, whoever goes away here.
+    """
+    if loop is None or loop.is_closed():
+        work.close()
+        raise DaemonSilent("the service has ended")
+    answer = asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, loop))
+    try:
+        async with asyncio.timeout(bound_s):
+            return await asyncio.shield(answer)
+    except TimeoutError as error:
+        raise DaemonSilent(f"the service has not answered for {bound_s:g} s. See its log") from error

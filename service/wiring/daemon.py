@@ -44,7 +44,7 @@ from service.wiring.devices import controller_names, make_camera, make_controlle
 from service.wiring.errors import WiringError
 from service.wiring.plan import make_plan, plan_of, sound_plan
 from service.wiring.remnants import remnants_keeper
-from service.wiring.servers import add_metrics, add_page, add_telemetry
+from service.wiring.servers import add_metrics, add_opcua, add_page, add_telemetry
 from service.wiring.triggers import add_triggers
 
 log = logging.getLogger("combtrace.daemon")
@@ -110,6 +110,7 @@ def build(
         add_metrics(config, parts, cycle, opened)
         add_telemetry(config, parts, cycle, opened)
         add_page(config, parts, cycle)
+        add_opcua(config, parts, cycle)
         opened.pop_all()
     return parts
 

@@ -1,4 +1,4 @@
-"""What is told beside the jobs: metrics, telemetry and the operator's page, which have to be installed only then."""
+"""What is told beside the jobs: metrics, telemetry, page and OPC UA, which have to be installed only then."""
 
 from __future__ import annotations
 
@@ -109,6 +109,23 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
         parts.page = make_page(config.page, sources)
     except PageError as error:
         raise WiringError(str(error)) from error
+
+
+def add_opcua(config: Config, parts: Parts, cycle: Cycle) -> None:
+    """Serve OPC UA where the configuration asks for it; raise WiringError."""
+    if config.opcua is None:
+        return
+    try:
+        from service.opcua.server import OpcuaServer, OpcuaSources
+        from service.opcua.trust import OpcuaError
+    except ModuleNotFoundError as error:
+        raise WiringError(f"opcua: {error.name} is not installed. Install combtrace[opcua], or remove opcua") from error
+    folder = config.service.state_dir / "opcua"
+    sources = OpcuaSources(parts.health, parts.executor, parts.journal, lambda: cycle.recipes, folder)
+    try:
+        parts.opcua = OpcuaServer(config.opcua, sources)
+    except OpcuaError as error:
+        raise WiringError(f"opcua: {error}") from error
 
 
 def _commission_sources(config: Config, parts: Parts) -> CommissionSources:

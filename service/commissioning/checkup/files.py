@@ -11,6 +11,7 @@ from contour.calibration.calibration import Calibration
 from contour.errors import CalibrationError
 from contour.geometry.rings import bounding_box
 from service.check_result import CheckResult, fault, ok, warning
+from service.commissioning.checkup.opcua import check_opcua
 from service.commissioning.checkup.page import check_page
 from service.config.adopted_recipes import load_adopted
 from service.config.config import Config
@@ -35,7 +36,7 @@ def summary(config: Config) -> str:
 
 
 def check_files(config: Config) -> Iterator[CheckResult]:
-    """Calibration, sizes of methods, exports, table, and what the operator's page needs."""
+    """Calibration, sizes of methods, exports, table, and what page and OPC UA need."""
     yield from check_calibration(config)
     yield from _sizes(config)
     yield from _exports(config)
@@ -46,6 +47,8 @@ def check_files(config: Config) -> Iterator[CheckResult]:
         yield _table(config)
     if config.page is not None:
         yield from check_page(config.page)
+    if config.opcua is not None:
+        yield from check_opcua(config.opcua, config.service.state_dir)
 
 
 def check_calibration(config: Config) -> Iterator[CheckResult]:

@@ -1,4 +1,6 @@
-"""Whether metrics and page could listen where they are configured to, and telemetry has what it needs."""
+"""Whether metrics, the operator's page and OPC UA could listen where they are configured to, and telemetry has what it
+needs.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from service.daemon.listening_socket import bound
 
 
 def check_listening(config: Config, running: int | None) -> Iterator[CheckResult]:
-    """What metrics, telemetry and page need, ports among it. running: the process that listens there by rights."""
+    """What metrics, telemetry, page and OPC UA need, ports among it. running: the process that listens by rights."""
     if config.metrics is not None:
         if importlib.util.find_spec("prometheus_client") is None:
             yield fault(
@@ -24,10 +26,11 @@ def check_listening(config: Config, running: int | None) -> Iterator[CheckResult
             yield ok("metrics", f"{config.metrics.host}:{config.metrics.port}")
     if config.telemetry is not None:
         yield _telemetry(config.telemetry)
-    if config.page is not None:
-        why = _why_not(config.page.host, config.page.port, running)
+    for name in ("page", "opcua"):
+        settings = getattr(config, name)
+        why = None if settings is None else _why_not(settings.host, settings.port, running)
         if why is not None:
-            yield fault("page", why, "Set another page.host or page.port")
+            yield fault(name, why, f"Set another {name}.host or {name}.port")
 
 
 def _telemetry(settings: Telemetry) -> CheckResult:

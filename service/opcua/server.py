@@ -25,7 +25,7 @@ from service.jobs.health import Health
 from service.opcua.bounded import ListeningServer
 from service.opcua.methods import Methods
 from service.opcua.session import MOST_CONNECTIONS, CellServer, Rules
-from service.opcua.trust import OpcuaError, OwnCertificate, Trust, own_certificate
+from service.opcua.trust import OpcuaError, OwnCertificate, Trust, own_certificate, read_own
 from service.opcua.vision_system import StateSeen, VisionSystem, method_id, vision_system
 from service.records.job import Job
 from service.records.journal import Journal
@@ -57,16 +57,13 @@ class OpcuaServer:
     """Listens from the start, answers while `run` runs."""
 
     def __init__(self, settings: Opcua, sources: OpcuaSources) -> None:
-        """Raise OpcuaError where users, certificate, folder or address cannot be used."""
+        """Raise OpcuaError where users, a certificate of the plant's, or the address cannot be used."""
         self._settings = settings
         self._sources = sources
         self._trust = Trust(sources.folder)
         self._users = users_of(settings)
-        self._own = own_certificate(settings, sources.folder)
-        try:
-            self._trust.open()
-        except OSError as error:
-            raise OpcuaError(f"{sources.folder}: no folders can be made there: {error.strerror}") from error
+        if settings.certificate is not None and settings.key is not None:
+            read_own(settings.certificate, settings.key)
         self._socket: socket.socket | None = _listening(settings)
         self._untold: deque[StateSeen | Job] = deque(maxlen=MOST_UNTOLD)
         self._wake: Callable[[], None] = lambda: None
@@ -82,8 +79,9 @@ class OpcuaServer:
         methods = Methods(asyncio.get_running_loop(), operations, self._sources.journal, health)
         while True:
             why = await self._served(methods)
-            log.error("opcua: the server ended and is started again in %g s: %s", AGAIN_S, why, exc_info=why)
-            health.warn(PART, f"the OPC UA server ended: {why}. Report it with the log")
+            told = None if isinstance(why, OpcuaError) else why
+            log.error("opcua: not served, tried again in %g s: %s", AGAIN_S, why, exc_info=told)
+            health.warn(PART, f"OPC UA is not served: {why}")
             await asyncio.sleep(AGAIN_S)
             health.warn(PART, None)
 
@@ -115,6 +113,11 @@ class OpcuaServer:
             thread.shutdown(wait=False)
         return OpcuaError("it ended, expected it to run for ever")
 
+    def close(self) -> None:
+        """Listen no more, where it has not begun to serve."""
+        if self._socket is not None:
+            self._socket.close()
+
     def _changed(self, state: State, reason: str | None) -> None:
         self._untold.append(StateSeen(datetime.now(UTC), state, reason, self._sources.health.job))
         self._wake()
@@ -125,11 +128,13 @@ class OpcuaServer:
 
     async def _serve(self, methods: Methods, wake: asyncio.Event) -> None:
         """In the server's own thread."""
+        self._trust.open()
+        own = await asyncio.to_thread(own_certificate, self._settings, self._sources.folder)
         rules = Rules(self._trust, self._users)
         listener, self._socket = self._socket or _listening(self._settings), None
         with closing(listener):
             server = ListeningServer(CellServer(rules), listener)
-            await _prepared(server, self._own, self.address)
+            await _prepared(server, own, self.address)
             cell = await vision_system(server)
             rules.reading[method_id("ResultManagement.GetResultById")] = methods.get_result
             rules.ordering[method_id("VisionStateMachine.Halt")] = methods.halt

@@ -108,9 +108,12 @@ class Trust:
         return self.folder / "trusted"
 
     def open(self) -> None:
-        """Make the folders; raise OSError."""
-        for folder in (self.trusted, self.folder / "rejected"):
-            folder.mkdir(parents=True, exist_ok=True)
+        """Make the folders; raise OpcuaError."""
+        try:
+            for folder in (self.trusted, self.folder / "rejected"):
+                folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OpcuaError(f"{self.folder}: no folders can be made there: {error.strerror}") from error
 
     def why_not(self, certificate: bytes | None) -> str | None:
         """Why a client with this certificate (DER) is not trusted; None where it is. One not known is kept to look at.

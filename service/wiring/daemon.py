@@ -109,8 +109,8 @@ def build(
         add_triggers(config, parts, opened)
         add_metrics(config, parts, cycle, opened)
         add_telemetry(config, parts, cycle, opened)
+        add_opcua(config, parts, cycle, opened)
         add_page(config, parts, cycle)
-        add_opcua(config, parts, cycle)
         opened.pop_all()
     return parts
 

@@ -111,7 +111,7 @@ def add_page(config: Config, parts: Parts, cycle: Cycle) -> None:
         raise WiringError(str(error)) from error
 
 
-def add_opcua(config: Config, parts: Parts, cycle: Cycle) -> None:
+def add_opcua(config: Config, parts: Parts, cycle: Cycle, opened: ExitStack) -> None:
     """Serve OPC UA where the configuration asks for it; raise WiringError."""
     if config.opcua is None:
         return
@@ -123,9 +123,10 @@ def add_opcua(config: Config, parts: Parts, cycle: Cycle) -> None:
     folder = config.service.state_dir / "opcua"
     sources = OpcuaSources(parts.health, parts.executor, parts.journal, lambda: cycle.recipes, folder)
     try:
-        parts.opcua = OpcuaServer(config.opcua, sources)
+        server = parts.opcua = OpcuaServer(config.opcua, sources)
     except OpcuaError as error:
         raise WiringError(f"opcua: {error}") from error
+    opened.callback(server.close)
 
 
 def _commission_sources(config: Config, parts: Parts) -> CommissionSources:

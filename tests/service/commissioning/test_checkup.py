@@ -20,16 +20,18 @@ from service.cli.main import main
 from service.commissioning.checkup.devices import check_devices
 from service.commissioning.checkup.files import check_files
 from service.commissioning.checkup.listening import check_listening
+from service.commissioning.checkup.opcua import check_opcua
 from service.commissioning.checkup.page import check_page
 from service.commissioning.checkup.running import holder
 from service.commissioning.checkup.storage import check_storage
 from service.config.adopted_recipes import Word, keep_adopted
-from service.config.config import Config
+from service.config.config import Config, Opcua
 from service.config.config_file import SAMPLES, load_config
 from service.config.recipe_keys import with_values
 from service.daemon.lock import Lock, NameLock, name_is_held
 from service.records.job import TriggerStamp
 from service.records.journal import Journal
+from tests.support.interop.opcua import identity
 from tests.support.nobody import NOBODY, needs_root, open_folder, python_as_nobody
 
 
@@ -321,7 +323,7 @@ def test_without_exports_there_is_nothing_to_say_of_them(tmp_path: Path) -> None
 # --- what listens -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("part", ["metrics", "page"])
+@pytest.mark.parametrize("part", ["metrics", "page", "opcua"])
 def test_a_port_that_another_program_has_is_a_fault_unless_the_service_runs(tmp_path: Path, part: str) -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
@@ -356,6 +358,25 @@ def test_telemetry_needs_its_package_and_a_password_that_is_its_own(
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     (found,) = check_listening(config(tmp_path, more=telemetry), None)
     assert (found.level, found.text) == (Level.FAULT, "paho-mqtt is not installed")
+
+
+# --- OPC UA -------------------------------------------------------------------------------------------------------
+
+
+def test_opcua_tells_whom_it_lets_in_and_what_cannot_be_used(tmp_path: Path) -> None:
+    settings = config(tmp_path, more="opcua: {users_file: users}\n")
+    assert settings.opcua is not None
+    (found,) = check_opcua(settings.opcua, tmp_path)
+    assert (found.level, "users: cannot be read" in found.text) == (Level.FAULT, True)
+    (tmp_path / "users").write_text(f"anna {'a' * 24}\n")
+    (tmp_path / "users").chmod(0o600)
+    empty, found = check_opcua(settings.opcua, tmp_path)
+    assert (empty.level, "no client is trusted" in empty.text) == (Level.WARNING, True)
+    assert found.text == "127.0.0.1:4840, 0 clients trusted, halted and reset by anna"
+    own = identity(tmp_path / "own", days=3)
+    own.key.chmod(0o600)
+    plants = Opcua(certificate=own.certificate, key=own.key)
+    assert any("its certificate ends on" in one.text for one in check_opcua(plants, tmp_path))
 
 
 # --- the operator's page ------------------------------------------------------------------------------------------

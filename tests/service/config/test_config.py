@@ -176,6 +176,8 @@ def test_the_embedded_defaults_need_no_file() -> None:
         ),
         (SMALL + "triggers: [{kind: serial}]\n", "triggers[0].port: is missing"),
         (SMALL + "page: {port: 9000}\nmetrics: {port: 9000}\n", "page.port and metrics.port are both 9000"),
+        (SMALL + "metrics: {port: 9000}\nopcua: {port: 9000}\n", "metrics.port and opcua.port are both 9000"),
+        (SMALL + "opcua: {certificate: x}\n", "only one of them is given, expected both or none"),
         (SMALL + "recipes: []\n", "recipes is empty"),
         (SMALL.replace("c.yaml", "c.yaml, max_age_days: -1"), "calibration.max_age_days: seen -1"),
         (SMALL.replace("modbus-tcp", "modbus-tcp, port: 05020"), "05020 begins with 0; write 5020"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from service.wiring import triggers
 from service.wiring.daemon import StandIns, build, opening_of
 from service.wiring.errors import WiringError
 
-IN_TURN = ("_make_link", "_make_archive", "_make_executor", "add_triggers", "add_metrics", "add_page")
+IN_TURN = ("_make_link", "_make_archive", "_make_executor", "add_triggers", "add_metrics", "add_opcua", "add_page")
 
 
 def free_port() -> int:
@@ -96,8 +97,9 @@ async def test_what_was_opened_is_closed_when_the_next_part_cannot_be_had(
         with pytest.raises(WiringError, match=failing):
             build(config, opening=opening)
     step = IN_TURN.index(failing)
-    assert [shut(pool) for pool in opened.pools] == [True] * [0, 1, 1, 1, 2, 2][step], "the camera's, the serial ports'"
-    assert len(opened.archives) == [0, 0, 1, 1, 1, 1][step]
+    pools = [0, 1, 1, 1, 2, 2, 2][step]  # the camera's, the serial ports'
+    assert [shut(pool) for pool in opened.pools] == [True] * pools
+    assert len(opened.archives) == [0, 0, 1, 1, 1, 1, 1][step]
     assert opened.closed == opened.archives
     assert opening._journal is not None
     with pytest.raises(JournalError, match="closed database"):
@@ -149,3 +151,16 @@ async def test_a_page_that_cannot_be_served_leaves_no_metrics_behind(tmp_path: P
     assert parts.metrics is not None
     parts.metrics.close()
     parts.lock.release()
+
+
+async def test_opcua_that_cannot_be_served_as_it_is_configured_stops_the_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = configured(tmp_path, metrics=None, opcua={"port": free_port(), "users_file": str(tmp_path / "none")})
+    with pytest.raises(WiringError, match=r"opcua: .*none: cannot be read"):
+        build(config)
+    for name in [name for name in sys.modules if name.startswith("service.opcua")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "asyncua", None)
+    with pytest.raises(WiringError, match="Install combtrace\\[opcua\\]"):
+        build(config)

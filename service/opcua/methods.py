@@ -11,12 +11,10 @@ from asyncua import ua
 
 from service.daemon.control import CommandRefused
 from service.daemon.operations import Operations
-from service.jobs.health import Health
 from service.opcua.results import made, result_fields
 from service.opcua.session import MethodRefused
 from service.records.journal import Journal
 from service.records.journal_file import JournalError
-from service.state import State
 from service.web.daemon_access import DaemonSilent, answered
 
 log = logging.getLogger("combtrace.opcua")
@@ -32,7 +30,6 @@ class Methods:
     daemon_loop: asyncio.AbstractEventLoop
     operations: Operations
     journal: Journal
-    health: Health
 
     async def get_result(self, arguments: list[ua.Variant], _who: str) -> list[ua.Variant]:
         """GetResultById: handle (0: nothing is held), result, error; raise ValueError where it is no number."""
@@ -55,11 +52,9 @@ class Methods:
         return await self._carried_out(who, "halt", lambda: self.operations.halt({"reason": reason}, who), reason)
 
     async def reset(self, arguments: list[ua.Variant], who: str) -> list[ua.Variant]:
-        """Reset: a halt ends; without one all parts begin anew."""
+        """Reset: a halt ends; raise MethodRefused where there is none."""
         reason = str(arguments[1].Value or "")[:LARGEST_REASON]
-        action = "resume" if self.health.state is State.HALTED else "reset"
-        do = self.operations.resume if action == "resume" else self.operations.reset
-        return await self._carried_out(who, action, lambda: do({}, who), reason)
+        return await self._carried_out(who, "resume", lambda: self.operations.resume({}, who), reason)
 
     async def _carried_out(
         self, who: str, action: str, do: Callable[[], Awaitable[dict[str, object]]], detail: str

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -53,6 +53,14 @@ class OpcuaSources:
     folder: Path
 
 
+@dataclass
+class _Signals:
+    """From the daemon's loop to one run of the server: there is something new, it is to end."""
+
+    wake: asyncio.Event = field(default_factory=asyncio.Event)
+    ends: bool = False
+
+
 class OpcuaServer:
     """Listens from the start, answers while `run` runs."""
 
@@ -67,7 +75,7 @@ class OpcuaServer:
         self._socket: socket.socket | None = _listening(settings)
         self._untold: deque[StateSeen | Job] = deque(maxlen=MOST_UNTOLD)
         self._wake: Callable[[], None] = lambda: None
-        self._listens = self._ends = False
+        self._listens = False
 
     async def run(self, operations: Operations) -> None:
         """Serve for ever, in the daemon's loop. What goes wrong here is a warning: jobs go on without it."""
@@ -76,7 +84,7 @@ class OpcuaServer:
             health.listen(self._changed)
             self._sources.executor.on_settled.append(self._settled)
             self._listens = True
-        methods = Methods(asyncio.get_running_loop(), operations, self._sources.journal, health)
+        methods = Methods(asyncio.get_running_loop(), operations, self._sources.journal)
         while True:
             why = await self._served(methods)
             told = None if isinstance(why, OpcuaError) else why
@@ -87,18 +95,17 @@ class OpcuaServer:
 
     async def _served(self, methods: Methods) -> Exception:
         """Serve until that ends, and why."""
-        self._ends = False
         self._untold.clear()
         self._changed(self._sources.health.state, self._sources.health.reason)
-        loop, wake, thread = asyncio.new_event_loop(), asyncio.Event(), ThreadPoolExecutor(1, PART)
+        loop, signals, thread = asyncio.new_event_loop(), _Signals(), ThreadPoolExecutor(1, PART)
 
         def wake_up() -> None:
             with suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(wake.set)
+                loop.call_soon_threadsafe(signals.wake.set)
 
         def work() -> None:
             with asyncio.Runner(loop_factory=lambda: loop) as runner:
-                runner.run(self._serve(methods, wake))
+                runner.run(self._serve(methods, signals))
 
         self._wake = wake_up
         serving = asyncio.get_running_loop().run_in_executor(thread, work)
@@ -107,7 +114,7 @@ class OpcuaServer:
         except Exception as error:  # noqa: BLE001  the owner of defects in this server: the cell outlives it, and tells
             return error
         finally:
-            self._ends = True
+            signals.ends = True
             wake_up()
             await asyncio.wait([serving], timeout=THREAD_ENDS_S)
             thread.shutdown(wait=False)
@@ -126,7 +133,7 @@ class OpcuaServer:
         self._untold.append(job)
         self._wake()
 
-    async def _serve(self, methods: Methods, wake: asyncio.Event) -> None:
+    async def _serve(self, methods: Methods, signals: _Signals) -> None:
         """In the server's own thread."""
         self._trust.open()
         own = await asyncio.to_thread(own_certificate, self._settings, self._sources.folder)
@@ -146,16 +153,16 @@ class OpcuaServer:
             await server.start()
             log.info("opcua: %s, clients are trusted by %s", self.address, self._trust.trusted)
             try:
-                await self._show_all(cell, wake)
+                await self._show_all(cell, signals)
             finally:
                 await server.stop()
 
-    async def _show_all(self, cell: VisionSystem, wake: asyncio.Event) -> None:
-        while not self._ends:
+    async def _show_all(self, cell: VisionSystem, signals: _Signals) -> None:
+        while not signals.ends:
             with suppress(TimeoutError):
                 async with asyncio.timeout(LOOK_S):
-                    await wake.wait()
-            wake.clear()
+                    await signals.wake.wait()
+            signals.wake.clear()
             await self._show(cell)
 
     async def _show(self, cell: VisionSystem) -> None:

@@ -169,6 +169,7 @@ def test_a_user_halts_and_resets_and_the_journal_says_who(served: Served, reader
         assert client.ask("status", node=AUTOMATIC) == "BadStateNotActive"
         assert client.ask("call", object=MACHINE, method=f"{MACHINE}.Reset", cause="")["status"] == "Good"
         until(lambda: reader.states(OUTER)[-1:] == ["Operational"], what="Operational")
+        assert client.ask("call", object=MACHINE, method=f"{MACHINE}.Reset", cause="")["status"] == "BadInvalidState"
     finally:
         client.close()
     with sqlite3.connect(served.cell.journal) as journal:

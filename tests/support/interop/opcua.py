@@ -59,7 +59,6 @@ class NodeClient:
     shown: Identity
     user: str = ""
     password: str = ""
-    open: bool = False
     told: list[dict[str, Any]] = field(default_factory=list)
     refusal: str | None = None
 
@@ -73,7 +72,6 @@ class NodeClient:
             "pki": str(self.shown.key.parent / "pki"),
             "user": self.user,
             "password": self.password,
-            "open": self.open,
         }
         environment = {**os.environ, "NODE_PATH": str(node_modules(CLIENT_PACKAGES))}
         command = [node, str(HERE / "opcua_client.js"), json.dumps(given)]

@@ -1,4 +1,4 @@
-// node-opcua's client, by JSON lines: node opcua_client.js '{"url", "certificate", "key", "pki", "user"?, "password"?, "open"?}'
+// node-opcua's client, by JSON lines: node opcua_client.js '{"url", "certificate", "key", "pki", "user", "password"}'
 // It says {"up": true} or {"refused": why}, then answers each {"do": …} of its input; notifications come between.
 "use strict";
 const readline = require("readline");
@@ -34,9 +34,8 @@ async function main() {
     certificateFile: given.certificate,
     privateKeyFile: given.key,
     clientCertificateManager: await manager(),
-    securityMode: given.open ? opcua.MessageSecurityMode.None : opcua.MessageSecurityMode.SignAndEncrypt,
-    securityPolicy: given.open ? opcua.SecurityPolicy.None : opcua.SecurityPolicy.Basic256Sha256,
-    endpointMustExist: !given.open,
+    securityMode: opcua.MessageSecurityMode.SignAndEncrypt,
+    securityPolicy: opcua.SecurityPolicy.Basic256Sha256,
     connectionStrategy: { maxRetry: 2, initialDelay: 200 },
     keepSessionAlive: false,
   });

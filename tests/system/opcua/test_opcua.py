@@ -212,6 +212,7 @@ def test_a_user_halts_and_resets_and_the_journal_says_who(served: Served, reader
 def test_a_refusal_is_told_with_its_reason(served: Served, reader: NodeClient) -> None:
     """Last, for the cell goes on with a recipe that refuses everything."""
     served.cell.controller.stop()
+    until(lambda: bool(reader.events("-> Error")), what="the loss")
     served.cell._trigger_every = ("--trigger-every", "0.5", "--recipe", "2")
     served.cell.controller = served.cell.start_controller()
     until(lambda: bool(reader.events("112 area_out_of_limits")), 60, "a refusal")
@@ -220,7 +221,5 @@ def test_a_refusal_is_told_with_its_reason(served: Served, reader: NodeClient) -
     assert (ready["ResultState"], ready["Severity"]) == (1, 500)
     assert (more["EventType"], more["CausePath"]) == ("ns=2;i=1038", "area_out_of_limits")
     assert more["JobId"] == ready["JobId"]
-    lost = reader.events("-> Error")
-    assert lost
-    assert lost[0]["EventType"] == "ns=2;i=1019"
+    assert reader.events("-> Error")[0]["EventType"] == "ns=2;i=1019"
     assert reader.events("Error -> ")[0]["EventType"] == "ns=2;i=1020"

@@ -6,6 +6,7 @@ ContourError
 ├── NoBlockFound        the picture was usable, but no block could be traced in it
 ├── EdgeContradicted    the block's border is not of the kind that was promised
 ├── BoardNotSeen        the picture shows no calibration board that could be used
+├── GaugeNotSeen        the picture shows no gauge, or not all of it
 ├── MarginImpossible    a contour that a margin tears, closes up or lets vanish
 ├── CalibrationFailed   views or points from which no calibration can be had
 └── CalibrationError    a calibration that contradicts itself, or does not fit the picture
@@ -44,6 +45,10 @@ class CalibrationError(ContourError):
 
 class BoardNotSeen(ContourError):
     """The picture shows no calibration board that could be used; the message says what was seen instead."""
+
+
+class GaugeNotSeen(ContourError):
+    """The picture does not show the whole gauge; the message says what was seen instead."""
 
 
 class CalibrationFailed(ContourError):

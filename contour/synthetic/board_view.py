@@ -39,11 +39,23 @@ def render_flat(
 
     A sheet is its white box and its black boxes: left, bottom, right, top, shapes (4,) and (N, 4), millimetres.
     """
+    return render_planes([(camera, sheets)], sensor=sensor, seed=seed)
+
+
+def render_planes(
+    planes: Sequence[tuple[CameraModel, Sequence[tuple[Float64s, Float64s]]]],
+    *,
+    sensor: Sensor | None = None,
+    seed: int = 1,
+) -> Bytes:
+    """The same of sheets in several planes, each with the one camera in that plane's frame; none may hide another."""
+    camera, _ = planes[0]
     light = np.full((camera.height, camera.width), TABLE, dtype=np.float32)
-    for paper, ink in sheets:
-        white = _coverage(camera, paper[None])
-        black = _coverage(camera, ink)
-        light += white * np.float32(PAPER - TABLE) - black * np.float32(PAPER - INK)
+    for seen_by, sheets in planes:
+        for paper, ink in sheets:
+            white = _coverage(seen_by, paper[None])
+            black = _coverage(seen_by, ink)
+            light += white * np.float32(PAPER - TABLE) - black * np.float32(PAPER - INK)
     return expose(sensor or Sensor(), [light], seed)
 
 

@@ -15,7 +15,7 @@ from contour.image.opencv_boards import solve_pose
 from contour.length_test.seen_gauge import SeenGauge, SeenLength, SeenLine, straightness_mm
 
 HEIGHT_STEP_MM = 1.0
-_FEWEST_IN_LINE = 5
+FEWEST_IN_LINE = 5
 """Four corners of a straight row hardly show how it is bent: two of them hold the line."""
 
 
@@ -61,8 +61,11 @@ def seen_plate(seen: SeenCorners, pairs: Sequence[CornerPair], calibration: Cali
         measured = float(np.linalg.norm(np.subtract(*places[ends])))
         grown = float(np.linalg.norm(np.subtract(*higher[ends]))) - measured
         lengths.append(SeenLength(pair.name, measured, places[ends], grown / HEIGHT_STEP_MM))
+    lines = _lines(seen, places)
+    if not lines:
+        raise GaugeNotSeen(f"the gauge is not whole: no row or column of {FEWEST_IN_LINE} corners is seen. Clear it")
     heights = _heights(seen, calibration) if isinstance(calibration, CameraCalibration) else None
-    return SeenGauge(tuple(lengths), _lines(seen, places), _around(places), _turn_deg(seen, places), heights)
+    return SeenGauge(tuple(lengths), lines, _around(places), _turn_deg(seen, places), heights)
 
 
 def _heights(seen: SeenCorners, camera: CameraCalibration) -> Float64s:
@@ -100,7 +103,7 @@ def _lines(seen: SeenCorners, places: Float64s) -> tuple[SeenLine, ...]:
     for name, which, count in (("row", seen.rows - down, seen.rows), ("column", across + 1, seen.columns)):
         for number in range(1, count + 1):
             points = places[which == number]
-            if len(points) >= _FEWEST_IN_LINE:
+            if len(points) >= FEWEST_IN_LINE:
                 lines.append(SeenLine(f"{name} {number}", straightness_mm(points)))
     return tuple(lines)
 

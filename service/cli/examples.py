@@ -97,6 +97,17 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "The weekly check with a folder of pictures of the master part.",
         ),
     ),
+    "accept": (
+        ("combtrace accept --gauge plate.yaml --config config.yaml --operator Anna", "By the camera, step by step."),
+        (
+            "combtrace accept places/ --gauge plate.yaml --config config.yaml --against last.json --json now.json",
+            "From a folder of pictures, beside last year's.",
+        ),
+        (
+            "combtrace accept places/ --gauge plate.yaml --config config.yaml --study anna=anna/ boris=boris/",
+            "With a gauge study: each operator's pictures in a folder.",
+        ),
+    ),
     "repeat": (("combtrace repeat --config config.yaml --count 50", "How much 50 frames of one scene scatter."),),
     "teach-table": (
         ("combtrace teach-table --config config.yaml", "The camera takes the pictures: clear the table first."),

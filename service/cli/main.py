@@ -25,6 +25,7 @@ MODULES = (  # of this package, in the order of `--help`
     *("controller.simulate_controller", "controller.simulate_service"),
     *("pictures.cameras", "pictures.grab", "pictures.focus", "pictures.live"),
     *("calibration.board", "calibration.calibrate", "calibration.align", "calibration.verify", "calibration.repeat"),
+    "calibration.accept",
     *("pictures.teach_table", "controller.probe"),
     *("records.jobs", "records.replay", "records.report", "records.remnants"),
     *("daemon.status", "daemon.halt", "daemon.resume", "daemon.confirm", "daemon.reset", "daemon.pin"),

@@ -76,7 +76,7 @@ class Tracing:
             )
         work_area = np.array(config.work_area_mm, dtype=np.float64) if config and config.work_area_mm else None
         calibration = guard.record.calibration if guard else None
-        measurer = Measurer(calibration, guard=guard, work_area_mm=work_area, table=_table(config))
+        measurer = Measurer(calibration, guard=guard, work_area_mm=work_area, table=table_of(config))
         return cls(measurer, recipe, thickness_mm)
 
     def traced(self, image: Path) -> tuple[Bytes, Measurement]:
@@ -126,7 +126,8 @@ def _recipe(config: Config, args: argparse.Namespace) -> Recipe:
         raise UserError("; ".join(describe(error, Recipe))) from error
 
 
-def _table(config: Config | None) -> TableRecord | None:
+def table_of(config: Config | None) -> TableRecord | None:
+    """The taught table of a configuration, None where it has none; raise UserError."""
     if config is None or config.table is None:
         return None
     from service.measuring.table_file import TableFileError, find_table

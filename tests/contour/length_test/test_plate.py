@@ -86,3 +86,10 @@ def test_the_same_place_is_known_again_and_half_a_turn_is_another() -> None:
     assert first.same_place(seen_plate(corners(20.0, -179.0), PAIRS, calibration(), 20.0))
     assert not first.same_place(seen_plate(corners(20.0, -5.0), PAIRS, calibration(), 20.0))
     assert not first.same_place(seen_plate(corners(20.0, 160.0), PAIRS, calibration(), 20.0))
+
+
+def test_a_plate_of_which_no_line_is_left_is_not_whole() -> None:
+    left = {0, 7, 40, 47}
+    hidden = tuple(number for number in range(48) if number not in left)
+    with pytest.raises(GaugeNotSeen, match="no row or column of 5 corners"):
+        seen_plate(corners(20.0, without=hidden), PAIRS, calibration(), 20.0)

@@ -1,0 +1,1 @@
+"""Pictures of a gauge and its file in; what is missing, and a certificate of the cell, out. Used by `accept`."""

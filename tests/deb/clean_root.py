@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import pytest
+
 from tests.support.processes.processes import until
 from tests.support.real_parts import missing, need_program
 
@@ -87,7 +89,8 @@ def booted(root: Path, shown: Path) -> Iterator[Machine]:
             """The machine once it has started; its first process is not the first one that is forked for it."""
             if outer.poll() is not None:
                 console.seek(0)
-                missing(f"no container can be booted here: {console.read().decode(errors='replace')}")
+                # No package mends that: whoever runs this lacks the rights.
+                pytest.skip(f"no container can be booted here: {console.read().decode(errors='replace')}")
             machines = [Machine(int(process)) for process in children.read_text().split()]
             state = "systemctl", "is-system-running"
             return next((one for one in machines if one.tried(*state).stdout.strip() in UP), None)

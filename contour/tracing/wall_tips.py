@@ -160,8 +160,7 @@ def _cut_off(light: Bytes, seen: BlockEvidence, on_stage: OnStage) -> Trace:
     last = np.array([light.shape[1] - 1.0, light.shape[0] - 1.0])
     rings = [np.clip(ring.coarse, 0.0, last)[::-1].copy() for ring in seen.rings]
     on_stage("trace")
-    # A thing over the edge may bring the coarse block to the picture's border and the outline not quite.
-    return replace(_trace(seen, Contour(rings[0], tuple(rings[1:])), light), reaches_frame=True)
+    return _trace(seen, Contour(rings[0], tuple(rings[1:])), light)
 
 
 def _trace(seen: BlockEvidence, contour: Contour, light: Bytes, *, uncertainty_px: float | None = None) -> Trace:

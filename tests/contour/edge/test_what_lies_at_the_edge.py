@@ -108,11 +108,24 @@ def test_dark_things_cover_what_they_part_from_the_block_or_hide_in_a_corner(kin
     assert "covered" in {stretch.state for stretch in traced.evidence}
 
 
-def test_a_coarse_outline_that_is_only_to_be_shown_is_said_to_reach_the_frame() -> None:
-    """A hand brings the coarse block to the picture's border, and the outline ends some pixels before it."""
+def test_a_block_that_a_hand_brings_to_the_frame_lies_in_view_and_is_hardly_known() -> None:
+    """No wall of the block lies in the picture's last pixels, and the outline goes around the hand."""
     traced = trace(render(shop_floor_scene("hand_or_cable", 1_003_002).scene).picture, TraceSettings())
-    assert traced.uncertainty_px is None
+    assert not traced.reaches_frame
+    assert traced.uncertainty_px is not None
+    assert traced.pitch_px is not None
+    assert traced.uncertainty_px > 0.5 * traced.pitch_px
+
+
+@pytest.mark.parametrize("side", ["left", "right", "top", "bottom"])
+def test_a_block_that_goes_on_outside_of_the_picture_reaches_the_frame(side: str) -> None:
+    picture = edge_scene("compound").rendered.picture
+    height, width = picture.shape[:2]
+    x, y = (width // 2, height // 2)
+    part = {"left": picture[:, x:], "right": picture[:, :x], "top": picture[y:], "bottom": picture[:y]}[side]
+    traced = trace(np.ascontiguousarray(part), TraceSettings())
     assert traced.reaches_frame
+    assert traced.uncertainty_px is None
 
 
 def test_comb_in_a_corner_that_the_outline_cuts_off_is_a_part_left_out() -> None:

@@ -45,7 +45,7 @@ _BESIDE_PITCHES = 0.6
 _QUIET, _SMOOTH, _GOOD_SHARE = 0.45, 0.3, 0.3
 _MOST = 0.5
 # Pitches into what may fill a hole: its rim, and its middle (or so much of the deepest); how light that rim is.
-_HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT = (0.5, 0.9), (1.0, 0.6), 0.92
+_HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT = (0.4, 0.7), (1.0, 0.6), 0.93
 # Shadows, sides of the block and its mirror image make a band beside it that has no room for a disc of this radius, or
 # for few here and there; where walls are lost in a cell or two, the cells are flat.
 _BAND, _LONG_PITCHES = 0.55, 2.0

@@ -1,7 +1,7 @@
 """Bumps and dents of an outline too narrow to be told from a chip that clings to the block, or from cells lost; and
 wider bumps that stand upright on an edge, as a strip of cells does that was cut off, or a printed label; and arms of
 any length and direction that are as narrow as a cable, or as a strip and not pointed; and low steps near a corner, as a
-strip of cells makes that lies against it.
+strip of cells makes that lies against it; and horns.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _WIDTH, _DEPTH = 5.0, 0.75
 # and what stands farther out is an arm.
 _WIDE, _UPRIGHT, _HIGH = 10.0, 0.6, 4.5
 # Beside its foot the outline runs along it over so much, but for this angle; a corner between two such edges stands
-# out by half its width times the tangent.
-_BESIDE, _ANGLE_DEG = 2.0, 22.0
+# out by half its width times the tangent. On a curve or a corner it turns out at both feet, by so much over a pitch.
+_BESIDE, _ANGLE_DEG, _OUT_DEG = 2.0, 22.0, 25.0
 _SLOPE = 0.5 * float(np.tan(np.radians(_ANGLE_DEG)))
 # What stands out by no more than this times what the edges on its two sides are apart is a step from one to the other.
 _STEP = 1.5
@@ -37,6 +37,9 @@ _PITCH_SAMPLES = 6.0
 # A step: of outlines without what is smaller than this it turns in and out by so much, or the other way around, and
 # goes on as before but for that; so low, and a corner comes so soon behind it.
 _EVEN, _TURN_DEG, _TURNED_DEG, _STEP_HIGH, _STEP_LONG = 0.3, 45.0, 35.0, (0.75, 4.5), 10.0
+# A horn: a corner so sharp, its interior angle, and so near to one that turns out by so much, as a wire makes or a mark
+# on the table that leads away from the block. Of outlines followed so closely that no curve has such a corner.
+_HORN_DEG, _HORN_LONG, _HORN_FOOT_DEG, _HORN_EVEN = 60.0, 5.0, 40.0, 0.1
 # From foot to foot the narrowest is told: a wider one, farther out on the same edge, is no deeper by this.
 _DEEPER = 0.05
 
@@ -58,13 +61,14 @@ class NarrowFeature:
 
 
 def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
-    """The deepest bump or dent of a contour in pixels on an edge that goes on in its own direction; None without one.
+    """The deepest bump or dent of a contour in pixels on an edge that goes on in its own direction, or that stands out
+    of a curve or a corner at both its feet; None without one.
 
-    A corner is none, nor is the end of an arm: there the edges beside it run another way.
+    A corner is none, nor is the end of an arm: there the edges beside it run another way, and no foot is beside them.
     """
     found = [one for ring in contour.rings for one in [_deepest(ring, pitch_px)] if one is not None]
     found += _arms(contour, pitch_px) + _slits(contour, pitch_px)
-    found += [step for ring in contour.rings for step in _steps(ring, pitch_px)]
+    found += [one for ring in contour.rings for one in (*_steps(ring, pitch_px), *_horns(ring, pitch_px))]
     return max(found, key=lambda one: one.depth_pitches) if found else None
 
 
@@ -149,6 +153,23 @@ def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
     return found
 
 
+def _horns(ring: Ring, pitch_px: float) -> list[NarrowFeature]:
+    """Sharp corners that stand out of the outline beside them."""
+    corners = fewer_vertices(ring, _HORN_EVEN * pitch_px)
+    edges = np.roll(corners, -1, axis=0) - corners
+    long, heading = np.hypot(*edges.T) / pitch_px, edges[:, 0] + 1j * edges[:, 1]
+    turn_deg = -np.degrees(np.angle(heading / np.roll(heading, 1)))
+    found = []
+    for tip in np.flatnonzero(turn_deg > 180.0 - _HORN_DEG).tolist():
+        sides = ((long[tip - 1], turn_deg[tip - 1]), (long[tip], turn_deg[(tip + 1) % len(corners)]))
+        feet = [side for side, foot_deg in sides if side < _HORN_LONG and foot_deg < -_HORN_FOOT_DEG]
+        if feet and min(feet) > _DEPTH:
+            wide = 2.0 * min(feet) * np.sin(np.radians(0.5 * (180.0 - turn_deg[tip])))
+            x, y = corners[tip].tolist()
+            found.append(NarrowFeature(float(min(feet)), float(wide), (x, y), True))
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class _Beside:
     """The outline beside each place of a ring, on one side of it, in two halves: their unit directions, and the middle
@@ -168,6 +189,13 @@ class _Beside:
     def take(self, chosen: Indices) -> _Beside:
         """What lies beside some of the places."""
         return _Beside(*(part[chosen] for part in (self.near, self.far, self.middle)))
+
+    def turning_to(self, after: _Beside) -> Float64s:
+        """By how much the outline turns at each place, radians, positive to the right as seen with y down."""
+        one, two = self.near, after.near
+        return np.asarray(
+            np.arctan2(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], (one * two).sum(axis=1)), np.float64
+        )
 
     def along(self, foot: Float64s) -> Float64s:
         """Cosine of the angle to the foot, of the half that runs less along it."""
@@ -199,12 +227,20 @@ def _deepest(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     one, other = before.take(starts), after.take(ends[long, starts])
     along = foot / np.maximum(width, 1e-9)[:, None]
     least = np.maximum(np.maximum(_DEPTH * pitch_px, _SLOPE * width), _STEP * one.apart(other))
-    chosen = np.flatnonzero((reach > least) & (np.minimum(one.along(along), other.along(along)) > aligned))
+    # Which way bumps may lie: 0 either, as seen along the outline 1 to the right and -1 to the left, nan none.
+    side = np.where(np.minimum(one.along(along), other.along(along)) > aligned, 0.0, np.nan)
+    turn = np.stack([before.turning_to(after)[feet] for feet in (starts, ends[long, starts])])
+    side = np.where(
+        np.isnan(side) & (np.abs(turn).min(axis=0) > np.radians(_OUT_DEG)) & (turn[0] * turn[1] > 0.0),
+        np.sign(turn[0]),
+        side,
+    )
+    chosen = np.flatnonzero((reach > least) & ~np.isnan(side))
     best: NarrowFeature | None = None
     for some in np.split(chosen, np.flatnonzero(np.diff(long[chosen])) + 1):
         if len(some):
             run = starts[some], int(steps[long[some[0]], 0])
-            best = _deeper(best, places, run, (along[some], width[some], least[some]), pitch_px)
+            best = _deeper(best, places, run, (along[some], width[some], least[some], side[some]), pitch_px)
     return best
 
 
@@ -212,21 +248,22 @@ def _deeper(
     best: NarrowFeature | None,
     places: Float64s,
     run: tuple[Indices, int],
-    foot: tuple[Float64s, Float64s, Float64s],
+    foot: tuple[Float64s, Float64s, Float64s, Float64s],
     pitch_px: float,
 ) -> NarrowFeature | None:
     """The deepest of those that begin at `run`'s places and are its steps long, or `best` where none is deeper."""
     starts, steps = run
-    along, width, least = foot
+    along, width, least, side = foot
     path = places[(starts[:, None] + np.arange(steps + 1)) % len(places)] - places[starts][:, None, :]
     off = path[:, :, 0] * along[:, 1:] - path[:, :, 1] * along[:, :1]
     farthest = np.abs(off).argmax(axis=1)
     row = np.arange(len(starts))
     depth = np.abs(off[row, farthest])
     # Contours in pixels have the block on their left as seen with y down: what lies on the right is out.
-    out = off.mean(axis=1) < 0
+    middle = off.mean(axis=1)
+    out = middle < 0
     upright = out & (depth < _HIGH * pitch_px) & (np.abs(_areas(path)) > _UPRIGHT * width * depth)
-    depth = np.where((depth > least) & (upright | (width < _WIDTH * pitch_px)), depth, 0.0)
+    depth = np.where((depth > least) & (side * middle <= 0.0) & (upright | (width < _WIDTH * pitch_px)), depth, 0.0)
     one = int(depth.argmax())
     if depth[one] <= ((best.depth_pitches + _DEEPER) * pitch_px if best else 0.0):
         return best

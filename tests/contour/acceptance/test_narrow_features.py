@@ -223,3 +223,40 @@ def test_moved_moves_its_place() -> None:
 
 def test_a_small_square_is_no_feature_of_itself() -> None:
     assert narrow_feature(Contour(SQUARE[::-1] * 12.0), PITCH) is None
+
+
+def pitches(*points: tuple[float, float]) -> shapely.Polygon:
+    return shapely.affinity.scale(shapely.Polygon(points), PITCH, PITCH, origin=(0, 0))
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 50.0, 160.0])
+def test_what_stands_out_of_a_corner_on_both_sides_is_found(turn_deg: float) -> None:
+    corner = pitches((0, 0), (18, 0), (18, -14), (0, -14))
+    ink = pitches((0, -2.4), (-0.9, -0.9), (-0.5, 1.7), (2.4, 0), (1, -1))
+    one = found(corner | ink, turn_deg)
+    assert one is not None
+    assert one.outwards
+    assert one.width_pitches == pytest.approx(3.4, abs=0.5)
+    assert found(corner, turn_deg) is None
+    block = pitches((-10, -10), (10, -10), (10, 10), (-10, 10))
+    inner = block - corner
+    assert found(inner, turn_deg) is None
+    bite = found(inner - ink, turn_deg)
+    assert bite is not None
+    assert not bite.outwards
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 50.0, 160.0])
+def test_a_horn_is_found_and_the_tips_of_a_crescent_are_none(turn_deg: float) -> None:
+    disc = shapely.Point(-4.77 * PITCH, 1.36 * PITCH).buffer(4.9 * PITCH)
+    one = found(disc | pitches((0, 0), (1.6, 4.7), (-0.2, 3.14), (-4, 1)), turn_deg)
+    assert one is not None
+    assert one.outwards
+    assert one.depth_pitches == pytest.approx(2.4, abs=0.3)
+    crescent = shapely.Point(0, 0).buffer(10 * PITCH) - shapely.Point(6 * PITCH, 0).buffer(8 * PITCH)
+    assert found(crescent, turn_deg) is None
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 50.0])
+def test_a_small_round_hole_is_no_dent(turn_deg: float) -> None:
+    assert found(BLOCK - shapely.Point(300, 300).buffer(2.0 * PITCH), turn_deg) is None

@@ -29,6 +29,11 @@ class Chain:
     curve: Curve
     witnesses: Indices
 
+    @property
+    def price(self) -> float:
+        """Nats for the curve's parameters."""
+        return _PRICE_OF_FREEDOM * self.curve.freedom
+
 
 def free_curves(witnesses: Witnesses, segments: Segments, found: Joints, signed: Float64s) -> list[Chain]:
     """Chains whose spline is the shorter description: its misfit and parameters cost less than those of its lines and

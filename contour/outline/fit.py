@@ -13,12 +13,13 @@ from contour.geometry.rings import Ring
 from contour.outline.bevels import bevelled
 from contour.outline.chains import Chain, free_curves
 from contour.outline.corners import Joints, arc_points, thinned, without_reversed
+from contour.outline.doubtful import untold
 from contour.outline.free_curves import curve_points, within
 from contour.outline.labelling import label
 from contour.outline.lines_and_arcs import distance
 from contour.outline.missed_walls import overlooked, with_bounds
 from contour.outline.proposals import FEW, gather, propose, renewed
-from contour.outline.roundings import rounded, untold
+from contour.outline.roundings import rounded
 from contour.outline.runs import Segments, around, fitted, runs
 from contour.outline.spread import Vertices, unseen_share, vertex_sigma
 from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
@@ -104,8 +105,7 @@ def _fitted(
     for chain in chains:
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
-    in_chains = np.isin(np.arange(len(segments)), [k for chain in chains for k in chain.segments])
-    doubtful = untold(witnesses, replace(segments, bend=segments.bend & ~in_chains), found, inlier)
+    doubtful = untold(witnesses, segments, found, inlier, residual, chains)
     found = bevelled(witnesses, segments, found, inlier, material[:, 0] + 1j * material[:, 1])
     vertices = _vertices(witnesses, segments, found, chains)
     if len(vertices.ring) < 3:

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Complexes, Float64s, Indices, rolled
-from contour.outline.lines_and_arcs import distance, feet
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, rolled
+from contour.outline.lines_and_arcs import Models, distance, feet
 from contour.outline.proposals import FEW, Proposals
-from contour.outline.reach import Reach, reach, supports
 from contour.outline.witnesses import Witnesses, cost
 
 # Nats for one more line or arc: its parameters at the precision the witnesses give, and where it begins.
@@ -52,6 +51,15 @@ class Labelling:
     energy: float
 
 
+@dataclass(frozen=True, eq=False)
+class _Reach:
+    """From each state's foot along its model to the nearest witness that lies on it, back and ahead: shape (N, A),
+    pixels, 0 where none does."""
+
+    back: Float64s
+    ahead: Float64s
+
+
 def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     """The cheapest labelling of the ring's witnesses by `proposals`, each within its own stretch."""
     here, last, following = _states(witnesses, proposals)
@@ -61,7 +69,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     signed = distance(models, points)
     unary = cost(witnesses, signed, np.arange(count)[:, None])
     foot, tangent = feet(models, points)
-    reached = reach(witnesses, models, foot, last=last, following=following)
+    reached = _reach(witnesses, models, foot, last=last, following=following)
     hidden = (reached.back + reached.ahead) / witnesses.pitch_px
     unary = unary * np.clip(1.0 + _DEARER_PER_PITCH * (hidden - _UNSEEN_EDGE), 1.0, _DEAREST)
     unary = np.where(here >= 0, unary, _FAR)
@@ -107,7 +115,7 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Indices, Indice
 
 
 def _steps(
-    witnesses: Witnesses, proposals: Proposals, here: Indices, foot: Complexes, tangent: Complexes, reached: Reach
+    witnesses: Witnesses, proposals: Proposals, here: Indices, foot: Complexes, tangent: Complexes, reached: _Reach
 ) -> Float64s:
     """Price of going from state a at witness i to state b at witness i + 1, shape (N, A, A)."""
 
@@ -216,3 +224,26 @@ def _cheapest_path(step: Float64s, initial: Float64s, closing: int | None) -> tu
     for i in range(count - 2, -1, -1):
         path[i] = at = int((totals[i] + step[i, :, at]).argmin())
     return path, float(last[path[count - 1]])
+
+
+def _reach(witnesses: Witnesses, models: Models, foot: Complexes, *, last: Indices, following: Indices) -> _Reach:
+    """The reach of each state: its model, foot and supporting witnesses (see `supports`), shape (N, A) each."""
+    return _Reach(_away(witnesses, models, foot, last), _away(witnesses, models, foot, following))
+
+
+def supports(lies: Bools, place: Indices, begin: Indices, end: Indices) -> tuple[Indices, Indices]:
+    """The witness at or before each entry, and at or after it, that `lies` on the same model; -1 where none does.
+
+    Entries of one model run from `begin` to `end`, one for each witness (at `place`) that it may explain.
+    """
+    here = np.arange(len(place))
+    last = np.maximum.accumulate(np.where(lies, here, -1))
+    following = np.minimum.accumulate(np.where(lies, here, len(place))[::-1])[::-1]
+    back = np.where(last >= begin, place[np.maximum(last, 0)], -1)
+    ahead = np.where(following < end, place[np.minimum(following, len(place) - 1)], -1)
+    return back, ahead
+
+
+def _away(witnesses: Witnesses, models: Models, foot: Complexes, support: Indices) -> Float64s:
+    there, _ = feet(models, witnesses.points[support])
+    return np.where(support >= 0, np.abs(there - foot), 0.0)

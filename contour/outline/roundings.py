@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, rolled
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices
 from contour.outline.corners import Joints, intersections
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE
 from contour.outline.lines_and_arcs import Models, distance, feet, join
@@ -27,13 +27,10 @@ _LONELY = 3.0
 # Nats for a corner that is not as the others are.
 _UNLIKE = 2.0
 _TIGHTEST = 0.95
-# An arc told from the corner that it passes by fewer witnesses than that, ends of walls counted twice, so deep in it,
-# pitches, and of a radius that no other arc has, may as well be that corner; it matters where the two are so far apart.
-_TELL, _DEEP_IN, _ALIKE, _APART = 4, 0.1, 0.15, 0.5
 # Witnesses of either edge that are looked at to tell whether it is worth the trouble.
 _NEXT = 6
 # A smaller turn is no corner, and about a larger one goes no arc, radians.
-_LEAST_TURN, _MOST_TURN = 0.3, 2.6
+LEAST_TURN, MOST_TURN = 0.3, 2.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,31 +111,6 @@ def rounded(witnesses: Witnesses, segments: Segments, found: Joints) -> tuple[Se
     return ring.segments, ring.found, ring.made
 
 
-def untold(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools) -> Complexes:
-    """Middles of arcs that too few witnesses tell from the corners that they may be, shape (K,), in the fitting
-    plane.
-
-    Roundings of one block mostly have one radius: two that are alike tell each other. A radius r passes the corner of a
-    turn t at r / cos(t / 2) - r.
-    """
-    begin, owner, curvature = rolled(found.begin, 1), segments.owner(len(witnesses)), segments.models.curvature
-    places = []
-    for k in np.flatnonzero(segments.bend):
-        ends = np.array([begin[k], found.end[k]])
-        tangent = feet(segments.models.take(np.array([k, k])), ends)[1]
-        turn = float(np.abs(np.angle(tangent[0].conjugate() * tangent[1])))
-        passed = (1.0 / np.cos(0.5 * min(turn, _MOST_TURN)) - 1.0) / abs(curvature[k])
-        alike = segments.bend & (np.abs(curvature / curvature[k] - 1.0) < _ALIKE)
-        if turn > _MOST_TURN or passed < _APART * witnesses.pitch_px or np.count_nonzero(alike) > 1:
-            continue
-        own = inlier & (owner == k)
-        away = np.abs(((witnesses.points[own, None] - ends) * tangent.conj()).imag).min(axis=1)
-        deep = away > _DEEP_IN * witnesses.pitch_px
-        if np.count_nonzero(deep) + np.count_nonzero(deep & witnesses.clean[own]) < _TELL:
-            places.append(ends.mean())
-    return np.array(places, np.complex128)
-
-
 def _common_radius(witnesses: Witnesses, ring: _Ring, sign: float) -> float | None:
     """Radius that the remaining corners of one sense share with each other or with those that were rounded, negative
     for reflex ones; None where they are better left as they are.
@@ -181,7 +153,7 @@ def _corner(witnesses: Witnesses, ring: _Ring, signed: Float64s, k: int, between
     edges = segments.models.take(members[[0, -1]])
     tangent = feet(edges, np.array([near, far]))[1]
     turn = float(np.angle(tangent[0].conjugate() * tangent[1]))
-    if not _LEAST_TURN < abs(turn) < _MOST_TURN or (not between and near != far):
+    if not LEAST_TURN < abs(turn) < MOST_TURN or (not between and near != far):
         return None
     length = segments.length[members]
     if length.sum() < 3:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from contour.outline.fit import FittedRing, fit_ring
-from contour.outline.reach import supports
+from contour.outline.labelling import supports
 from contour.outline.witnesses import cost, prepare
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, distances, errors, rectangle, witnesses

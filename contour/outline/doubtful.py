@@ -1,0 +1,115 @@
+"""Where an outline is round though a corner explains what was seen as well, or hardly anything was seen of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, rolled
+from contour.outline.chains import Chain
+from contour.outline.corners import Joints
+from contour.outline.labelling import PRICE_ARC, PRICE_LINE
+from contour.outline.lines_and_arcs import Models, distance, feet
+from contour.outline.roundings import LEAST_TURN, MOST_TURN
+from contour.outline.runs import Segments
+from contour.outline.witnesses import Witnesses, cost
+
+# An arc told from the corner that it passes by fewer witnesses than that, ends of walls counted twice, so deep in it,
+# pitches, and of a radius that no other arc has, may as well be that corner; it matters where the two are so far apart.
+_TELL, _DEEP_IN, _ALIKE, _APART = 4, 0.1, 0.15, 0.5
+# Two lines explain the witnesses of an arc or a curve as well where they cost no more than so many nats above it; it
+# matters where they meet so far from any of these witnesses, pitches. A line's least number of witnesses.
+_AS_WELL, _FAR, _OF_A_LINE = 8.0, 0.4, 2
+# An outlier has no say in where a line lies.
+_LEAST_WEIGHT = 1e-9
+
+
+def untold(
+    witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools, residual: Float64s, chains: list[Chain]
+) -> Complexes:
+    """Middles of arcs and free curves that may as well be corners, shape (K,), in the fitting plane.
+
+    Roundings of one block mostly have one radius: two that are alike tell each other.
+    """
+    bend, curvature = np.flatnonzero(segments.bend), segments.models.curvature
+    alike = np.zeros((len(segments), len(segments)), dtype=bool)
+    alike[np.ix_(bend, bend)] = np.abs(curvature[bend] / curvature[bend, None] - 1.0) < _ALIKE
+    arcs = np.setdiff1d(bend, [k for chain in chains for k in chain.segments])
+    lone = arcs[np.count_nonzero(alike[np.ix_(arcs, arcs)], axis=1) == 1]
+    curves = [((segments.first[k] + np.arange(segments.length[k])) % len(witnesses), PRICE_ARC) for k in lone]
+    for chain in chains:
+        others = np.setdiff1d(bend, chain.segments)
+        if not chain.curve.closed and not alike[np.ix_(np.array(chain.segments), others)].any():
+            curves.append((chain.witnesses, chain.price))
+    places = [
+        witnesses.points[index].mean()
+        for index, price in curves
+        if _may_be_a_corner(witnesses, index, residual[index], price)
+    ]
+    return np.array(places + _hardly_seen(witnesses, segments, lone, found, inlier), np.complex128)
+
+
+def _may_be_a_corner(witnesses: Witnesses, index: Indices, residual: Float64s, price: float) -> bool:
+    """Whether two lines explain the witnesses at `index`, in order, as well as the curve of so many nats that they
+    have these distances from, and meet far from it.
+    """
+    count = len(index)
+    first = np.arange(_OF_A_LINE, count - _OF_A_LINE + 1)
+    if not len(first):
+        return False
+    points = witnesses.points[index] - witnesses.points[index].mean()
+    lying = np.abs(residual) < 3.0 * witnesses.outer[index]
+    weight = np.where(lying, witnesses.outer[index] ** -2.0, _LEAST_WEIGHT)
+    before = _lines(points, weight).take(first - 1)
+    after = _lines(points[::-1], weight[::-1]).take(count - first - 1)
+    after = Models(after.origin, -after.tangent, after.curvature)
+    signed = np.where(
+        np.arange(count) < first[:, None],
+        distance(before.take((slice(None), None)), points),
+        distance(after.take((slice(None), None)), points),
+    )
+    nats = cost(witnesses, signed, index).sum(axis=1)
+    best = int(nats.argmin())
+    if nats[best] + 2.0 * PRICE_LINE > cost(witnesses, residual, index).sum() + price + _AS_WELL:
+        return False
+    way, other = before.tangent[best], after.tangent[best]
+    turn = np.angle(other * way.conjugate())
+    if not LEAST_TURN < abs(turn) < MOST_TURN:
+        return False
+    on_it = points[lying]
+    along = ((after.origin[best] - before.origin[best]) * other.conjugate()).imag / (way * other.conjugate()).imag
+    return bool(np.abs(before.origin[best] + along * way - on_it).min(initial=np.inf) > _FAR * witnesses.pitch_px)
+
+
+def _lines(points: Complexes, weight: Float64s) -> Models:
+    """The lines through the first point, the first two, three and so on, shape (N,), by weighted least squares across
+    them.
+    """
+    total, first, second = (np.cumsum(weight * points**power) for power in (0, 1, 2))
+    middle = first / total
+    tangent = np.exp(0.5j * np.angle(second - first * middle))
+    forward = ((points - points[0]) * tangent.conj()).real
+    return Models(middle, np.where(forward < 0.0, -tangent, tangent), np.zeros(len(points)))
+
+
+def _hardly_seen(
+    witnesses: Witnesses, segments: Segments, arcs: Indices, found: Joints, inlier: Bools
+) -> list[np.complex128]:
+    """Middles of those arcs that too few witnesses tell from the corners that they may be.
+
+    A radius r passes the corner of a turn t at r / cos(t / 2) - r.
+    """
+    begin, owner = rolled(found.begin, 1), segments.owner(len(witnesses))
+    places = []
+    for k in arcs:
+        ends = np.array([begin[k], found.end[k]])
+        tangent = feet(segments.models.take(np.array([k, k])), ends)[1]
+        turn = float(np.abs(np.angle(tangent[0].conjugate() * tangent[1])))
+        passed = (1.0 / np.cos(0.5 * min(turn, MOST_TURN)) - 1.0) / abs(segments.models.curvature[k])
+        if turn > MOST_TURN or passed < _APART * witnesses.pitch_px:
+            continue
+        own = inlier & (owner == k)
+        away = np.abs(((witnesses.points[own, None] - ends) * tangent.conj()).imag).min(axis=1)
+        deep = away > _DEEP_IN * witnesses.pitch_px
+        if np.count_nonzero(deep) + np.count_nonzero(deep & witnesses.clean[own]) < _TELL:
+            places.append(ends.mean())
+    return places

@@ -1,0 +1,24 @@
+"""A curve that two lines explain nearly as well as it does may be a corner, and is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contour.synthetic import render
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
+from tests.support.scenes.random_scenes import random_scene
+
+
+@pytest.mark.parametrize(("seed", "place"), [(1_054_048, (633.0, 424.0)), (1_058_134, (598.0, 460.0))])
+def test_a_curve_is_told_where_two_lines_would_do_and_lie_elsewhere(seed: int, place: tuple[float, float]) -> None:
+    """An arc over a corner whose tip is lost, 0.8 of a cell off, and a free curve around one, 0.7."""
+    traced = trace(render(random_scene(seed).scene).picture, TraceSettings())
+    assert traced.untold_px is not None
+    assert traced.pitch_px is not None
+    assert np.hypot(*np.subtract(traced.untold_px, place)) < 2.0 * traced.pitch_px
+
+
+def test_a_curve_is_one_where_two_lines_hardly_turn() -> None:
+    assert trace(render(random_scene(1_058_142).scene).picture, TraceSettings()).untold_px is None

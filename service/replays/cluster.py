@@ -37,6 +37,7 @@ class Cluster:
         """Raise ReplayError where Dask is missing, or nobody answers there."""
         try:
             from distributed import Client
+            from distributed.comm.addressing import parse_address, parse_host_port
         except ImportError as error:
             raise ReplayError(f"--scheduler needs Dask, which is not here. {INSTALL}") from error
         self._work = work
@@ -47,6 +48,7 @@ class Cluster:
         self._begun = 0
         self._looked_at: float | None = None
         try:
+            parse_host_port(parse_address(scheduler)[1])  # the client waits 20 s with what it cannot parse
             self._client: Client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError, RuntimeError) as error:
             raise ReplayError(

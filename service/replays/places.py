@@ -47,20 +47,24 @@ class Place:
             return
         with TemporaryDirectory(prefix="combtrace-replay-") as folder:
             here = Path(folder)
-            self._fetch(here, job_id, ended)
-            yield here
+            try:
+                self._fetch(here, job_id, ended)
+                yield here
+            except EvidenceError as error:  # told by where it lies: the copy has gone when that is read
+                raise EvidenceError(str(error).replace(folder, self.address), error.flaw) from error
 
     def _fetch(self, here: Path, job_id: int, ended: str) -> None:
-        """Copy the job's document and frame, and the tables that the document may name; raise EvidenceError."""
+        """Copy the job's document and frame, and the tables that the document may name; raise EvidenceError.
+
+        What is not there any more is not copied: whoever reads it says what that means.
+        """
         if ended == UNKNOWN:
             raise EvidenceError(f"{self.address}: holds nothing of job {job_id}", Flaw.MISSING)
         there = folder_of(here, job_id)
         there.mkdir()
-        inside = f"{self.address}/{there.name}"
         document = there / f"{job_id}-{ended}.json"
-        _copy(f"{inside}/{document.name}", document)
-        with suppress(FileNotFoundError):  # whoever reads it says what that means: of some jobs there is none
-            _copy(f"{inside}/{job_id}-{FRAME}", there / f"{job_id}-{FRAME}")
+        _copy(f"{self.address}/{there.name}/{document.name}", document)
+        _copy(f"{self.address}/{there.name}/{job_id}-{FRAME}", there / f"{job_id}-{FRAME}")
         for table in _tables_named(document):
             (here / TABLES).mkdir(exist_ok=True)
             _copy(f"{self.address}/{TABLES}/{table}", here / TABLES / table)
@@ -72,7 +76,7 @@ def _tables_named(document: Path) -> list[str]:
 
     try:
         table = json.loads(document.read_bytes())["table"]
-    except (ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError):
         return []
     return [Path(table).name] if isinstance(table, str) else []
 
@@ -92,12 +96,13 @@ def _names(address: str) -> Iterable[str]:
 
 
 def _copy(address: str, file: Path) -> None:
-    """Fetch one file; raise FileNotFoundError, and EvidenceError where the storage does not answer."""
-    files, path = _opened(address)
+    """Fetch one file, if it is there; raise EvidenceError where the storage does not answer."""
     try:
-        file.write_bytes(files.cat_file(path))
-    except FileNotFoundError:
-        raise
+        files, path = _opened(address)
+        with suppress(FileNotFoundError):
+            file.write_bytes(files.cat_file(path))
+    except ReplayError as error:
+        raise EvidenceError(str(error), Flaw.STORAGE) from error
     except Exception as error:  # of whichever library answers for this kind of address
         raise EvidenceError(f"{address}: cannot be read: {_told(error)}", Flaw.STORAGE) from error
 

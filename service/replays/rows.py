@@ -51,6 +51,7 @@ OF_THE_RUN: Final = ("total_ms_before", "total_ms_after", "read_ms", "worker")
 """Columns that are others each time; total_ms_before where another version measures."""
 
 Row = dict[str, Any]
+_HOLDS: Final[dict[str, type]] = {"string": str, "int64": int, "double": float, "bool": bool, "timestamp": datetime}
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,26 @@ class Side:
         """True where verdict and outline are the same to the last bit."""
         same = all(self.kept[name] == other.kept[name] for name in ("pixels", "millimetres", "uncertainty_mm"))
         return same and self.codes == other.codes
+
+
+def fitting(row: Row) -> Row:
+    """The same, for the table: a damaged document may say anything, and one value would stop the whole run.
+
+    Raise TypeError, ValueError, OverflowError where a column cannot hold its value.
+    """
+    found: Row = {}
+    for column, value in row.items():
+        kind = COLUMNS[column][0]
+        whole = type(value) is int
+        fits = value is None or isinstance(value, _HOLDS[kind]) or (whole and kind == "double")
+        if not fits or (isinstance(value, bool) and kind != "bool"):
+            raise TypeError(f"{column}: {str(value)[:60]!r}, expected {kind}")
+        if whole and kind == "int64" and not -(2**63) <= value < 2**63:
+            raise OverflowError(f"{column}: a number that no {kind} holds")
+        if isinstance(value, str):
+            value.encode()  # a half of a pair of surrogates cannot be written
+        found[column] = float(value) if whole and kind == "double" else value
+    return found
 
 
 def row_of(document: dict[str, Any], before: Side, after: Side) -> Row:

@@ -72,16 +72,19 @@ class RunFiles:
     def open(self, names: Sequence[JobName]) -> None:
         """Begin with these jobs, by place and number, or go on with those of before; raise ReplayError."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
         try:
             self.parts.mkdir(parents=True, exist_ok=True)
             self._lock = (self.parts / "lock").open("wb")
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if self.complete:
+                raise ReplayError(f"{self.output}: another run has ended meanwhile. The same command tells of it")
             if not self.begun:
+                for part in self.parts.glob("batch-*.parquet"):  # of a run whose plan somebody took away
+                    part.unlink()
                 columns = {key: [getattr(name, key) for name in names] for key in ("place", "job_id", "ended")}
                 self._write(PLAN, pa.table(columns).replace_schema_metadata(self._metadata()))
-            self._plan = pq.read_table(self.parts / PLAN)
+            self._plan = _read(self.parts / PLAN)
         except BlockingIOError as error:
             raise ReplayError(f"{self.output}: another run writes it. Wait for it, or name another file") from error
         except OSError as error:
@@ -142,7 +145,7 @@ class RunFiles:
             with pq.ParquetWriter(beside, schema().with_metadata(metadata)) as writer:
                 waiting: list[pa.Table] = []
                 for number in self.batches:
-                    waiting.append(pq.read_table(self.parts / _part(number)))
+                    waiting.append(_read(self.parts / _part(number)))
                     if sum(map(len, waiting)) >= ROWS_A_GROUP or number == self.batches[-1]:
                         writer.write_table(pa.concat_tables(waiting))
                         waiting = []
@@ -171,7 +174,8 @@ class RunFiles:
             return
         others = sorted(key for key in {*found, *self._terms} if found.get(key) != self._terms.get(key))
         told = ", ".join(f"{key} was {found.get(key)}, is {self._terms.get(key)}" for key in others)
-        raise ReplayError(f"{path}: is of another run: {told}. Name another --output, or delete it")
+        there = path if path == self.output else self.parts
+        raise ReplayError(f"{there}: is of another run: {told}. Name another --output, or delete it")
 
 
 def schema() -> pa.Schema:
@@ -197,6 +201,17 @@ def terms_of(path: Path) -> Terms:
         return dict(json.loads((pq.read_schema(path).metadata or {})[TERMS]))
     except (OSError, ArrowException, KeyError, ValueError) as error:
         raise ReplayError(f"{path}: is no table of `combtrace replay`. Name another --output, or delete it") from error
+
+
+def _read(part: Path) -> pa.Table:
+    """What a part holds; raise ReplayError where a disk has damaged it."""
+    import pyarrow.parquet as pq
+    from pyarrow.lib import ArrowException
+
+    try:
+        return pq.read_table(part)
+    except (OSError, ArrowException) as error:
+        raise ReplayError(f"{part}: cannot be read: {error}. Delete it: the same command does it again") from error
 
 
 def _part(number: int) -> str:

@@ -18,8 +18,9 @@ from service.records.archived_job import ArchivedJob, load_archived
 from service.records.evidence import EvidenceError, Flaw, measurement_fields
 from service.records.replay import Replayed, Settings, replay
 from service.replays.against import OtherVersion, OtherVersionError
+from service.replays.errors import ReplayError
 from service.replays.places import Place
-from service.replays.rows import COLUMNS, Row, Side, Versions, apart_between, job_columns, row_of
+from service.replays.rows import COLUMNS, Row, Side, Versions, apart_between, fitting, job_columns, row_of
 from service.replays.thumbnails import Thumbnails, thumbnails
 from service.replays.versions import versions_here
 
@@ -82,18 +83,18 @@ class Work:
         try:
             with self.places[name.place].at_hand(name.job_id, name.ended) as archive:
                 archived = load_archived(archive, name.job_id)
-                row |= job_columns(archived.document)
+                row |= fitting(job_columns(archived.document))
                 row["read_ms"] = 1000 * (time.perf_counter() - begun)
                 again, before, after = self._sides(archived, archive)
                 told = row_of(archived.document, before, after)
             if self.against is None:
                 told["identical"] = again.identical
-            row |= told
+            row |= fitting(told)
         except EvidenceError as error:
             row |= left_out(error.flaw, str(error))
         except OtherVersionError as error:
             row |= left_out(Lost.OTHER_VERSION, str(error))
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
             row |= left_out(Flaw.DOCUMENT_DAMAGED, f"job {name.job_id}: {type(error).__name__}: {error}")
         except Exception as error:  # noqa: BLE001 - a job's owner: one that cannot be done must not end the others
             row |= left_out(Lost.DEFECT, f"job {name.job_id}: {type(error).__name__}: {error}")
@@ -128,17 +129,22 @@ class Work:
 
 def left_out(kind: Flaw | Lost, text: str) -> Row:
     """What the row of a job tells that could not be done."""
-    return {"left_out": str(kind), "left_out_text": text}
+    return {"left_out": str(kind), "left_out_text": text.encode(errors="replace").decode()}
 
 
 def other_version(given: Path) -> OtherVersion:
-    """The process of the other version: one for each process that works, started where there is none, or none alive."""
-    known = _others.get(given)
-    if known is not None and known.alive:
-        return known
-    if known is not None:
+    """The process of the other version: one for each process that works, started where there is none, or none alive.
+
+    Raise OtherVersionError where it cannot be started here, as on a worker that has no such wheel.
+    """
+    known = _others.pop(given, None)
+    if known is not None and not known.alive:
         known.close()
-    _others[given] = OtherVersion(given)
+        known = None
+    try:
+        _others[given] = known or OtherVersion(given)
+    except ReplayError as error:
+        raise OtherVersionError(str(error)) from error
     return _others[given]
 
 

@@ -137,6 +137,10 @@ def _places(args: argparse.Namespace, config: Config | None) -> tuple[Place, ...
         cell, equals, address = given.partition("=")
         if not equals or "/" in cell:
             cell, address = "", given
+        if "@" in address.partition("://")[2].partition("/")[0]:  # it would stand in table and report
+            raise UserError(
+                "--archive: an address with a user or password. Give those by the environment, as AWS's tools"
+            )
         address = address.rstrip("/") if "://" in address else str(Path(address).resolve())
         cell = cell or address.rpartition("/")[2]
         if cell in found:

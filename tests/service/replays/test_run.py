@@ -203,6 +203,39 @@ def test_two_runs_do_not_write_one_table_at_a_time(work: Work, tmp_path: Path) -
             second.open(names(work))
 
 
+def test_a_run_that_another_has_ended_meanwhile_leaves_the_table(work: Work, alone: list[Row], tmp_path: Path) -> None:
+    output = tmp_path / "rows.parquet"
+    with RunFiles(output, TERMS) as late:
+        assert carried_out(work, output, Played(work), quiet) == alone
+        with pytest.raises(ReplayError, match="another run has ended meanwhile"):
+            late.open([])
+    assert rows(output) == alone
+
+
+def test_parts_of_a_run_whose_plan_was_taken_away_are_not_taken_for_this_ones(work: Work, tmp_path: Path) -> None:
+    with RunFiles(tmp_path / "rows.parquet", {"set": ["another"]}) as files:
+        files.open(names(work))
+        files.put(0, [{}] * files.size(0))
+        (files.parts / "plan.parquet").unlink()
+    with RunFiles(tmp_path / "rows.parquet", TERMS) as files:
+        files.open(names(work))
+        assert files.missing() == list(files.batches)
+
+
+def test_a_damaged_part_is_named_and_done_again_once_it_is_deleted(
+    work: Work, alone: list[Row], tmp_path: Path
+) -> None:
+    output = tmp_path / "rows.parquet"
+    with RunFiles(output, TERMS) as files:
+        files.open(names(work))
+        part = files.parts / "batch-0000000.parquet"
+        part.write_bytes(b"PAR1 but for a few bytes")
+    with pytest.raises(ReplayError, match=r"batch-0000000.parquet: cannot be read: .*Delete it"):
+        carried_out(work, output, Played(work), quiet)
+    part.unlink()
+    assert carried_out(work, output, Played(work), quiet) == alone
+
+
 def test_time_left_follows_the_pace_of_this_run_alone() -> None:
     progress = Progress(jobs=100, before=40, done=20, elapsed_s=10.0)
     assert progress.left_s == 20.0

@@ -14,8 +14,10 @@ from service.records.evidence import EvidenceError, Flaw
 from service.records.replay import Settings, replay
 from service.replays.places import Place
 from service.replays.rows import COLUMNS, OF_THE_RUN, Row
+from service.replays.run_files import schema
 from service.replays.work import JobName, Lost, Work
 from tests.support.processes.processes import ROOT
+from tests.support.real_parts import CLUSTER, need_module
 from tests.support.service.archives import changed_document, frame_of, write_archive
 
 
@@ -129,6 +131,26 @@ def lost_table(archive: Path) -> None:
     changed_document(archive, 1, table="tables/0123.npz")
 
 
+def recipe_number_that_is_none(archive: Path) -> None:
+    changed_document(archive, 1, recipe={**load_archived(archive, 1).document["recipe"], "number": "one"})
+
+
+def recipe_number_beyond_all_columns(archive: Path) -> None:
+    changed_document(archive, 1, recipe={**load_archived(archive, 1).document["recipe"], "number": 10**30})
+
+
+def recipe_name_that_cannot_be_written(archive: Path) -> None:
+    changed_document(archive, 1, recipe={**load_archived(archive, 1).document["recipe"], "name": "\ud800"})
+
+
+def vertices_that_are_no_number(archive: Path) -> None:
+    changed_document(archive, 1, measurement={**load_archived(archive, 1).document["measurement"], "vertices": "many"})
+
+
+def area_beyond_all_numbers(archive: Path) -> None:
+    changed_document(archive, 1, measurement={**load_archived(archive, 1).document["measurement"], "area_mm2": 10**400})
+
+
 @pytest.mark.parametrize(
     ("damage", "kind"),
     [
@@ -141,6 +163,11 @@ def lost_table(archive: Path) -> None:
         (unknown_recipe_key, Flaw.SETTINGS),
         (damaged_calibration, Flaw.CALIBRATION),
         (lost_table, Flaw.TABLE),
+        (recipe_number_that_is_none, Flaw.DOCUMENT_DAMAGED),
+        (recipe_number_beyond_all_columns, Flaw.DOCUMENT_DAMAGED),
+        (recipe_name_that_cannot_be_written, Flaw.DOCUMENT_DAMAGED),
+        (vertices_that_are_no_number, Flaw.DOCUMENT_DAMAGED),
+        (area_beyond_all_numbers, Flaw.DOCUMENT_DAMAGED),
     ],
 )
 def test_a_job_that_cannot_be_done_says_why_by_kind(archive: Path, damage: object, kind: Flaw) -> None:
@@ -151,6 +178,32 @@ def test_a_job_that_cannot_be_done_says_why_by_kind(archive: Path, damage: objec
     assert found["left_out_text"]
     assert found["outcome_after"] is None
     assert row(archive, 2)["left_out"] is None
+    pa = need_module("pyarrow", CLUSTER)
+    assert len(pa.Table.from_pylist([found], schema())) == 1  # the table takes the row: it does not end the run
+
+
+def test_of_a_bucket_what_went_meanwhile_is_missing_and_told_by_where_it_lay(archive: Path) -> None:
+    stored = need_module("fsspec", CLUSTER).filesystem("memory")
+    changed_document(archive, 3, table="tables/0123.npz")
+    (document_of(archive, 4) or Path()).write_text("{")
+    for path in (archive / "0000000xxx").iterdir():
+        stored.pipe(f"/plant/cell-7/0000000xxx/{path.name}", path.read_bytes())
+    place = Place("cell-7", "memory://plant/cell-7")
+    there = dict(place.jobs())
+    stored.rm("/plant/cell-7/0000000xxx/1-accepted.json")
+    found = [Work((place,)).row(JobName(0, job, there[job])) for job in (1, 2, 3, 4)]
+    stored.rm("/plant", recursive=True)
+    assert [one["left_out"] for one in found] == [Flaw.MISSING, None, Flaw.TABLE, Flaw.DOCUMENT_DAMAGED]
+    assert found[0]["left_out_text"].startswith("memory://plant/cell-7: holds nothing of job 1.")
+    assert found[3]["left_out_text"].startswith("memory://plant/cell-7/0000000xxx/4-accepted.json: is no document")
+
+
+def test_a_worker_that_has_no_such_wheel_does_not_call_that_a_defect(archive: Path, tmp_path: Path) -> None:
+    work = Work((Place("cell-7", str(archive)),), against=tmp_path / "combtrace.whl")
+    for _ in range(2):
+        found = work.row(JobName(0, 1, "accepted"))
+        assert found["left_out"] == Lost.OTHER_VERSION
+        assert "there is no such wheel" in found["left_out_text"]
 
 
 def test_a_job_that_nothing_is_kept_of_is_left_out_as_missing(archive: Path) -> None:

@@ -120,6 +120,7 @@ def test_against_this_very_version_nothing_differs_and_conditions_pass(archive: 
         (("--output", "r.parquet", "--workers", "2", "--scheduler", "tcp://x:1"), "exclude each other"),
         (("--output", "r.parquet", "--archive", "nowhere"), "nowhere: cannot be listed: No such file"),
         (("--output", "r.parquet", "--archive", "odd://x"), "odd://x: Protocol not known: odd"),
+        (("--output", "r.parquet", "--archive", "s3://me:word@plant/a"), "an address with a user or password"),
         (("--output", "r.parquet", "--archive", "a", "--archive", "b/a"), "there is a cell 'a' already"),
         (("--output", "r.parquet", "--archive", "a", "--since", "1d"), "those are for a journal"),
         (("--output", "r.parquet", "--archive", "a", "--limit", "-1"), "--limit -1: expected 0 or more"),
@@ -158,8 +159,14 @@ def test_without_the_extra_it_says_how_to_install_it(
     assert "which is not here. Install: pip install 'combtrace[cluster]'" in answer.stderr
 
 
-def test_without_a_scheduler_it_says_what_was_expected(archive: Path, tmp_path: Path) -> None:
-    words = ("--archive", archive, "--output", tmp_path / "rows.parquet", "--scheduler", "somewhere://x")
+@pytest.mark.parametrize("address", ["somewhere://x", "nonsense"])
+def test_without_a_scheduler_it_says_what_was_expected(
+    address: str, archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed = need_module("distributed", CLUSTER)
+    # It would wait 20 s at its end for what it never began.
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: pytest.fail("a client of a scheduler that cannot be"))
+    words = ("--archive", archive, "--output", tmp_path / "rows.parquet", "--scheduler", address)
     answer = called("replay", *words)
     assert answer.returncode == 2
     assert "no Dask scheduler answers there" in answer.stderr

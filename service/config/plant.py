@@ -13,9 +13,9 @@ _NAME = re.compile(r"[^+#/\s\0][^+#/\0]{0,99}")
 
 
 def _a_name(value: Any) -> Any:
-    """A part of a topic: MQTT gives +, # and / a meaning of their own there."""
-    if isinstance(value, str) and not _NAME.fullmatch(value):
-        raise ValueError(f"is {value[:60]!r}, expected 1 to 100 characters without + # /")
+    """A part of a topic: MQTT gives +, # and / a meaning of their own there, and brokers refuse control characters."""
+    if isinstance(value, str) and not (_NAME.fullmatch(value) and value.isprintable()):
+        raise ValueError(f"is {value[:60]!r}, expected 1 to 100 printable characters without + # /")
     return value
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from service.telemetry.payload import Metric, Payload, PayloadError, Value, decoded
+from service.telemetry.payload import MOST_METRICS, Metric, Payload, PayloadError, Value, decoded
 from service.telemetry.sparkplug import BIRTH_COUNT, NAMESPACE
 
 MOST_CELLS = 1000
-MOST_METRICS = 1000
+LONGEST_TEXT = 20_000
 REBIRTH_GAP_S = 2.0  # between two wishes for a birth of the same cell
 JOB, NUMBER, SETTLED = "Job/", "Job/Number", "Job/Settled"
 
@@ -66,7 +66,7 @@ class Cells:
             payload = decoded(raw)
         except PayloadError:
             return None
-        if (name not in self.by_name and len(self.by_name) >= MOST_CELLS) or len(payload.metrics) > MOST_METRICS:
+        if name not in self.by_name and len(self.by_name) >= MOST_CELLS:
             return None
         cell = self.by_name.setdefault(name, Cell(name))
         if kind == "NDEATH":
@@ -115,9 +115,12 @@ def _tell(cell: Cell, payload: Payload, heard: Heard) -> None:
 
 
 def _now(cell: Cell, name: str, metric: Metric) -> None:
+    """Keep it, within bounds: what a broker lets through may be anybody's, and without end."""
+    if name not in cell.values and len(cell.values) >= MOST_METRICS:
+        return
     if name == "State/Name" and (metric.value != cell.values.get(name) or cell.state_since_ms is None):
         cell.state_since_ms = metric.timestamp_ms
-    cell.values[name] = metric.value
+    cell.values[name] = metric.value[:LONGEST_TEXT] if isinstance(metric.value, str) else metric.value
 
 
 def text(values: dict[str, Any], name: str) -> str:

@@ -130,7 +130,11 @@ class Listener:
         if now_s >= self._added_s + FIGURES_S:
             self._added_s = now_s
             shift = shift_begin(self._settings.shifts, datetime.fromtimestamp(self._now()).astimezone())
-            figures = self._store.figures(round(shift.timestamp() * 1000), self._now_ms())
+            try:
+                figures = self._store.figures(round(shift.timestamp() * 1000), self._now_ms())
+            except StoreError as error:
+                log.warning("fleet: %s", error)
+                return
             with self._lock:
                 self._figures = figures
 

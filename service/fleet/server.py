@@ -10,7 +10,7 @@ from service.fleet.page import Pages
 from service.fleet.settings import Fleet
 from service.fleet.store import Store, StoreError
 from service.fleet.views import FleetView, compared, viewer
-from service.web.http_server import http_server, listening
+from service.web.http_server import certificate_mistake, http_server, listening
 
 log = logging.getLogger("combtrace.fleet")
 
@@ -22,6 +22,9 @@ class FleetError(Exception):
 def serve(settings: Fleet) -> None:
     """Until SIGTERM or Ctrl-C; raise FleetError."""
     page = settings.page
+    why_not = certificate_mistake(page.certificate, page.key)
+    if why_not is not None:
+        raise FleetError(why_not)
     try:
         listener_socket = listening(page.host, page.port)
     except OSError as error:
@@ -30,10 +33,9 @@ def serve(settings: Fleet) -> None:
         ) from error
     with listener_socket:
         try:
-            store = Store(settings.store)
+            listener = Listener(settings, Store(settings.store))
         except StoreError as error:
             raise FleetError(str(error)) from error
-        listener = Listener(settings, store)
         see = viewer(settings)
 
         def look() -> FleetView:

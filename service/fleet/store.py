@@ -66,9 +66,12 @@ class Store:
             raise StoreError(f"{path}: cannot be used: {error}. Check the path, or move the file away") from error
 
     def cells(self) -> list[Cell]:
-        """Those that were ever heard of, as they were last; not born."""
-        rows = self._database.execute("SELECT grp, node, told, heard_ms FROM cells").fetchall()
-        return [Cell((group, node), dict(json.loads(told)), heard_ms=heard_ms) for group, node, told, heard_ms in rows]
+        """Those that were ever heard of, as they were last; not born. Raise StoreError."""
+        try:
+            rows = self._database.execute("SELECT grp, node, told, heard_ms FROM cells").fetchall()
+            return [Cell((group, node), dict(json.loads(told)), heard_ms=at) for group, node, told, at in rows]
+        except (sqlite3.Error, ValueError, TypeError) as error:
+            raise StoreError(f"{self._path}: is damaged: {error}. Move it away; the past alone is lost") from error
 
     def keep(self, cells: Iterable[Cell], jobs: Iterable[tuple[Name, dict[str, Value | None]]], before_ms: int) -> None:
         """Note what is new, and let go what was settled before; raise StoreError."""
@@ -80,13 +83,21 @@ class Store:
                 self._database.executemany("INSERT OR IGNORE INTO jobs VALUES (?, ?, ?, ?, ?, ?, ?)", rows)
                 self._database.executemany("INSERT OR REPLACE INTO cells VALUES (?, ?, ?, ?)", known)
                 self._database.execute("DELETE FROM jobs WHERE settled_ms < ?", (before_ms,))
-            finally:
                 self._database.execute("COMMIT")
+            finally:
+                if self._database.in_transaction:  # else no later one could begin
+                    self._database.execute("ROLLBACK")
         except sqlite3.Error as error:
             raise StoreError(f"{self._path}: cannot be written: {error}. Free space, or see who may write") from error
 
     def figures(self, shift_ms: int, now_ms: int) -> dict[Name, Figures]:
-        """Of each cell with jobs in the last eight days. shift_ms: when the shift began."""
+        """Of each cell with jobs in the last eight days; raise StoreError. shift_ms: when the shift began."""
+        try:
+            return self._figures(shift_ms, now_ms)
+        except sqlite3.Error as error:
+            raise StoreError(f"{self._path}: cannot be read: {error}. Move it away and start again") from error
+
+    def _figures(self, shift_ms: int, now_ms: int) -> dict[Name, Figures]:
         outcomes: dict[Name, dict[str, int]] = {}
         query = "SELECT grp, node, outcome, count(*) FROM jobs WHERE settled_ms >= ? GROUP BY 1, 2, 3"
         for group, node, outcome, count in self._database.execute(query, (shift_ms,)):

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 LARGEST = 1_000_000
+MOST_METRICS = 1000
 Value = int | float | bool | str
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _NAME, _ALIAS, _TIMESTAMP, _DATATYPE, _HISTORICAL, _NULL = 1, 2, 3, 4, 5, 7
@@ -114,8 +115,11 @@ def decoded(raw: bytes) -> Payload:
     """The payload that the bytes hold; raise PayloadError."""
     if len(raw) > LARGEST:
         raise PayloadError(f"{len(raw)} bytes, expected {LARGEST} at most")
-    timestamp_ms, seq, metrics = 0, None, []
+    timestamp_ms, seq = 0, None
+    metrics: list[Metric] = []
     for field, value in _fields(raw):
+        if len(metrics) > MOST_METRICS:
+            raise PayloadError(f"more than {MOST_METRICS} metrics")
         if field == 1 and isinstance(value, int):
             timestamp_ms = value
         elif field == 2 and isinstance(value, bytes):

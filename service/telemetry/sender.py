@@ -32,6 +32,7 @@ log = logging.getLogger("combtrace.telemetry")
 
 BEAT_S = 1.0  # a cell that says nothing for some of these is silent
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 8.0  # before the next connection; drawn, for a plant's cells lose it together
+STEADY_S = 10.0  # a connection that ends sooner is tried again with a longer pause each time
 GAP_S = 0.1  # from a change to its telling: a job that begins or ends has the processor first
 AT_ONCE = 50  # jobs or changes for which one answer is waited for
 SAVE_S = 60.0
@@ -134,16 +135,22 @@ class Sender:
     def _run(self) -> None:
         pause_s = FIRST_PAUSE_S
         while not self._stop.is_set():
-            born_ms = self._born_ms
+            begun_s, born_ms = time.monotonic(), self._born_ms
             try:
                 self._connection()
             except SessionLost as lost:
-                self._tell_lost(str(lost))
+                self._tell_lost(str(lost) + self._hint(born_ms, begun_s))
             except Exception:  # whatever it is, it ends neither the daemon nor what it tells
                 log.exception("telemetry: a defect. Report it with this log; it is tried again")
-            pause_s = FIRST_PAUSE_S if self._born_ms != born_ms else min(2 * pause_s, LONGEST_PAUSE_S)
+            pause_s = min(2 * pause_s, LONGEST_PAUSE_S) if time.monotonic() < begun_s + STEADY_S else FIRST_PAUSE_S
             self._stop.wait(pause_s * random.uniform(0.5, 1))
         self._save()
+
+    def _hint(self, born_ms: int, begun_s: float) -> str:
+        """What to look for where a connection ended soon after its birth: two of one name drive each other away."""
+        if self._born_ms == born_ms or time.monotonic() >= begun_s + STEADY_S:
+            return ""
+        return f". If it goes on: is another cell named {self._settings.group}/{self._settings.node}, too?"
 
     def _tell_lost(self, why: str) -> None:
         """Once each: a broker that is away for a week is no news."""
@@ -159,7 +166,8 @@ class Sender:
         self._changes.again()
         self._jobs.again()
         will = self._node.death(self._now_ms())
-        client_id = f"combtrace-{settings.group}-{settings.node}"
+        # A broker lets the last of one id in and the others go: no two cells may have one, as a-b, c and a, b-c would.
+        client_id = f"combtrace-{len(settings.group)}-{settings.group}-{settings.node}"
         try:
             session = Session(settings, client_id, will, self._waker, self._heard)
         except NotReached:

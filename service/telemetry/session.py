@@ -6,7 +6,6 @@ another will. Whatever the broker says or leaves unsaid ends this connection at 
 
 from __future__ import annotations
 
-import os
 import select
 import socket
 import ssl
@@ -229,25 +228,36 @@ class Session:
 
 
 def password_of(broker: Broker) -> str | None:
-    """The first line of the password's file; raise ValueError, OSError."""
+    """The first line of the password's file; raise ValueError."""
     path = broker.password_file
     if path is None:
         return None
-    if os.stat(path).st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+    try:
+        mode, text = path.stat().st_mode, path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read: {_words(error)}. Expected the password in its first line") from error
+    if mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise ValueError(f"{path}: others may read it. `chmod 600 {path}`")
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = text.splitlines()
     if not lines or not lines[0]:
         raise ValueError(f"{path}: its first line is empty, expected the password")
     return lines[0]
 
 
 def tls_context(broker: Broker) -> ssl.SSLContext:
-    """By which the broker is judged, and with what one proves to be oneself; raise OSError, ValueError."""
+    """By which the broker is judged, and with what one proves to be oneself; raise ValueError."""
     tls = broker.tls
     assert tls is not None
-    context = ssl.create_default_context(cafile=tls.ca_file)
+    try:
+        context = ssl.create_default_context(cafile=tls.ca_file)
+    except OSError as error:
+        raise ValueError(f"{tls.ca_file}: {_words(error)}. Expected certificates, PEM") from error
     if tls.cert_file is not None:
-        context.load_cert_chain(tls.cert_file, tls.key_file)
+        try:  # with an empty password: a library that asks for one would wait at the daemon's terminal
+            context.load_cert_chain(tls.cert_file, tls.key_file, password="")
+        except OSError as error:
+            told = f"{tls.cert_file} with {tls.key_file}: {_words(error)}"
+            raise ValueError(f"{told}. Expected a certificate and its key, PEM, without a password") from error
     return context
 
 

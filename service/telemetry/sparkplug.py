@@ -10,6 +10,7 @@ from service.telemetry.payload import DataType, Metric, Payload, PayloadError, V
 from service.telemetry.session import Message
 
 NAMESPACE = "spBv1.0"
+LARGEST_COMMAND = 20_000
 BIRTH_COUNT, REBIRTH = "bdSeq", "Node Control/Rebirth"
 
 
@@ -33,7 +34,12 @@ def state_said(payload: bytes) -> tuple[bool, int] | None:
 
 
 def rebirth_asked(payload: bytes) -> bool:
-    """Whether a command asks for a birth; it is the one thing that any command may ask for."""
+    """Whether a command asks for a birth; it is the one thing that any command may ask for.
+
+    A long one is not looked at: reading it would take the interpreter from the jobs.
+    """
+    if len(payload) > LARGEST_COMMAND:
+        return False
     try:
         metrics = decoded(payload).metrics
     except PayloadError:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import ssl
 from asyncio import Transport
 from pathlib import Path
 
@@ -65,6 +66,20 @@ def http_server(app: ASGIApp, certificate: Path | None = None, key: Path | None 
             ssl_keyfile=key,
         )
     )
+
+
+def certificate_mistake(certificate: Path | None, key: Path | None) -> str | None:
+    """Why a certificate cannot be served with; None where it can, or where there is none."""
+    if certificate is None or key is None:
+        return None
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)
+    except OSError as error:
+        return (
+            f"page: certificate {certificate} and key {key} cannot be used: {error.strerror or error}. "
+            "Expected PEM files that belong together"
+        )
+    return None
 
 
 def listening(host: str, port: int) -> socket.socket:

@@ -6,7 +6,6 @@ import asyncio
 import importlib.metadata
 import logging
 import socket
-import ssl
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -22,7 +21,7 @@ from service.web.commands import Commands, Known
 from service.web.daemon_access import DaemonAccess, PageSources
 from service.web.guard import Guard
 from service.web.html import Pages
-from service.web.http_server import http_server, listening
+from service.web.http_server import certificate_mistake, http_server, listening
 from service.web.people.pins import PeopleFile
 from service.web.people.tokens import TokenFile, TokenFileError
 from service.web.trends.endpoints import TrendEndpoints
@@ -125,15 +124,9 @@ def known_of(settings: PageSettings) -> Known:
 
 def check_certificate(settings: PageSettings) -> None:
     """Raise PageError where there is one that cannot be used."""
-    if settings.certificate is None or settings.key is None:
-        return
-    try:
-        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(settings.certificate, settings.key)
-    except (OSError, ssl.SSLError) as error:
-        raise PageError(
-            f"page: certificate {settings.certificate} and key {settings.key} cannot be used: "
-            f"{error.strerror or error}. Expected PEM files that belong together"
-        ) from error
+    why_not = certificate_mistake(settings.certificate, settings.key)
+    if why_not is not None:
+        raise PageError(why_not)
 
 
 def make_page(settings: PageSettings, sources: PageSources) -> PageServer:

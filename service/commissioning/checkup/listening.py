@@ -43,7 +43,7 @@ def _telemetry(settings: Telemetry) -> CheckResult:
         password_of(settings)
         if settings.tls is not None:
             tls_context(settings)
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         return fault("telemetry", str(error), "Check telemetry.password_file and telemetry.tls")
     return ok("telemetry", f"{settings.group}/{settings.node} to {settings.host}:{settings.port}")
 

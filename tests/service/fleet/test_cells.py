@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from service.fleet.cells import MOST_CELLS, REBIRTH_GAP_S, Cell, Cells, Heard
+from service.fleet.cells import LONGEST_TEXT, MOST_CELLS, REBIRTH_GAP_S, Cell, Cells, Heard
 from service.telemetry.cell_metrics import ALIASES, TYPES, Values
-from service.telemetry.payload import Metric
+from service.telemetry.payload import MOST_METRICS, DataType, Metric
 from service.telemetry.session import Message
 from service.telemetry.sparkplug import Node
 
@@ -94,6 +94,15 @@ def test_more_cells_than_can_be_shown_are_not_kept() -> None:
         message = Node("plant", f"cell-{number}", 0).data([], AT_MS)
         cells.take(message.topic, message.payload, 0.0, AT_MS)
     assert len(cells.by_name) == MOST_CELLS
+
+
+def test_a_cell_that_names_more_and_more_fills_no_memory(born: Ear) -> None:
+    for number in range(3):
+        values = [Metric("x" * 30_000, DataType.STRING, f"{number}-{k}") for k in range(30)]
+        values += [Metric(k, DataType.UINT64, f"n{number}-{k}") for k in range(800)]
+        born.hears(born.node.data(values, AT_MS))
+    assert len(born.cell.values) == MOST_METRICS
+    assert max(len(value) for value in born.cell.values.values() if isinstance(value, str)) == LONGEST_TEXT
 
 
 @settings(max_examples=25)

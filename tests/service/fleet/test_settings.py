@@ -40,6 +40,8 @@ def test_an_empty_mapping_is_enough_and_paths_count_from_the_file(tmp_path: Path
         ("groups: ['a/b']\n", r"without \+ # /"),
         ("shifts: []\n", "expected one time of day or more"),
         ("shifts: ['25:00']\n", "expected HH:MM"),
+        ("shifts: ['23:00-12:00']\n", "expected HH:MM"),
+        ('host_id: "a\\tb"\n', "printable characters"),
     ],
 )
 def test_a_mistake_is_told(tmp_path: Path, text: str, expected: str) -> None:

@@ -88,6 +88,29 @@ def test_a_file_that_is_none_is_named(tmp_path: Path, content: bytes | None) -> 
         Store(path)
 
 
+def test_what_a_full_disk_refused_is_written_once_there_is_room(tmp_path: Path) -> None:
+    store = Store(tmp_path / "fleet.sqlite")
+    many = [(NAME, job(number, 10)) for number in range(1, 5000)]
+    store._database.execute("PRAGMA max_page_count = 20")
+    with pytest.raises(StoreError, match="full"):
+        store.keep([], many, 0)
+    store._database.execute("PRAGMA max_page_count = 100000")
+    store.keep([], many, 0)
+    assert store.figures(0, NOW_MS)[NAME].outcomes == {"accepted": 4999}
+    store.close()
+
+
+def test_a_file_that_was_damaged_is_named_whatever_is_asked_of_it(tmp_path: Path) -> None:
+    store = Store(tmp_path / "fleet.sqlite")
+    store._database.execute("DROP TABLE jobs")
+    with pytest.raises(StoreError, match=r"fleet\.sqlite: cannot be read: no such table"):
+        store.figures(0, NOW_MS)
+    store._database.execute("INSERT INTO cells VALUES ('plant', 'cell-1', '{', 0)")
+    with pytest.raises(StoreError, match=r"fleet\.sqlite: is damaged"):
+        store.cells()
+    store.close()
+
+
 @pytest.mark.parametrize(
     ("now", "begin"), [("05:59", "22:00"), ("06:00", "06:00"), ("13:59", "06:00"), ("23:10", "22:00")]
 )

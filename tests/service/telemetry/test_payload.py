@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from service.telemetry.payload import LARGEST, DataType, Metric, Payload, PayloadError, decoded, encoded
+from service.telemetry.sparkplug import REBIRTH, rebirth_asked
 from tests.support.interop.programs import python_packages
 
 TIMES = st.integers(0, 2**62)
@@ -100,3 +101,15 @@ def test_a_payload_cut_short_is_none(cut: int) -> None:
 def test_what_is_too_large_is_not_read() -> None:
     with pytest.raises(PayloadError, match="1000000 at most"):
         decoded(bytes(LARGEST + 1))
+
+
+def test_a_payload_of_too_many_metrics_is_refused_before_all_are_read() -> None:
+    with pytest.raises(PayloadError, match="more than 1000 metrics"):
+        decoded(b"\x12\x00" * 400_000)
+
+
+def test_a_long_command_is_not_read() -> None:
+    wish = Payload(1, (Metric(True, DataType.BOOLEAN, REBIRTH),))
+    assert rebirth_asked(encoded(wish, types=True))
+    long = replace(wish, metrics=(*wish.metrics, Metric("x" * 30_000, DataType.STRING, "more")))
+    assert not rebirth_asked(encoded(long, types=True))

@@ -128,3 +128,25 @@ async def test_nothing_is_told_before_the_host_that_is_waited_for_is_there(broke
         assert faults(bystander.lines()) == []
         assert numbers[-1] not in bystander.values("Job/Number")
         assert len(bystander.lines("NBIRTH")) == 1
+
+
+async def test_two_cells_of_one_name_leave_each_other_time_and_say_what_to_look_for(
+    broker: Mosquitto, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("WARNING", "combtrace.telemetry")
+    async with (
+        wired(tmp_path / "one", NO_CONTROLLER, **telling(broker)) as one,
+        wired(tmp_path / "other", NO_CONTROLLER, **telling(broker)),
+    ):
+        await until(lambda: "is another cell named combtrace/cell-1, too?" in caplog.text)
+        assert str((await one.job()).outcome) == "written"
+
+
+async def test_two_names_that_are_alike_when_run_together_are_two_clients(broker: Mosquitto, tmp_path: Path) -> None:
+    log = tmp_path / "mosquitto.log"
+    async with (
+        wired(tmp_path / "one", NO_CONTROLLER, **telling(broker, group="a-b", node="c")),
+        wired(tmp_path / "other", NO_CONTROLLER, **telling(broker, group="a", node="b-c")),
+    ):
+        await until(lambda: log.read_text().count(" as combtrace-") >= 2)
+        assert "already connected, closing old connection" not in log.read_text()

@@ -123,21 +123,23 @@ class Trust:
         if not certificate:
             return "it shows no certificate"
         name = f"{hashlib.sha1(certificate, usedforsecurity=False).hexdigest()}.der"
-        if not any(certificate == kept for kept in self._kept()):
+        if certificate not in self.certificates():
             return f"its certificate is not trusted{self._rejected(name, certificate)}"
         found = x509.load_der_x509_certificate(certificate)
         if not found.not_valid_before_utc <= datetime.now(UTC) <= found.not_valid_after_utc:
             return f"its certificate is valid from {found.not_valid_before_utc} to {found.not_valid_after_utc}"
         return None
 
-    def _kept(self) -> list[bytes]:
-        """Each file of the folder as DER, but those that cannot be read."""
+    def certificates(self) -> list[bytes]:
+        """Those that are trusted, DER; files that hold none are passed over."""
         found = []
         for path in sorted(self.trusted.iterdir()) if self.trusted.is_dir() else ():
             try:
                 data = path.read_bytes()[:LARGEST_FILE]
-                pem = b"-----BEGIN" in data
-                found.append(x509.load_pem_x509_certificate(data).public_bytes(Encoding.DER) if pem else data)
+                if b"-----BEGIN" in data:
+                    data = x509.load_pem_x509_certificate(data).public_bytes(Encoding.DER)
+                x509.load_der_x509_certificate(data)
+                found.append(data)
             except (OSError, ValueError):
                 continue
         return found

@@ -33,9 +33,11 @@ def check_opcua(settings: Opcua, state_dir: Path) -> Iterator[CheckResult]:
     except OpcuaError as error:
         yield fault("opcua", str(error))
         return
-    trusted = Trust(folder).trusted
-    count = len(list(trusted.iterdir())) if trusted.is_dir() else 0
+    trust = Trust(folder)
+    count = len(trust.certificates())
     if not count:
-        yield warning("opcua", f"no client is trusted: {trusted} is empty", "Lay clients' certificates there")
+        yield warning(
+            "opcua", f"no client is trusted: {trust.trusted} holds no certificate", "Lay clients' certificates there"
+        )
     who = "none who may halt" if users is None else f"halted and reset by {', '.join(name for name, _ in users.read())}"
     yield ok("opcua", f"{settings.host}:{settings.port}, {count} clients trusted, {who}")

@@ -370,9 +370,15 @@ def test_opcua_tells_whom_it_lets_in_and_what_cannot_be_used(tmp_path: Path) -> 
     assert (found.level, "users: cannot be read" in found.text) == (Level.FAULT, True)
     (tmp_path / "users").write_text(f"anna {'a' * 24}\n")
     (tmp_path / "users").chmod(0o600)
+    trusted = tmp_path / "opcua" / "trusted"
+    trusted.mkdir(parents=True)
+    (trusted / "notes.txt").write_text("certificates go here")
     empty, found = check_opcua(settings.opcua, tmp_path)
     assert (empty.level, "no client is trusted" in empty.text) == (Level.WARNING, True)
     assert found.text == "127.0.0.1:4840, 0 clients trusted, halted and reset by anna"
+    (trusted / "client.pem").write_bytes(identity(tmp_path / "client").certificate.read_bytes())
+    (found,) = check_opcua(settings.opcua, tmp_path)
+    assert "1 clients trusted" in found.text
     own = identity(tmp_path / "own", days=3)
     own.key.chmod(0o600)
     plants = Opcua(certificate=own.certificate, key=own.key)

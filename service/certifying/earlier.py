@@ -20,21 +20,25 @@ class EarlierError(Exception):
     """An earlier certificate cannot be compared with: the file, what was seen, what is expected."""
 
 
-class _Length(BaseModel):
+class _Read(BaseModel):
+    """What is read has numbers alone: with one that is none nothing could be compared."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+
+class _Length(_Read):
     name: str
     true_mm: float
     error_mm: float
     uncertainty_mm: float
 
 
-class _Gauge(BaseModel):
+class _Gauge(_Read):
     id: str
 
 
-class Earlier(BaseModel):
+class Earlier(_Read):
     """What is compared of a certificate's JSON."""
-
-    model_config = ConfigDict(frozen=True)
 
     number: str
     procedure: str

@@ -59,7 +59,7 @@ def check_able(gauge: Gauge, guard: CalibrationGuard, limit: Limit, temperature_
         if least >= limit.at(known.length_mm):
             raise NotCertified(
                 f"length {known.name} of the gauge is sure to {least:.3f} mm only, the limit is "
-                f"{limit.at(known.length_mm):.3f} mm: it can show nothing. Take a better gauge, measure its warmth "
+                f"{limit.at(known.length_mm):g} mm: it can show nothing. Take a better gauge, measure its warmth "
                 "(--temperature-c), or state a larger limit (--limit-mm)"
             )
     if gauge.file.form_mm >= limit.constant_mm:

@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from functools import cache
-from importlib.resources import files
-
 from service.details import russian
 from service.reasons import Language
+from service.texts import Texts
 
-
-def static(name: str) -> str:
-    """A file of what certificates are made of."""
-    return (files("service.certifying") / "static" / name).read_text(encoding="utf-8")
-
-
-@cache
-def _texts() -> dict[str, dict[str, str]]:
-    return dict(json.loads(static("texts.json")))
-
-
-def words(language: Language, key: str, **values: object) -> str:
-    """A text, with its values put in."""
-    return _texts()[language][key].format(**values)
+_TEXTS = Texts("service.certifying")
+static, words = _TEXTS.static, _TEXTS.words
 
 
 def millimetres(language: Language, value: float, digits: int = 3, *, signed: bool = False) -> str:

@@ -2,28 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import math
 from datetime import datetime
-from functools import cache
-from importlib.resources import files
 
 from service.reasons import Language
+from service.texts import Texts
 
-
-def static(name: str) -> str:
-    """A file of what reports and pages are made of."""
-    return (files("service.trends") / "static" / name).read_text(encoding="utf-8")
-
-
-@cache
-def _texts() -> dict[str, dict[str, str]]:
-    return dict(json.loads(static("texts.json")))
-
-
-def words(language: Language, key: str, **values: object) -> str:
-    """A text, with its values put in."""
-    return _texts()[language][key].format(**values)
+_TEXTS = Texts("service.trends")
+static, words = _TEXTS.static, _TEXTS.words
 
 
 def number(language: Language, value: float | None, digits: int | None = None) -> str:

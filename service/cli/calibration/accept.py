@@ -80,6 +80,7 @@ def run(args: argparse.Namespace) -> int:
     """Look, decide, write."""
     from service.certifying.trial import NotCertified, certified, studied
 
+    _check_files(args)
     bench = _Bench.of(args)
     earlier = _earlier(args.against)
     with text_output(args.json) as write_json:
@@ -150,6 +151,15 @@ class _Bench:
         return cls(config, gauge, guard, Eye(gauge, guard, recipe, table_of(config)), told)
 
 
+def _check_files(args: argparse.Namespace) -> None:
+    """Raise UserError where the certificate would take the place of the one that it is held against."""
+    if args.against is None:
+        return
+    for option, written in (("--output", args.output), ("--json", None if args.json == "-" else args.json)):
+        if written is not None and Path(written).resolve() == args.against.resolve():
+            raise UserError(f"{option} {written}: is the certificate of --against, which is to be kept. Name another")
+
+
 def _check_numbers(args: argparse.Namespace) -> None:
     if args.limit_mm is not None and not 0 < args.limit_mm < 1e3:
         raise UserError(f"--limit-mm {args.limit_mm:g}: expected a number above 0, in millimetres")
@@ -166,7 +176,7 @@ def _command(args: argparse.Namespace) -> str:
     words = ["combtrace", "accept", "--gauge", args.gauge.name]
     for name in ("config", "calibration", "recipe", "limit_mm", "limit_mm_per_m", "places", "temperature_c"):
         value = getattr(args, name)
-        if value not in (None, 0.0):
+        if value is not None and (value or name != "limit_mm_per_m"):
             words += [f"--{name.replace('_', '-')}", value.name if isinstance(value, Path) else f"{value}"]
     study = ["--study", *args.study] if args.study else []
     return shlex.join([*words, *(path.name for path in args.images or [args.keep]), *study])

@@ -16,8 +16,8 @@ from service.reasons import Language, Reason
 from service.replays.report.conditions import Condition
 from service.replays.report.histogram import histogram
 from service.replays.report.summary import Group, Summary
-from service.replays.report.words import words
 from service.replays.rows import Row
+from service.texts import Texts
 from service.trends.documents import STYLE
 from service.trends.parts import section, table
 from service.trends.words import moment, number
@@ -34,6 +34,7 @@ figcaption { font-size: 14px; }
 td:first-child { white-space: nowrap; }
 """
 _CODES = {int(reason) for reason in Reason}
+words = Texts("service.replays.report").words
 
 Draw = Callable[[Row], "Thumbnails | None"]
 

@@ -17,7 +17,7 @@ import yaml
 
 from contour.calibration.calibration import SimpleCalibration
 from contour.length_test.verdict import Limit
-from service.certifying.earlier import compared, read_earlier
+from service.certifying.earlier import EarlierError, compared, read_earlier
 from service.certifying.gauge_file import BlockFile, BoardEntry, CornersEntry, PlateFile, read_gauge
 from service.certifying.sight import Sight, served
 from service.certifying.trial import NotCertified, check_able, studied
@@ -193,6 +193,26 @@ def test_last_years_certificate_stands_beside_this_one(
     grown = certificate(trial.told, trial.record, trial.again(warmer_k=60.0), tmp_path)
     changes = compared(grown, read_earlier(folder / "last.json")).changes
     assert any(change.moved for change in changes)
+
+
+def test_last_years_certificate_is_not_written_over(folder: Path, last: dict[str, Any]) -> None:
+    earlier = str(folder / "last.json")
+    for option in ("--json", "--output"):
+        words = [*options(folder), "--against", earlier, option, earlier]
+        assert main(["accept", str(folder / "pictures"), *words]) == 2
+    assert json.loads((folder / "last.json").read_text()) == last
+
+
+def test_a_certificate_with_a_number_that_is_none_is_no_certificate(last: dict[str, Any], tmp_path: Path) -> None:
+    (tmp_path / "odd.json").write_text(json.dumps({**last, "limit_mm": float("nan")}))
+    with pytest.raises(EarlierError, match=r"odd\.json: is no certificate: limit_mm: Input should be a finite number"):
+        read_earlier(tmp_path / "odd.json")
+
+
+def test_a_gauge_at_nought_degrees_is_in_the_command_that_repeats_it(folder: Path, tmp_path: Path) -> None:
+    words = ["--json", str(tmp_path / "cold.json"), "--output", str(tmp_path / "cold.html"), "--temperature-c", "0"]
+    main(["accept", str(folder / "pictures"), *options(folder), *words])
+    assert "--temperature-c 0.0" in json.loads((tmp_path / "cold.json").read_text())["command"]
 
 
 def test_a_study_of_unequal_numbers_or_of_a_picture_that_does_not_serve_is_refused(

@@ -33,6 +33,7 @@ _EXPECTED = {
     "string_type": "text; put it in quotes",
     "string_too_short": "{min_length} or more characters",
     "string_too_long": "{max_length} characters at most",
+    "string_pattern_mismatch": "text of the form {pattern}",
     "bool_type": "true or false",
     "bool_parsing": "true or false",
     "tuple_type": "a list",

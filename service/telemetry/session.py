@@ -92,7 +92,8 @@ class Session:
         self._waker = waker
         self._answered: set[int] = set()
         self._connected: bool | None = None
-        self._why = "the broker closed the connection"
+        self._where = f"{broker.host}:{broker.port}"
+        self._why = f"{self._where}: closed before it answered. Is it a broker's port, with TLS where tls is set alone?"
         client = paho.Client(
             CallbackAPIVersion.VERSION2, client_id, clean_session=True, protocol=MQTTProtocolVersion.MQTTv311
         )
@@ -112,9 +113,13 @@ class Session:
             if broker.tls is not None:
                 self._client.tls_set_context(tls_context(broker))
             self._client.connect(broker.host, broker.port, KEEP_ALIVE_S)
+        except ssl.SSLCertVerificationError as error:
+            self.close()
+            told = f"{self._where}: its certificate is not trusted: {error.verify_message}"
+            raise NotReached(f"{told}. Check tls.ca_file, and the name in the certificate") from error
         except (OSError, ValueError) as error:
             self.close()
-            raise NotReached(f"{broker.host}:{broker.port}: {_words(error)}") from error
+            raise NotReached(f"{self._where}: {_words(error)}") from error
         try:
             self.turn_until(lambda: self._connected is not None, "CONNECT")
         except SessionLost:
@@ -124,7 +129,7 @@ class Session:
     def _on_connect(self, _client: paho.Client, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
         self._connected = not code.is_failure
         if code.is_failure:
-            self._why = f"the broker refused the connection: {code}"
+            self._why = f"{self._where}: the broker refused the connection: {code}. Check username and password_file"
 
     def _on_disconnect(self, _client: paho.Client, _data: Any, _flags: Any, code: Any, _properties: Any) -> None:
         if self._connected:

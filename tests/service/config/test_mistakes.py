@@ -56,6 +56,10 @@ def told(tmp_path: Path, *, camera: str = "", period: str = "1", recipe: str = "
             "line 14: recipes[1].binarize: seen 300, expected one of flat, otsu or 255 at",
         ),
         ({"recipe": "    max_vertices: 10.5"}, "line 14: recipes[1].max_vertices: seen 10.5, expected a whole number"),
+        (
+            {"recipe": "telemetry: {node: a, page_url: 'ftp://x'}"},
+            "page_url: seen 'ftp://x', expected text of the form",
+        ),
         ({"recipe": "  - yes"}, "line 14: recipes[2]: seen true, as yes and on are read, expected keys with values"),
         ({"recipe": "    parameters: [1]"}, "line 14: recipes[1].parameters: seen [1], expected keys with values"),
         (

@@ -24,7 +24,8 @@ log = logging.getLogger("combtrace.fleet")
 
 KEEP_S = 1.0  # from one writing of the store to the next
 FIGURES_S = 5.0
-PAUSE_S = 0.5
+PAUSE_S, LONGEST_PAUSE_S = 0.5, 8.0
+STEADY_S = 10.0
 STOP_S = 2.0
 MOST_WAITING = 100_000  # jobs, for a disk that takes nothing now
 KNOWN = ("NBIRTH", "NDATA", "NDEATH")
@@ -71,18 +72,25 @@ class Listener:
     # --- in its own thread --------------------------------------------------------------------------------------
 
     def _run(self) -> None:
-        told = ""
+        told, pause_s = "", PAUSE_S
         while not self._waker.stopped.is_set():
+            begun_s = time.monotonic()
             try:
                 self._connection()
             except SessionLost as lost:
-                log.log(logging.DEBUG if str(lost) == told else logging.WARNING, "fleet: %s", lost)
-                told = str(lost)
+                why, host = str(lost), self._settings.host_id
+                if self.connected and time.monotonic() < begun_s + STEADY_S:
+                    why += f". If it goes on: is there another page with host_id {host}?"
+                    pause_s = min(2 * pause_s, LONGEST_PAUSE_S)  # two would drive each other away
+                else:
+                    pause_s = PAUSE_S
+                log.log(logging.DEBUG if why == told else logging.WARNING, "fleet: %s", why)
+                told = why
             except Exception:  # whatever it is, the page goes on, and it is tried again
                 log.exception("fleet: a defect. Report it with this log")
             self.connected = False
             self._keep_up()
-            self._waker.stopped.wait(PAUSE_S)
+            self._waker.stopped.wait(pause_s)
         self._keep_up(at_once=True)
 
     def _connection(self) -> None:

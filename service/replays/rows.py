@@ -121,7 +121,7 @@ def row_of(document: dict[str, Any], before: Side, after: Side) -> Row:
         row[f"outcome_{name}"], row[f"reason_{name}"] = _end(document["job"], side.codes)
         for quantity in ("area_mm2", "vertices", "uncertainty_mm"):
             row[f"{quantity}_{name}"] = side.kept[quantity]
-        row[f"total_ms_{name}"] = side.kept["timings_ms"].get("total")
+        row[f"total_ms_{name}"] = dict(side.kept["timings_ms"]).get("total")
         for program in ("combtrace", "numpy", "opencv"):
             row[f"{program}_{name}"] = getattr(side.versions, program)
     return row
@@ -138,7 +138,7 @@ def apart_between(before: Side, after: Side) -> Apart | None:
 
 def job_columns(document: dict[str, Any]) -> Row:
     """What the row tells of the job itself."""
-    recipe = document["recipe"] or {}
+    recipe = dict(document["recipe"] or {})
     return {
         "taken_at": datetime.fromisoformat(document["job"]["taken_at"]),
         "recipe": recipe.get("number"),

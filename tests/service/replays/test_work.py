@@ -143,6 +143,14 @@ def recipe_name_that_cannot_be_written(archive: Path) -> None:
     changed_document(archive, 1, recipe={**load_archived(archive, 1).document["recipe"], "name": "\ud800"})
 
 
+def recipe_that_is_a_list(archive: Path) -> None:
+    changed_document(archive, 1, recipe=[1])
+
+
+def times_that_are_none(archive: Path) -> None:
+    changed_document(archive, 1, measurement={**load_archived(archive, 1).document["measurement"], "timings_ms": None})
+
+
 def vertices_that_are_no_number(archive: Path) -> None:
     changed_document(archive, 1, measurement={**load_archived(archive, 1).document["measurement"], "vertices": "many"})
 
@@ -166,6 +174,8 @@ def area_beyond_all_numbers(archive: Path) -> None:
         (recipe_number_that_is_none, Flaw.DOCUMENT_DAMAGED),
         (recipe_number_beyond_all_columns, Flaw.DOCUMENT_DAMAGED),
         (recipe_name_that_cannot_be_written, Flaw.DOCUMENT_DAMAGED),
+        (recipe_that_is_a_list, Flaw.DOCUMENT_DAMAGED),
+        (times_that_are_none, Flaw.DOCUMENT_DAMAGED),
         (vertices_that_are_no_number, Flaw.DOCUMENT_DAMAGED),
         (area_beyond_all_numbers, Flaw.DOCUMENT_DAMAGED),
     ],

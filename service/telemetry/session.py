@@ -115,7 +115,7 @@ class Session:
             self._client.connect(broker.host, broker.port, KEEP_ALIVE_S)
         except ssl.SSLCertVerificationError as error:
             self.close()
-            told = f"{self._where}: its certificate is not trusted: {error.verify_message}"
+            told = f"{self._where}: certificate verify failed: {error.verify_message}"
             raise NotReached(f"{told}. Check tls.ca_file, and the name in the certificate") from error
         except (OSError, ValueError) as error:
             self.close()

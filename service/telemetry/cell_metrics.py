@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import time
 from collections import Counter
 from collections.abc import Mapping
 from datetime import datetime
@@ -13,7 +14,8 @@ from service.config.recipes import Recipe
 from service.jobs.health import Fault
 from service.reasons import Outcome
 from service.records.job import Job
-from service.telemetry.payload import DataType, Value
+from service.telemetry.kept import Kept
+from service.telemetry.payload import DataType, Metric, Value
 from service.telemetry.sources import DaemonSources
 
 Values = dict[str, Value | None]
@@ -94,8 +96,37 @@ _QUALITY = {
 }
 
 
+class CellNow:
+    """What a cell is like at a moment, but for its state and its jobs. outcomes: of jobs since the start."""
+
+    def __init__(self, sources: DaemonSources, kept: Kept, page_url: str | None) -> None:
+        """kept: since when recipes, calibration and version are as they are."""
+        self._sources, self._kept, self._page_url = sources, kept, page_url
+        self.outcomes: Counter[Outcome] = Counter()
+        self._recipes: tuple[object, str] = (None, "")
+        self._begun_s = time.monotonic()
+
+    def values(self, dropped: int, now_ms: int) -> Values:
+        """Each metric. dropped: jobs and changes that were let go untold."""
+        recipes = self._sources.recipes()
+        if recipes is not self._recipes[0]:
+            self._recipes = (recipes, recipes_hash(recipes))
+        values = values_now(self._sources, self.outcomes)
+        calibration, version = values["Calibration/Hash"], str(values["Service/Version"])
+        seen = self._kept.first_seen
+        return values | {
+            "Recipes/Hash": self._recipes[1],
+            "Recipes/Since": seen("recipes", self._recipes[1], now_ms),
+            "Calibration/Since": None if calibration is None else seen("calibration", str(calibration), now_ms),
+            "Service/Since": seen("version", version, now_ms),
+            "Service/Page": self._page_url,
+            UPTIME: round(time.monotonic() - self._begun_s),
+            DROPPED: dropped,
+        }
+
+
 def values_now(sources: DaemonSources, outcomes: Counter[Outcome]) -> Values:
-    """All that is looked at now, but for what the sender adds. outcomes: of jobs since the start."""
+    """All that the daemon's parts say now."""
     faults, warnings = sources.health.faults(), sources.health.warnings
     link, storage, archive = sources.link, sources.storage, sources.archive
     guard = sources.guard()
@@ -138,6 +169,14 @@ def job_values(job: Job) -> Values:
         **{name: report.get(key) for name, key in _REPORTED.items()},
         **{name: quality.get(key) for name, key in _QUALITY.items()},
     }
+
+
+def metrics_of(values: Values, at_ms: int, born_ms: int) -> list[Metric]:
+    """As they were at a moment; historical where that was before the birth."""
+    return [
+        Metric(value, TYPES[name], alias=ALIASES[name], timestamp_ms=at_ms, historical=at_ms < born_ms)
+        for name, value in values.items()
+    ]
 
 
 def recipes_hash(recipes: Mapping[int, Recipe]) -> str:

@@ -9,18 +9,16 @@ import logging
 import random
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 
 from service.config.plant import Telemetry
-from service.reasons import Outcome
 from service.records.job import Job
 from service.state import State
 from service.telemetry import cell_metrics
-from service.telemetry.cell_metrics import ALIASES, TYPES, Values
+from service.telemetry.cell_metrics import TYPES, CellNow, Values, metrics_of
 from service.telemetry.kept import Kept, load_kept, save_kept
 from service.telemetry.payload import Metric
 from service.telemetry.session import ANSWER_S, NotReached, Session, SessionLost, Waker
@@ -71,16 +69,14 @@ class Sender:
         self._jobs = Jobs(journal, settings.store, newest if confirmed is None else min(confirmed, newest))
         self._changes = Changes(settings.store)
         self._state: Values = {}
-        self._outcomes: Counter[Outcome] = Counter()
+        self._cell = CellNow(sources, self._kept, settings.page_url)
         self._told: Values = {}
-        self._recipes: tuple[object, str] = (None, "")
         self._node = Node(settings.group, settings.node, self._kept.births)
         self._host_online, self._host_said_ms = settings.primary_host is None, 0
         self._rebirth = False
         self._awaited: Awaited | None = None
         self._due_s = inf  # when what is new is to be told
         self._born_ms = 0
-        self._begun_s = time.monotonic()
         self._saved_s = 0.0
         self._lost = ""
         self._waker = Waker()
@@ -121,7 +117,7 @@ class Sender:
 
     def _settled(self, job: Job) -> None:
         if job.outcome is not None:
-            self._outcomes[job.outcome] += 1
+            self._cell.outcomes[job.outcome] += 1
         self._jobs.due = True
         self._is_new()
 
@@ -259,7 +255,7 @@ class Sender:
         self._due_s = 0.0  # once it is answered there may be more
         now_ms = self._now_ms()
         if changes:
-            metrics = [one for change in changes for one in self._metrics(change.values, change.at_ms)]
+            metrics = [one for change in changes for one in metrics_of(change.values, change.at_ms, self._born_ms)]
             session.publish(self._node.data(metrics, now_ms))
         for job in jobs:
             session.publish(self._node.data(self._of_job(job), now_ms))
@@ -269,14 +265,7 @@ class Sender:
     def _of_job(self, job: Job) -> list[Metric]:
         values = cell_metrics.job_values(job)
         at_ms = values["Job/Settled"]
-        return self._metrics(values, at_ms if isinstance(at_ms, int) else self._now_ms())
-
-    def _metrics(self, values: Values, at_ms: int) -> list[Metric]:
-        old = at_ms < self._born_ms
-        return [
-            Metric(value, TYPES[name], alias=ALIASES[name], timestamp_ms=at_ms, historical=old)
-            for name, value in values.items()
-        ]
+        return metrics_of(values, at_ms if isinstance(at_ms, int) else self._now_ms(), self._born_ms)
 
     def _birth(self, session: Session) -> None:
         """All there is to tell, as it is now."""
@@ -296,24 +285,10 @@ class Sender:
         changed = {name: value for name, value in now.items() if value != self._told[name]}
         self._told = now
         now_ms = self._now_ms()
-        session.publish(self._node.data(self._metrics(changed, now_ms), now_ms))
+        session.publish(self._node.data(metrics_of(changed, now_ms, self._born_ms), now_ms))
 
     def _now_values(self) -> Values:
-        values = cell_metrics.values_now(self._sources, self._outcomes)
-        recipes = self._sources.recipes()
-        if recipes is not self._recipes[0]:
-            self._recipes = (recipes, cell_metrics.recipes_hash(recipes))
-        calibration, version = values["Calibration/Hash"], str(values["Service/Version"])
-        seen, now_ms = self._kept.first_seen, self._now_ms()
-        return values | {
-            "Recipes/Hash": self._recipes[1],
-            "Recipes/Since": seen("recipes", self._recipes[1], now_ms),
-            "Calibration/Since": None if calibration is None else seen("calibration", str(calibration), now_ms),
-            "Service/Since": seen("version", version, now_ms),
-            "Service/Page": self._settings.page_url,
-            cell_metrics.UPTIME: round(time.monotonic() - self._begun_s),
-            cell_metrics.DROPPED: self._changes.dropped + self._jobs.dropped,
-        }
+        return self._cell.values(self._changes.dropped + self._jobs.dropped, self._now_ms())
 
     def _save(self) -> None:
         self._kept.confirmed = self._jobs.confirmed

@@ -43,6 +43,9 @@ _EXPECTED = {
     "dict_type": "keys with values",
     "model_type": "keys with values",
     "model_attributes_type": "keys with values",
+    "date_type": "a date such as 2026-11-23",
+    "date_from_datetime_parsing": "a date such as 2026-11-23",
+    "date_from_datetime_inexact": "a date such as 2026-11-23, without a time",
     "path_type": "the path of a file or folder",
 }
 

@@ -40,7 +40,8 @@ A length passes where its error and the test's uncertainty together stay within 
 No conformity to a standard is claimed.
 
 Exit status: 0 passes, 3 does not pass or is not decided, 2 nothing is certified: bad
-gauge file, gauge not found, too few positions."""
+gauge file, gauge not found, too few positions, 1 the camera failed: its pictures so far
+are kept."""
 
 FEWEST_PLACES, MOST_PLACES = 5, 100
 

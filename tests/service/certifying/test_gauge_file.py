@@ -58,6 +58,12 @@ def changed(data: dict[str, Any], place: int, **values: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("data", "expected"),
     [
+        ({**BLOCK, "calibrated_on": "soon"}, "calibrated_on: seen 'soon', expected a date such as 2026-11-23"),
+        (
+            {**BLOCK, "calibrated_on": 5.5},
+            "calibrated_on: seen 5.5, expected a date such as 2026-11-23, without a time",
+        ),
+        ({**BLOCK, "calibrated_on": True}, "calibrated_on: seen true, .*, expected a date such as"),
         (changed(PLATE, 0, length_mm=None, length_in=8.859), r"lengths\[0\]\.length_in: unknown key"),
         (
             changed(PLATE, 0, length_mm=22.503),

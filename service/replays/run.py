@@ -35,12 +35,13 @@ class WorkerFigures:
 
 @dataclass
 class Progress:
-    """How far a run is. before: jobs that earlier runs of the same command did."""
+    """How far a run is. before: jobs that earlier runs of the same command did. waits: there is no worker now."""
 
     jobs: int
     before: int
     done: int = 0
     elapsed_s: float = 0.0
+    waits: bool = False
     left_out: Counter[str] = field(default_factory=Counter)
     workers: dict[str, WorkerFigures] = field(default_factory=dict)
 
@@ -89,6 +90,7 @@ class Run:
                 flying += 1
             ended = self._workers.ended(WAIT_S)
             self.progress.elapsed_s = self._now() - begun
+            self.progress.waits = self._workers.room == 0
             if ended is not None:
                 flying -= 1
                 if ended.done is None:

@@ -55,6 +55,8 @@ def progress_line(progress: Progress, here_mb: float) -> str:
     done = progress.before + progress.done
     filled = BAR * done // max(progress.jobs, 1)
     told = [f"[{'#' * filled}{'.' * (BAR - filled)}] {done}/{progress.jobs} jobs"]
+    if progress.waits:
+        told.append("no worker is there: waiting for one")
     if progress.workers:
         each = sum(one.jobs_a_second for one in progress.workers.values()) / len(progress.workers)
         count = len(progress.workers)

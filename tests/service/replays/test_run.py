@@ -14,6 +14,7 @@ from typing import Self
 
 import pytest
 
+from service.cli.records.replay_progress import progress_line
 from service.records.evidence import Flaw
 from service.replays.errors import ReplayError
 from service.replays.places import Place
@@ -234,6 +235,24 @@ def test_a_damaged_part_is_named_and_done_again_once_it_is_deleted(
         carried_out(work, output, Played(work), quiet)
     part.unlink()
     assert carried_out(work, output, Played(work), quiet) == alone
+
+
+def test_a_run_without_a_worker_says_that_it_waits_for_one(work: Work, tmp_path: Path) -> None:
+    class Late(Played):
+        """There from the third look on."""
+
+        def ended(self, at_most_s: float) -> Ended | None:
+            looks.append(self.room)
+            self.room = 3 if len(looks) > 2 else 0
+            return super().ended(at_most_s) if self.begun else None
+
+    looks: list[int] = []
+    told: list[str] = []
+    late = Late(work)
+    late.room = 0
+    carried_out(work, tmp_path / "rows.parquet", late, lambda progress: told.append(progress_line(progress, 0)))
+    assert "0/12 jobs, no worker is there: waiting for one" in told[0]
+    assert "no worker" not in told[-1]
 
 
 def test_time_left_follows_the_pace_of_this_run_alone() -> None:

@@ -24,7 +24,7 @@ from service.jobs.executor import Executor
 from service.jobs.health import Health
 from service.opcua.bounded import ListeningServer
 from service.opcua.methods import Methods
-from service.opcua.session import MOST_CONNECTIONS, CellServer, Rules
+from service.opcua.session import MOST_CONNECTIONS, CellServer, Permissions, Rules
 from service.opcua.trust import OpcuaError, OwnCertificate, Trust, own_certificate, read_own
 from service.opcua.vision_system import StateSeen, VisionSystem, method_id, vision_system
 from service.records.job import Job
@@ -193,7 +193,7 @@ async def _prepared(server: ListeningServer, own: OwnCertificate, address: str) 
     await server.init()
     version = importlib.metadata.version("combtrace")
     await server.set_build_info("urn:combtrace", "combtrace", "combtrace", version, "0", datetime.now(UTC))
-    server.set_security_policy([POLICY])
+    server.set_security_policy([POLICY], Permissions())
     await server.load_certificate(own.certificate, "pem")
     await server.load_private_key(own.key, format="pem")
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from asyncua import ua
 from asyncua.common.utils import ServiceError
-from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.crypto.permission_rules import SimpleRoleRuleset, User, UserRole
 from asyncua.server.internal_server import InternalServer
 from asyncua.server.internal_session import InternalSession
 
@@ -43,6 +43,18 @@ class Rules:
     users: TokenFile | None
     reading: dict[ua.NodeId, Method] = field(default_factory=dict)
     ordering: dict[ua.NodeId, Method] = field(default_factory=dict)
+
+
+class Permissions(SimpleRoleRuleset):
+    """Which services there are: nodes are added and taken away by nobody, and before it is let in nobody has any."""
+
+    def check_validity(self, user: User, action_type_id: ua.NodeId, body: Any) -> bool:
+        """Whether it may pass; what may not is logged."""
+        passes = bool(super().check_validity(user, action_type_id, body))
+        if not passes:
+            name = ua.ObjectIdNames.get(action_type_id.Identifier, str(action_type_id.Identifier))
+            log.warning("opcua: %s refused", name.removesuffix("_Encoding_DefaultBinary"))
+        return passes
 
 
 class CellServer(InternalServer):

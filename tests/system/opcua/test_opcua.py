@@ -17,7 +17,7 @@ from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding
 
-from tests.support.interop.opcua import AUTOMATIC, CELL, CLIENT_PACKAGES, OUTER, Identity, NodeClient, identity
+from tests.support.interop.opcua import AUTOMATIC, CELL, CLIENT_PACKAGES, OUTER, URI, Identity, NodeClient, identity
 from tests.support.interop.programs import node_modules
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import TOKEN, token_file
@@ -178,6 +178,22 @@ async def test_somebody_elses_certificate_does_not_let_a_stranger_in(served: Ser
             await client.activate_session()
     finally:
         client.disconnect_socket()
+
+
+async def test_nodes_can_neither_be_added_nor_taken_away_and_who_tries_is_logged(served: Served) -> None:
+    own = served.cell.folder / "state" / "opcua" / "own.pem"
+    client = Client(f"opc.tcp://127.0.0.1:{served.port}")
+    shown = (served.trusted.certificate, served.trusted.key)
+    await client.set_security(SecurityPolicyBasic256Sha256, *shown, server_certificate=own)
+    client.application_uri = URI
+    async with client:
+        with pytest.raises(ua.UaStatusCodeError, match="BadUserAccessDenied"):
+            await client.get_node(CELL).add_variable(1, "mine", 5)
+        with pytest.raises(ua.UaStatusCodeError, match="BadUserAccessDenied"):
+            await client.delete_nodes([client.get_node(CELL)])
+        assert len(await client.get_node(CELL).get_children()) == 4
+    assert "opcua: AddNodesRequest refused" in served.log
+    assert "opcua: DeleteNodesRequest refused" in served.log
 
 
 def test_what_is_no_message_ends_its_connection_alone(served: Served, reader: NodeClient) -> None:

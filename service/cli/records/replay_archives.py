@@ -113,7 +113,9 @@ def _written(args: argparse.Namespace, settings: Settings, choose: Choose, condi
             terms["against_versions"] = asdict(other.versions)
     progress: Progress | None = None
     with RunFiles(args.output, terms) as files:
-        if not files.complete:
+        if files.complete:
+            print(f"{args.output}: is whole, and told as it is. To have all done again, delete it", file=sys.stderr)
+        else:
             files.open([] if files.begun else _names(args, work, config, choose))
             progress = _carry_out(args, work, files)
         summary = Summary.of(args.output)

@@ -54,6 +54,7 @@ def test_damaged_jobs_among_good_ones_are_counted_by_kind_and_in_the_exit_status
     assert all(row["identical"] for row in found if row["left_out"] is None)
     told = called("replay", "--archive", archive, "--output", serial)
     assert told.returncode == 2
+    assert f"{serial}: is whole, and told as it is. To have all done again, delete it" in told.stderr
     for kind in DAMAGED.values():
         assert f"left out: 1 {kind}, e.g. cell-7 " in told.stderr
     assert f"{JOBS} jobs, 0 not as before" in told.stdout

@@ -77,6 +77,7 @@ def test_a_change_is_tried_adopted_used_by_the_next_job_and_taken_back(served: R
         expect(page.locator("#tried > li.flipped")).to_contain_text("по рецепту от 100 до 90000 мм²")
         page.locator("#note").fill("the press is gone")
         page.locator('[data-back="0"]').click()
+        expect(page.locator("#history")).to_contain_text("person1: the press is gone")
         expect(page.locator("#adopt-told")).to_contain_text("Действует со следующего задания.")
     assert {job["recipe"]["max_area_mm2"] for job in served.jobs(1, "person1")} == {200_000}
     notes = [(note["action"], note["detail"], note["result"]) for note in served.notes("person1")]

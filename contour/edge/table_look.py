@@ -44,8 +44,9 @@ _BESIDE_PITCHES = 0.6
 # Of the gradient's usual mean over a cell of comb.
 _QUIET, _SMOOTH, _GOOD_SHARE = 0.45, 0.3, 0.3
 _MOST = 0.5
-# Pitches into what may fill a hole: its rim, and its middle (or so much of the deepest); how light that rim is.
-_HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT = (0.4, 0.7), (1.0, 0.6), 0.93
+# What fills a hole ends where it is half as light. Pitches into it: its rim, and its middle (or so much of the deepest);
+# how light that rim is. Where light is blown out no shade shows.
+_HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT, _BLOWN_OUT = (0.2, 0.5), (1.0, 0.6), 0.93, 250.0
 # Shadows, sides of the block and its mirror image make a band beside it that has no room for a disc of this radius, or
 # for few here and there; where walls are lost in a cell or two, the cells are flat.
 _BAND, _LONG_PITCHES = 0.55, 2.0
@@ -122,13 +123,15 @@ class TableLook:
         filled = self.foreign & self.lighter & inside
         if np.count_nonzero(filled) <= _MOST * np.count_nonzero(inside):
             return False
-        away = cv2.distanceTransform((self.foreign & inside).astype(np.uint8), cv2.DIST_L2, 3)
+        body = (inside & (self.light > 0.5 * median(self.light[filled]))).astype(np.uint8)
+        away = cv2.distanceTransform(cv2.morphologyEx(body, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), cv2.DIST_L2, 3)
         deep = np.asarray(away, np.float64) * (self.step / self.pitch_px)
         rim = (deep > _HOLE_RIM[0]) & (deep < _HOLE_RIM[1])
         middle = deep > max(_HOLE_MIDDLE[0], _HOLE_MIDDLE[1] * float(deep.max()))
         if not (rim.any() and middle.any()):
             return True
-        return bool(median(self.light[rim]) > _RIM_LIGHT * median(self.light[middle]))
+        amidst = median(self.light[middle])
+        return bool(amidst < _BLOWN_OUT and median(self.light[rim]) > _RIM_LIGHT * amidst)
 
 
 def beside(look: TableLook) -> float:

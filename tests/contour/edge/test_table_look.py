@@ -48,11 +48,11 @@ def painted(picture: Picture, area: NDArray[np.float64], level: int | tuple[int,
     return np.rint(picture * (1.0 - mask) + np.array(level) * mask).astype(np.uint8)
 
 
-def lit_by_a_lamp(picture: Picture, hole: NDArray[np.float64], shade_px: float) -> Picture:
+def lit_by_a_lamp(picture: Picture, hole: NDArray[np.float64], shade_px: float, level: float) -> Picture:
     """The table in a hole as light as nowhere else, but for the block's shade along the hole's rim, so soft."""
     inside = np.zeros(picture.shape[:2], np.float32)
     cv2.fillPoly(inside, [np.rint(hole).astype(np.int32)], 1.0)
-    light = 150.0 * cv2.GaussianBlur(inside, (0, 0), shade_px)
+    light = np.minimum(level * cv2.GaussianBlur(inside, (0, 0), shade_px), 255.0)
     return np.where(inside > 0, np.maximum(picture, light), picture).astype(np.uint8)
 
 
@@ -144,8 +144,11 @@ def test_a_hole_with_the_table_in_it_is_one_and_a_filled_one_is_none() -> None:
     assert not look_at(lambda picture: picture, "holed").fills(hole)
     assert look_at(lambda picture: painted(picture, ring, 150), "holed").fills(hole)
     assert not look_at(lambda picture: painted(picture, ring, 10), "holed").fills(hole)
-    for shade_px in (20.0, 10.0):
-        assert not look_at(partial(lit_by_a_lamp, hole=ring, shade_px=shade_px), "holed").fills(hole)
+    within = ring + 0.6 * PITCH * (ring.mean(axis=0) - ring) / np.hypot(*(ring.mean(axis=0) - ring).T)[:, None]
+    assert look_at(lambda picture: painted(painted(picture, ring, 10), within, 150), "holed").fills(hole), "cells around"
+    for shade_px, level in ((20.0, 150.0), (10.0, 150.0), (10.0, 900.0)):
+        lamp = partial(lit_by_a_lamp, hole=ring, shade_px=shade_px, level=level)
+        assert not look_at(lamp, "holed").fills(hole)
 
 
 def striped_around(picture: Picture) -> Picture:

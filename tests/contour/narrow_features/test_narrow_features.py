@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import shapely
 
-from contour.acceptance.narrow_features import NarrowFeature, narrow_feature
 from contour.geometry.rings import Contour
+from contour.narrow_features.feature import NarrowFeature
+from contour.narrow_features.narrow_feature import narrow_feature
 from tests.support.pictures.rings import SQUARE
 
 PITCH = 20.0

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from contour.geometry.rings import Contour
+from contour.geometry.rings import Contour, area
 from contour.narrow_features.arms import arms, slits
 from contour.narrow_features.bumps import deepest_bump
 from contour.narrow_features.feature import NarrowFeature
 from contour.narrow_features.steps import horns, steps
+
+# Blocks of few cells have arms and steps as narrow; but chips and strips are less than this share of a block.
+_LARGE = 1.0 / 7.0
 
 
 def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
@@ -16,6 +19,7 @@ def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
     A corner is none, nor is the end of an arm: there the edges beside it run another way, and no foot is beside them.
     """
     found = [one for ring in contour.rings for one in [deepest_bump(ring, pitch_px)] if one is not None]
-    found += arms(contour, pitch_px) + slits(contour, pitch_px)
-    found += [one for ring in contour.rings for one in (*steps(ring, pitch_px), *horns(ring, pitch_px))]
+    large = _LARGE * area(contour) / pitch_px**2
+    found += arms(contour, pitch_px, large) + slits(contour, pitch_px)
+    found += [one for ring in contour.rings for one in (*steps(ring, pitch_px, large), *horns(ring, pitch_px))]
     return max(found, key=lambda one: one.depth_pitches) if found else None

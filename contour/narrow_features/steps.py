@@ -19,14 +19,15 @@ _EVEN, _TURN_DEG, _TURNED_DEG, _STEP_HIGH, _STEP_LONG = 0.3, 45.0, 35.0, (0.75, 
 _HORN_DEG, _HORN_LONG, _HORN_FOOT_DEG, _HORN_EVEN = 60.0, 5.0, 40.0, 0.1
 
 
-def steps(ring: Ring, pitch_px: float) -> list[NarrowFeature]:
-    """Low steps out of an edge that end in a corner soon."""
+def steps(ring: Ring, pitch_px: float, large: float) -> list[NarrowFeature]:
+    """Low steps out of an edge that end in a corner soon, less than `large`, squares of the pitch."""
     even = fewer_vertices(ring, _EVEN * pitch_px)
     # Either way around; a contour in pixels has the block on its left as seen with y down: it turns left at corners.
     mirrored = np.stack([-even[::-1, 0], even[::-1, 1]], axis=1)
-    return _steps_along(even, pitch_px) + [
+    found = _steps_along(even, pitch_px) + [
         replace(step, place_px=(-step.place_px[0], step.place_px[1])) for step in _steps_along(mirrored, pitch_px)
     ]
+    return [step for step in found if step.depth_pitches * step.width_pitches < large]
 
 
 def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:

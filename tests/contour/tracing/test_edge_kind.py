@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Literal
 
+import cv2
 import numpy as np
 import pytest
 
@@ -88,6 +89,30 @@ def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
     found = traced(one)
     assert found.edge == "mixed"
     assert agreement(found.contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
+
+
+@pytest.mark.parametrize(
+    ("seed", "cells"),
+    [(1051302, "hexagonal"), (1051404, "triangular"), (1051322, "over-expanded")],
+    ids=["no end", "no end of triangles", "an end beyond the second"],
+)
+def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed: int, cells: Cells) -> None:
+    one = lattice(seed, cells, "mixed")
+    found = traced(one)
+    assert found.edge == "mixed"
+    assert agreement(found.contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
+
+
+@pytest.mark.parametrize(
+    ("seed", "cells", "pitch_px"), [(1051321, "hexagonal", 9.0), (1051403, "flex", 12.0)], ids=["pixels", "a wave"]
+)
+def test_rows_of_closed_cells_are_no_cut_however_fine(seed: int, cells: Cells, pitch_px: float) -> None:
+    one = lattice(seed, cells, "closed")
+    share = pitch_px / one.pitch_px
+    assert (
+        wall_tips(cv2.resize(one.picture, None, fx=share, fy=share, interpolation=cv2.INTER_AREA), TraceSettings()).edge
+        == "cells"
+    )
 
 
 def test_one_end_among_fine_triangles_is_a_cut() -> None:

@@ -19,10 +19,9 @@ from contour.image.opencv import fewer_vertices, pieces_and_areas
 from contour.image.pixel_sampling import sample_at
 from contour.image.side_by_side import side_by_side
 from contour.tracing.leaking_cells import leaking_cells
-from contour.tracing.table_surface import OUTLIER, table_surface
+from contour.tracing.table_surface import OUTLIER, difference_from_table
 from contour.walls.cell_scale import wall_width
 
-_GRID_PX = 4
 # Chips and dust are small against a block; a block smaller than this share of the picture is a chip to this method.
 _LEAST_SHARE = 0.004
 # How far behind the boundary, and before it, its own half level is looked for.
@@ -85,7 +84,7 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
     negative shoelace, holes positive. The table is a smooth surface in every channel, learnt from the picture's border
     inwards. Raises NoBlockFound.
     """
-    difference, noise = _difference(picture)
+    difference, noise = difference_from_table(picture)
     level = _levels(difference, noise, pitch_px)
     apart = _without_soft_shadow(difference, level)
     faint = (walls > 0) & (difference > np.maximum(level // 2, OUTLIER * noise))
@@ -157,25 +156,6 @@ def _with_faint_cells(surely: Bytes, perhaps: Bytes, pitch_px: float) -> Bytes:
     cells = area > _LEAST_CELL * pitch_px * pitch_px
     cells[0] = False
     return np.where(cells[labels], np.uint8(1), surely & perhaps)
-
-
-def _difference(picture: Bytes) -> tuple[Bytes, float]:
-    """How far each pixel is from the table: largest difference over the channels, shape (H, W), uint8; the table's
-    spread.
-    """
-    height, width = picture.shape[:2]
-    channels = picture[:, :, None] if picture.ndim == 2 else picture
-    grid = (max(8, width // _GRID_PX), max(8, height // _GRID_PX))
-    small = cv2.resize(picture, grid, interpolation=cv2.INTER_AREA).reshape(grid[1], grid[0], -1).astype(np.float64)
-    gray = channels[:, :, channels.shape[2] // 2]
-    rough = cv2.absdiff(gray, cv2.blur(gray, (5, 5)))
-    texture = np.asarray(cv2.resize(rough, grid, interpolation=cv2.INTER_AREA), np.uint8)
-    surface, spread = table_surface(small, texture)
-    table = np.clip(np.rint(surface), 0, 255).astype(np.uint8)
-    full = cv2.resize(table, (width, height), interpolation=cv2.INTER_LINEAR).reshape(channels.shape)
-    apart = cv2.absdiff(channels, full).reshape(height, width, -1)
-    largest = apart.max(axis=2) if apart.shape[2] > 1 else apart[:, :, 0]
-    return np.asarray(cv2.GaussianBlur(largest, (3, 3), 0), np.uint8), spread
 
 
 def _level(difference: Bytes, spread: float) -> float:

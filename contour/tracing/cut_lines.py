@@ -55,9 +55,9 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence, touched: list[Float64
     return None if (off > _LEFT_PX).any() else closed
 
 
-def touched_cuts(material: MaterialEdge, pitch_px: float) -> list[Float64s]:
+def touched_cuts(material: MaterialEdge, pitch_px: float, *, alike: bool = False) -> list[Float64s]:
     """Straight cuts along edges of the material's convex hull, pixels, (1, 2, 2) each: touched at every cell, with
-    openings between that differ.
+    openings between that differ, or may be `alike`, as where what is closed has none.
 
     They need no ends of walls: where walls meet a saw at a slant, none is seen to end. A closed border that runs along
     rows of cells is touched as often, but its openings are alike; along other directions it is touched more seldom.
@@ -66,20 +66,23 @@ def touched_cuts(material: MaterialEdge, pitch_px: float) -> list[Float64s]:
     border = np.concatenate([densified(ring, 0.5) for ring in material.border])
     hull = cv2.convexHull(border.astype(np.float32))[:, 0].astype(np.float64)
     corners = fewer_vertices(hull, near)
+    least = 0.0 if alike else max(_DIFFER * pitch_px, _DIFFER_PX)
     cuts = []
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         length = float(np.hypot(*(end - start)))
         along = (end - start) / length
         out = np.array([along[1], -along[0]])
         line = _Line(start, along, out * np.sign(out @ (start - corners.mean(axis=0))), np.zeros(0, np.bool_))
-        if length > _LEAST_LONG * pitch_px and _at_every_cell(material.apart.region, line, length, near, pitch_px):
+        long = length > _LEAST_LONG * pitch_px
+        differ = _openings_differ(material.apart.region, line, length, near, pitch_px) if long else None
+        if differ is not None and differ >= least:
             cuts.append(_from_corner_to_corner(border, np.empty((0, 2)), line, near, _OPEN_PITCHES * pitch_px))
     return [cut for cut in cuts if len(cut)]
 
 
-def _at_every_cell(region: Bytes, line: _Line, length: float, near: float, pitch_px: float) -> bool:
-    """Whether the region touches a line within `near` at every cell over its `length` from its point on, and openings
-    between differ; pixels.
+def _openings_differ(region: Bytes, line: _Line, length: float, near: float, pitch_px: float) -> float | None:
+    """By how much openings differ in depth where the region touches a line within `near` at every cell over its
+    `length` from its point on, all in pixels; None where it does not, or too few openings are deep.
     """
     # How far behind the line the region begins.
     depth = np.arange(-near, 1.5 * pitch_px, _ALONG_PX)
@@ -90,10 +93,10 @@ def _at_every_cell(region: Bytes, line: _Line, length: float, near: float, pitch
     runs = np.split(begins, np.flatnonzero(np.diff(begins > near)) + 1)
     openings = [run for run in runs if run[0] > near]
     if max(map(len, openings), default=0) * _ALONG_PX > _TOUCHED * pitch_px:
-        return False
+        return None
     deepest = np.array([run.max() for run in openings])
     deep = np.sort(deepest[deepest > max(_OPENING * pitch_px, near + _OPENING_PX)])
-    return len(deep) > 3 and bool(deep[-2] - deep[1] > max(_DIFFER * pitch_px, _DIFFER_PX))
+    return float(deep[-2] - deep[1]) if len(deep) > 3 else None
 
 
 def straight_cuts(

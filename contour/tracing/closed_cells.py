@@ -34,8 +34,9 @@ _NEARBY_PITCHES = 0.8
 _SOFT = 0.2
 # The least cell that a faint wall closes, in squares of the pitch.
 _LEAST_CELL = 0.5
-# And the largest that a cut opens: with its walls a cell is 0.87 of that, and cells of a block are about alike.
-_LARGEST_CELL, _LEAST_BAY = 1.2, 0.1
+# And the largest that a cut opens, over what large cells of the block enclose: of 88 lattices cut once opened ones have
+# 0.99 of that at most. Where none encloses so much table, over a square of the pitch: a cell has 0.87 with walls.
+_LARGEST_CELL, _LARGE_CELLS, _LEAST_OPENING, _LEAST_BAY = 1.2, 0.9, 0.2, 0.1
 # An opening as large as this is a hole, however narrow; broken walls join fewer cells.
 _HOLE = 5.0
 _SIMPLE_PX = 0.25
@@ -118,8 +119,11 @@ def _without_bays(closed: Bytes, shut: Bytes, apart: Apart, pitch_px: float) -> 
     free = cv2.erode((apart.difference <= apart.level).astype(np.uint8), away) > 0
     cells = apart.difference[(apart.region > 0) & free]
     floor = median(cells.astype(np.float64)) if len(cells) else 0.0
+    _, openings = pieces_and_areas(((apart.region > 0) & (apart.difference <= apart.level)).astype(np.uint8), 4)
+    whole = openings[1:][openings[1:] > _LEAST_OPENING * pitch_px * pitch_px]
+    cell = float(np.quantile(whole, _LARGE_CELLS)) if len(whole) else pitch_px * pitch_px
     labels, area = pieces_and_areas(closed & (1 - shut), 4)
-    bay = area > _LARGEST_CELL * pitch_px * pitch_px
+    bay = area > _LARGEST_CELL * cell
     bay[0] = False
     for number in 1 + np.flatnonzero(area[1:] > _LEAST_BAY * pitch_px * pitch_px) if floor >= _FLOOR_LEVELS else ():
         inner = apart.difference[(labels == number) & free]

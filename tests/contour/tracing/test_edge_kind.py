@@ -81,8 +81,8 @@ def test_teeth_of_closed_triangles_are_no_ends_of_walls(seed: int, border: Borde
 
 @pytest.mark.parametrize(
     ("seed", "cells"),
-    [(1051003, "over-expanded"), (1051006, "hexagonal"), (1051004, "square")],
-    ids=["two arms", "an end in an arm", "a bay larger than a cell"],
+    [(1051003, "over-expanded"), (1051006, "hexagonal"), (1051004, "square"), (1051443, "over-expanded")],
+    ids=["two arms", "an end in an arm", "a bay larger than a cell", "a bay of a cell and a half"],
 )
 def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
     one = lattice(seed, cells, "mixed")

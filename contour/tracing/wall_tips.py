@@ -74,12 +74,11 @@ def wall_tips(
         return _cut_off(light, seen, on_stage)
     try:
         return _cut(picture, light, (seen, look), rectifier, on_stage)
-    except NoBlockFound:
-        if settings.edge == "cut" or plate is not None:
-            raise
+    except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
-        closed, _ = _if_closed(solid, seen)
+        closed = None if settings.edge == "cut" or plate is not None else _if_closed(solid, seen)[0]
         if closed is None:
+            error.edge = "cut"
             raise
         return closed
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.errors import EdgeContradicted
+from contour.errors import EdgeContradicted, NoBlockFound
 from contour.geometry.agreement import agreement
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
@@ -50,6 +50,12 @@ def test_cut_cells_are_seen_and_traced_as_if_they_were_promised(cells: Cells) ->
     assert agreement(found.contour, one.outline).mean_px < 0.3
     promised = traced(one, "cut")
     assert all(np.array_equal(a, b) for a, b in zip(found.contour.rings, promised.contour.rings, strict=True))
+
+
+def test_a_cut_border_is_told_also_where_no_line_leads_through_its_ends() -> None:
+    with pytest.raises(NoBlockFound) as refused:
+        traced(lattice(1051442, "hexagonal", "cut"))
+    assert refused.value.edge == "cut"
 
 
 @pytest.mark.parametrize(("promise", "border"), [("cut", "closed"), ("cells", "cut")])

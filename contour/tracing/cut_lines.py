@@ -31,8 +31,8 @@ _FITS = 3
 _LEFT_PX = 3.0
 # A cut as long as the first is touched at every cell, so far apart at most (of 80 lattices cut once the most is 1.12).
 # So are rows of closed cells, whose openings are alike: of those so deep the second deepest and the second shallowest
-# differ by 0.09 at most in 78 closed borders, by 0.11 or more in cut ones. In pitches; and by more than pixels make of
-# what is alike: closed cells of 6 to 12 px passed for cut without.
+# differ by 0.09 at most in 78 closed borders, by 0.11 or more in cut ones. In pitches: a lens bends rows by as much as
+# still counts as near. And by more than pixels make of what is alike: closed cells of 6 to 12 px passed for cut.
 _LEAST_LONG, _TOUCHED, _OPENING, _DIFFER = 4.0, 1.25, 0.15, 0.1
 _DIFFER_PX, _OPENING_PX, _ALONG_PX = 3.0, 1.0, 0.5
 

@@ -273,6 +273,8 @@ def test_an_arm_that_is_a_large_part_of_the_block_is_its_own(arm: float, turn_de
     )
     assert found(l_shaped, turn_deg) is None
     assert found(u_shaped, turn_deg) is None
+    stepped = pitches((0, 0), (12, 0), (12, arm), (7.5, arm), (7.5, arm + 4.4), (0, arm + 4.4))
+    assert found(stepped, turn_deg) is None
     at_a_larger_block = pitches((0, 0), (32, 0), (32, 4), (24, 4), (24, 20), (0, 20))
     assert found(at_a_larger_block, turn_deg) is not None
 

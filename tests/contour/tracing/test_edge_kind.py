@@ -11,6 +11,8 @@ import pytest
 
 from contour.errors import EdgeContradicted, NoBlockFound
 from contour.geometry.agreement import agreement
+from contour.geometry.arrays import Bytes
+from contour.geometry.rings import Contour
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
 from tests.support.scenes.lattices import Border, Cells, Lattice, lattice
@@ -22,6 +24,12 @@ SEED = 977001
 @cache
 def drawn(cells: Cells, border: Border) -> Lattice:
     return lattice(SEED, cells, border)
+
+
+def smaller(one: Lattice, pitch_px: float) -> Bytes:
+    """Its picture with cells of that pitch."""
+    share = pitch_px / one.pitch_px
+    return np.asarray(cv2.resize(one.picture, None, fx=share, fy=share, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def traced(one: Lattice, edge: Literal["auto", "cut", "cells"] = "auto") -> Trace:
@@ -110,15 +118,19 @@ def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed
 
 
 @pytest.mark.parametrize(
-    ("seed", "cells", "pitch_px"), [(1051321, "hexagonal", 9.0), (1051403, "flex", 12.0)], ids=["pixels", "a wave"]
+    ("seed", "cells", "pitch_px"),
+    [(1051321, "hexagonal", 9.0), (1051403, "flex", 12.0), (1051320, "triangular", 48.0)],
+    ids=["pixels", "a wave", "teeth"],
 )
-def test_rows_of_closed_cells_are_no_cut_however_fine(seed: int, cells: Cells, pitch_px: float) -> None:
-    one = lattice(seed, cells, "closed")
-    share = pitch_px / one.pitch_px
-    assert (
-        wall_tips(cv2.resize(one.picture, None, fx=share, fy=share, interpolation=cv2.INTER_AREA), TraceSettings()).edge
-        == "cells"
-    )
+def test_rows_of_closed_cells_are_no_cut(seed: int, cells: Cells, pitch_px: float) -> None:
+    assert wall_tips(smaller(lattice(seed, cells, "closed"), pitch_px), TraceSettings()).edge == "cells"
+
+
+def test_such_a_cut_runs_to_the_last_thing_that_touches_its_line() -> None:
+    one = lattice(1051322, "over-expanded", "mixed")
+    found = wall_tips(smaller(one, 12.0), TraceSettings())
+    back = Contour((found.contour.exterior + 0.5) * (one.pitch_px / 12.0) - 0.5)
+    assert agreement(back, one.outline).hausdorff_px < 0.3 * one.pitch_px
 
 
 def test_one_end_among_fine_triangles_is_a_cut() -> None:

@@ -28,7 +28,11 @@ class ParameterError(ContourError):
 
 
 class NoBlockFound(ContourError):
-    """The picture is usable, but no block could be traced in it; the message says what was found instead."""
+    """The picture is usable, but no block could be traced in it; the message says what was found instead, and `edge`
+    what kind of border it has where that was told.
+    """
+
+    edge: Literal["cut"] | None = None
 
 
 class EdgeContradicted(ContourError):

@@ -9,7 +9,6 @@ import numpy as np
 from contour.acceptance.bare_edge import comb_at_edge
 from contour.acceptance.disagreement import Disagreement, disagreement
 from contour.acceptance.edge_contrast import alike_edge
-from contour.acceptance.narrow_features import NarrowFeature, narrow_feature
 from contour.acceptance.quality import Quality, block_quality
 from contour.edge.border_beyond import border_beyond
 from contour.edge.edge_parts import EdgePart
@@ -17,6 +16,8 @@ from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, densified
 from contour.image.side_by_side import side_by_side
+from contour.narrow_features.feature import NarrowFeature
+from contour.narrow_features.narrow_feature import narrow_feature
 from contour.tracing.trace import Trace
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.

@@ -19,10 +19,9 @@ from contour.image.opencv import fewer_vertices, pieces_and_areas
 from contour.image.pixel_sampling import sample_at
 from contour.image.side_by_side import side_by_side
 from contour.tracing.leaking_cells import leaking_cells
-from contour.tracing.table_surface import OUTLIER, table_surface
+from contour.tracing.table_surface import OUTLIER, difference_from_table
 from contour.walls.cell_scale import wall_width
 
-_GRID_PX = 4
 # Chips and dust are small against a block; a block smaller than this share of the picture is a chip to this method.
 _LEAST_SHARE = 0.004
 # How far behind the boundary, and before it, its own half level is looked for.
@@ -35,8 +34,9 @@ _NEARBY_PITCHES = 0.8
 _SOFT = 0.2
 # The least cell that a faint wall closes, in squares of the pitch.
 _LEAST_CELL = 0.5
-# And the largest that a cut opens: with its walls a cell is 0.87 of that, and cells of a block are about alike.
-_LARGEST_CELL, _LEAST_BAY = 1.2, 0.1
+# And the largest that a cut opens, over what large cells of the block enclose: of 88 lattices cut once opened ones have
+# 0.99 of that at most. Where none encloses so much table, over a square of the pitch: a cell has 0.87 with walls.
+_LARGEST_CELL, _LARGE_CELLS, _LEAST_OPENING, _LEAST_BAY = 1.2, 0.9, 0.2, 0.1
 # An opening as large as this is a hole, however narrow; broken walls join fewer cells.
 _HOLE = 5.0
 _SIMPLE_PX = 0.25
@@ -85,7 +85,7 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
     negative shoelace, holes positive. The table is a smooth surface in every channel, learnt from the picture's border
     inwards. Raises NoBlockFound.
     """
-    difference, noise = _difference(picture)
+    difference, noise = difference_from_table(picture)
     level = _levels(difference, noise, pitch_px)
     apart = _without_soft_shadow(difference, level)
     faint = (walls > 0) & (difference > np.maximum(level // 2, OUTLIER * noise))
@@ -119,8 +119,11 @@ def _without_bays(closed: Bytes, shut: Bytes, apart: Apart, pitch_px: float) -> 
     free = cv2.erode((apart.difference <= apart.level).astype(np.uint8), away) > 0
     cells = apart.difference[(apart.region > 0) & free]
     floor = median(cells.astype(np.float64)) if len(cells) else 0.0
+    _, openings = pieces_and_areas(((apart.region > 0) & (apart.difference <= apart.level)).astype(np.uint8), 4)
+    whole = openings[1:][openings[1:] > _LEAST_OPENING * pitch_px * pitch_px]
+    cell = float(np.quantile(whole, _LARGE_CELLS)) if len(whole) else pitch_px * pitch_px
     labels, area = pieces_and_areas(closed & (1 - shut), 4)
-    bay = area > _LARGEST_CELL * pitch_px * pitch_px
+    bay = area > _LARGEST_CELL * cell
     bay[0] = False
     for number in 1 + np.flatnonzero(area[1:] > _LEAST_BAY * pitch_px * pitch_px) if floor >= _FLOOR_LEVELS else ():
         inner = apart.difference[(labels == number) & free]
@@ -157,25 +160,6 @@ def _with_faint_cells(surely: Bytes, perhaps: Bytes, pitch_px: float) -> Bytes:
     cells = area > _LEAST_CELL * pitch_px * pitch_px
     cells[0] = False
     return np.where(cells[labels], np.uint8(1), surely & perhaps)
-
-
-def _difference(picture: Bytes) -> tuple[Bytes, float]:
-    """How far each pixel is from the table: largest difference over the channels, shape (H, W), uint8; the table's
-    spread.
-    """
-    height, width = picture.shape[:2]
-    channels = picture[:, :, None] if picture.ndim == 2 else picture
-    grid = (max(8, width // _GRID_PX), max(8, height // _GRID_PX))
-    small = cv2.resize(picture, grid, interpolation=cv2.INTER_AREA).reshape(grid[1], grid[0], -1).astype(np.float64)
-    gray = channels[:, :, channels.shape[2] // 2]
-    rough = cv2.absdiff(gray, cv2.blur(gray, (5, 5)))
-    texture = np.asarray(cv2.resize(rough, grid, interpolation=cv2.INTER_AREA), np.uint8)
-    surface, spread = table_surface(small, texture)
-    table = np.clip(np.rint(surface), 0, 255).astype(np.uint8)
-    full = cv2.resize(table, (width, height), interpolation=cv2.INTER_LINEAR).reshape(channels.shape)
-    apart = cv2.absdiff(channels, full).reshape(height, width, -1)
-    largest = apart.max(axis=2) if apart.shape[2] > 1 else apart[:, :, 0]
-    return np.asarray(cv2.GaussianBlur(largest, (3, 3), 0), np.uint8), spread
 
 
 def _level(difference: Bytes, spread: float) -> float:

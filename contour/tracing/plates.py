@@ -11,7 +11,7 @@ from contour.geometry.arrays import Bytes, Float64s, median, medians
 from contour.geometry.rings import Ring
 from contour.image.opencv import closed_by_disc
 from contour.tracing.closed_cells import MaterialEdge, closed_along
-from contour.tracing.cut_lines import straight_cuts
+from contour.tracing.cut_lines import straight_cuts, touched_cuts
 from contour.tracing.trace import Edge
 from contour.walls.comb_likeness import Comb
 
@@ -60,10 +60,14 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
         return None
     pitch_px = holes.pitch_px
     corners, normals = _bays(material.apart.region, _LEAST_BAY, pitch_px)
-    if not len(corners):
-        return material, "cells"
-    corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
-    lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
+    if len(corners):
+        corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
+        lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
+    else:
+        # Holes that were opened by less; a closed sheet has no openings.
+        lines = touched_cuts(material, pitch_px, alike=True)
+        if not lines:
+            return material, "cells"
     if len(lines) != 1:
         return None, "cut"
     cuts = np.array([_along_webs(material.contour.rings, cut) for cut in lines[0]])

@@ -1,7 +1,8 @@
-"""The table's own light, followed from the picture's border in under the block."""
+"""The table's own light, followed from the picture's border in under the block, and what differs from it."""
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s, median, medians
@@ -11,9 +12,29 @@ OUTLIER = 4.0
 
 _BORDER_SHARE = 0.015
 _ROUNDS = 6
+_GRID_PX = 4
 
 
-def table_surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
+def difference_from_table(picture: Bytes) -> tuple[Bytes, float]:
+    """How far each pixel is from the table: largest difference over the channels, shape (H, W), uint8; the table's
+    spread.
+    """
+    height, width = picture.shape[:2]
+    channels = picture[:, :, None] if picture.ndim == 2 else picture
+    grid = (max(8, width // _GRID_PX), max(8, height // _GRID_PX))
+    small = cv2.resize(picture, grid, interpolation=cv2.INTER_AREA).reshape(grid[1], grid[0], -1).astype(np.float64)
+    gray = channels[:, :, channels.shape[2] // 2]
+    rough = cv2.absdiff(gray, cv2.blur(gray, (5, 5)))
+    texture = np.asarray(cv2.resize(rough, grid, interpolation=cv2.INTER_AREA), np.uint8)
+    surface, spread = _surface(small, texture)
+    table = np.clip(np.rint(surface), 0, 255).astype(np.uint8)
+    full = cv2.resize(table, (width, height), interpolation=cv2.INTER_LINEAR).reshape(channels.shape)
+    apart = cv2.absdiff(channels, full).reshape(height, width, -1)
+    largest = apart.max(axis=2) if apart.shape[2] > 1 else apart[:, :, 0]
+    return np.asarray(cv2.GaussianBlur(largest, (3, 3), 0), np.uint8), spread
+
+
+def _surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
     """The table's light under the block too, shape of `small` (h, w, channels), and its spread: a surface of second
     order.
 

@@ -17,7 +17,7 @@ from contour.geometry.rings import Contour
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import MaterialEdge, material_edge
-from contour.tracing.cut_lines import with_cuts
+from contour.tracing.cut_lines import touched_cuts, with_cuts
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed
 from contour.tracing.evidence_check import check_against_evidence
 from contour.tracing.plates import like_plate, plate_edge
@@ -74,12 +74,11 @@ def wall_tips(
         return _cut_off(light, seen, on_stage)
     try:
         return _cut(picture, light, (seen, look), rectifier, on_stage)
-    except NoBlockFound:
-        if settings.edge == "cut" or plate is not None:
-            raise
+    except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
-        closed, _ = _if_closed(solid, seen)
+        closed = None if settings.edge == "cut" or plate is not None else _if_closed(solid, seen)[0]
         if closed is None:
+            error.edge = "cut"
             raise
         return closed
 
@@ -240,7 +239,10 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
         # Webs of a sheet do not end as walls do.
         (found, kind), comb = sheet, replace(comb, plate=True)
     else:
-        found = {"cells": material, "mixed": with_cuts(material, seen) if kind == "mixed" else None, "cut": None}[kind]
+        touched = [] if kind == "cut" else touched_cuts(material, seen.pitch_px)
+        kind = "mixed" if touched else kind
+        cut = with_cuts(material, seen, touched) if kind == "mixed" else None
+        found = material if kind == "cells" else cut
     return None if found is None else replace(solid.around(found), comb=comb, edge=kind), kind
 
 

@@ -122,7 +122,7 @@ class Measurer:
             result = self._traced(picture, recipe, thickness_mm, result, watch, camera)
         except NoBlockFound as error:
             watch.lap("trace")
-            result = replace(result, findings=rejections(judge_without_block(picture, str(error))))
+            result = replace(result, edge=error.edge, findings=rejections(judge_without_block(picture, str(error))))
         except EdgeContradicted as error:
             result = replace(result, edge=error.edge, findings=((Reason.EDGE_CONTRADICTED, str(error)),))
         except CalibrationError as error:

@@ -8,11 +8,11 @@ from contour.acceptance.acceptance import View, judge, judge_without_block
 from contour.acceptance.disagreement import Disagreement
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.findings import Finding, Limits, Refusal, closed, runs_where
-from contour.acceptance.narrow_features import NarrowFeature
 from contour.acceptance.quality import Quality
 from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.rings import Contour
 from contour.image.region import Region
+from contour.narrow_features.feature import NarrowFeature
 from contour.polygon.polygon import Polygon
 from contour.tracing.trace import Trace
 from contour.walls.comb_likeness import Comb

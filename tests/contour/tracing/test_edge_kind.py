@@ -5,11 +5,14 @@ from __future__ import annotations
 from functools import cache
 from typing import Literal
 
+import cv2
 import numpy as np
 import pytest
 
-from contour.errors import EdgeContradicted
+from contour.errors import EdgeContradicted, NoBlockFound
 from contour.geometry.agreement import agreement
+from contour.geometry.arrays import Bytes
+from contour.geometry.rings import Contour
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
 from tests.support.scenes.lattices import Border, Cells, Lattice, lattice
@@ -21,6 +24,12 @@ SEED = 977001
 @cache
 def drawn(cells: Cells, border: Border) -> Lattice:
     return lattice(SEED, cells, border)
+
+
+def smaller(one: Lattice, pitch_px: float) -> Bytes:
+    """Its picture with cells of that pitch."""
+    share = pitch_px / one.pitch_px
+    return np.asarray(cv2.resize(one.picture, None, fx=share, fy=share, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def traced(one: Lattice, edge: Literal["auto", "cut", "cells"] = "auto") -> Trace:
@@ -49,6 +58,12 @@ def test_cut_cells_are_seen_and_traced_as_if_they_were_promised(cells: Cells) ->
     assert agreement(found.contour, one.outline).mean_px < 0.3
     promised = traced(one, "cut")
     assert all(np.array_equal(a, b) for a, b in zip(found.contour.rings, promised.contour.rings, strict=True))
+
+
+def test_a_cut_border_is_told_also_where_no_line_leads_through_its_ends() -> None:
+    with pytest.raises(NoBlockFound) as refused:
+        traced(lattice(1051442, "hexagonal", "cut"))
+    assert refused.value.edge == "cut"
 
 
 @pytest.mark.parametrize(("promise", "border"), [("cut", "closed"), ("cells", "cut")])
@@ -80,14 +95,42 @@ def test_teeth_of_closed_triangles_are_no_ends_of_walls(seed: int, border: Borde
 
 @pytest.mark.parametrize(
     ("seed", "cells"),
-    [(1051003, "over-expanded"), (1051006, "hexagonal"), (1051004, "square")],
-    ids=["two arms", "an end in an arm", "a bay larger than a cell"],
+    [(1051003, "over-expanded"), (1051006, "hexagonal"), (1051004, "square"), (1051443, "over-expanded")],
+    ids=["two arms", "an end in an arm", "a bay larger than a cell", "a bay of a cell and a half"],
 )
 def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
     one = lattice(seed, cells, "mixed")
     found = traced(one)
     assert found.edge == "mixed"
     assert agreement(found.contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
+
+
+@pytest.mark.parametrize(
+    ("seed", "cells"),
+    [(1051302, "hexagonal"), (1051404, "triangular"), (1051322, "over-expanded")],
+    ids=["no end", "no end of triangles", "an end beyond the second"],
+)
+def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed: int, cells: Cells) -> None:
+    one = lattice(seed, cells, "mixed")
+    found = traced(one)
+    assert found.edge == "mixed"
+    assert agreement(found.contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
+
+
+@pytest.mark.parametrize(
+    ("seed", "cells", "pitch_px"),
+    [(1051321, "hexagonal", 9.0), (1051403, "flex", 12.0), (1051320, "triangular", 48.0)],
+    ids=["pixels", "a wave", "teeth"],
+)
+def test_rows_of_closed_cells_are_no_cut(seed: int, cells: Cells, pitch_px: float) -> None:
+    assert wall_tips(smaller(lattice(seed, cells, "closed"), pitch_px), TraceSettings()).edge == "cells"
+
+
+def test_such_a_cut_runs_to_the_last_thing_that_touches_its_line() -> None:
+    one = lattice(1051322, "over-expanded", "mixed")
+    found = wall_tips(smaller(one, 12.0), TraceSettings())
+    back = Contour((found.contour.exterior + 0.5) * (one.pitch_px / 12.0) - 0.5)
+    assert agreement(back, one.outline).hausdorff_px < 0.3 * one.pitch_px
 
 
 def test_one_end_among_fine_triangles_is_a_cut() -> None:

@@ -72,6 +72,14 @@ def test_a_sheet_that_was_cut_through_its_holes_is_traced_along_that(seed: int, 
     assert near.holds(found.uncertainty_px)
 
 
+def test_a_cut_that_opens_holes_by_little_is_seen_by_what_touches_its_line() -> None:
+    one = lattice(1051403, "round", "mixed")
+    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), "mixed")
+    assert found.pixels is not None
+    assert agreement(found.pixels, one.outline).hausdorff_px < 0.15 * one.pitch_px
+
+
 @pytest.mark.parametrize("seed", [1051003, 1051005, 1051006])
 def test_webs_that_do_not_end_as_walls_do_are_no_closed_border(seed: int) -> None:
     one = lattice(seed, "round", "mixed")

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import shapely
 
-from contour.acceptance.narrow_features import NarrowFeature, narrow_feature
 from contour.geometry.rings import Contour
+from contour.narrow_features.feature import NarrowFeature
+from contour.narrow_features.narrow_feature import narrow_feature
 from tests.support.pictures.rings import SQUARE
 
 PITCH = 20.0
@@ -260,3 +261,27 @@ def test_a_horn_is_found_and_the_tips_of_a_crescent_are_none(turn_deg: float) ->
 @pytest.mark.parametrize("turn_deg", [0.0, 50.0])
 def test_a_small_round_hole_is_no_dent(turn_deg: float) -> None:
     assert found(BLOCK - shapely.Point(300, 300).buffer(2.0 * PITCH), turn_deg) is None
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 35.0])
+@pytest.mark.parametrize("arm", [4.0, 4.4, 4.8])
+def test_an_arm_that_is_a_large_part_of_the_block_is_its_own(arm: float, turn_deg: float) -> None:
+    l_shaped = pitches((0, 0), (11, 0), (11, arm), (arm, arm), (arm, 11), (0, 11))
+    wide = 2 * arm + 5.5
+    u_shaped = pitches(
+        (0, 0), (wide, 0), (wide, 12), (wide - arm, 12), (wide - arm, arm), (arm, arm), (arm, 12), (0, 12)
+    )
+    assert found(l_shaped, turn_deg) is None
+    assert found(u_shaped, turn_deg) is None
+    stepped = pitches((0, 0), (12, 0), (12, arm), (7.5, arm), (7.5, arm + 4.4), (0, arm + 4.4))
+    assert found(stepped, turn_deg) is None
+    at_a_larger_block = pitches((0, 0), (32, 0), (32, 4), (24, 4), (24, 20), (0, 20))
+    assert found(at_a_larger_block, turn_deg) is not None
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 35.0])
+def test_what_lies_between_a_hole_and_the_edge_is_no_strip_but_may_be_a_thread(turn_deg: float) -> None:
+    size = BLOCK.bounds[3] - BLOCK.bounds[1]
+    for web, none in ((4.0, True), (2.0, True), (1.0, False)):
+        hole = shapely.box(200, 100 + web * PITCH, 500, 100 + size - web * PITCH)
+        assert (found(BLOCK - hole, turn_deg) is None) == none

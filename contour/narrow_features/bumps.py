@@ -1,0 +1,139 @@
+"""Bumps and dents of an outline too narrow to be told from a chip that clings to the block, or from cells lost; and
+wider bumps that stand upright on an edge, as a strip of cells does that was cut off, or a printed label.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import Ring
+from contour.narrow_features.feature import DEPTH, WIDTH, NarrowFeature
+
+# In cell pitches. A wider bump is a strip or a label where it fills so much of the rectangle over its foot: an arm's
+# end fills half, and what stands farther out is an arm.
+_WIDE, _UPRIGHT, _HIGH = 10.0, 0.6, 4.5
+# Beside its foot the outline runs along it over so much, but for this angle; a corner between two such edges stands
+# out by half its width times the tangent. On a curve or a corner it turns out at both feet, by so much over a pitch.
+_BESIDE, _ANGLE_DEG, _OUT_DEG = 2.0, 22.0, 25.0
+_SLOPE = 0.5 * float(np.tan(np.radians(_ANGLE_DEG)))
+# What stands out by no more than this times what the edges on its two sides are apart is a step from one to the other.
+_STEP = 1.5
+_SPACING, _LONGEST = 0.25, 20.0
+# From foot to foot the narrowest is told: a wider one, farther out on the same edge, is no deeper by this.
+_DEEPER = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """The outline beside each place of a ring, on one side of it, in two halves: their unit directions, and the middle
+    of the farther one, (N, 2) each.
+    """
+
+    near: Float64s
+    far: Float64s
+    middle: Float64s
+
+    @classmethod
+    def of(cls, places: Float64s, way: int, half: int) -> _Beside:
+        """Before (-1) or after (1) each place, halves of so many places."""
+        one, two = (np.roll(places, -way * reach, axis=0) for reach in (half, 2 * half))
+        return cls(_unit(way * (one - places)), _unit(way * (two - one)), (one + two) / 2)
+
+    def take(self, chosen: Indices) -> _Beside:
+        """What lies beside some of the places."""
+        return _Beside(*(part[chosen] for part in (self.near, self.far, self.middle)))
+
+    def turning_to(self, after: _Beside) -> Float64s:
+        """By how much the outline turns at each place, radians, positive to the right as seen with y down."""
+        one, two = self.near, after.near
+        return np.asarray(
+            np.arctan2(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], (one * two).sum(axis=1)), np.float64
+        )
+
+    def along(self, foot: Float64s) -> Float64s:
+        """Cosine of the angle to the foot, of the half that runs less along it."""
+        return np.asarray(np.minimum((self.near * foot).sum(axis=1), (self.far * foot).sum(axis=1)), np.float64)
+
+    def apart(self, other: _Beside) -> Float64s:
+        """How far apart the lines of the edge on both sides are."""
+        mean, way = _unit(self.far + other.far), other.middle - self.middle
+        return np.asarray(np.abs(mean[:, 0] * way[:, 1] - mean[:, 1] * way[:, 0]), np.float64)
+
+
+def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
+    """The deepest bump or dent of a ring in pixels, None without one."""
+    lengths = RingLengths.of(ring)
+    count = max(16, int(lengths.length / (_SPACING * pitch_px)))
+    places = lengths.at(np.linspace(0.0, lengths.length, count, endpoint=False, dtype=np.float64))
+    spacing = lengths.length / count
+    half = max(1, round(0.5 * _BESIDE * pitch_px / spacing))
+    before, after = _Beside.of(places, -1, half), _Beside.of(places, 1, half)
+    aligned = float(np.cos(np.radians(_ANGLE_DEG)))
+    # All feet at once: of so many steps, shape (S, 1), from each place, shape (S, N).
+    steps = np.arange(2, min(int(_LONGEST * pitch_px / spacing), count // 2))[:, None]
+    ends = (np.arange(count) + steps) % count
+    foot = places[ends] - places
+    width = np.hypot(foot[:, :, 0], foot[:, :, 1])
+    # A path so long reaches no farther out of its foot than half of it would, bent in its middle.
+    reach = 0.5 * np.sqrt(np.maximum((steps * spacing) ** 2 - width**2, 0.0))
+    long, starts = np.nonzero((width < _WIDE * pitch_px) & (reach > np.maximum(DEPTH * pitch_px, _SLOPE * width)))
+    foot, width, reach = foot[long, starts], width[long, starts], reach[long, starts]
+    one, other = before.take(starts), after.take(ends[long, starts])
+    along = foot / np.maximum(width, 1e-9)[:, None]
+    least = np.maximum(np.maximum(DEPTH * pitch_px, _SLOPE * width), _STEP * one.apart(other))
+    # Which way bumps may lie: 0 either, as seen along the outline 1 to the right and -1 to the left, nan none.
+    side = np.where(np.minimum(one.along(along), other.along(along)) > aligned, 0.0, np.nan)
+    turn = np.stack([before.turning_to(after)[feet] for feet in (starts, ends[long, starts])])
+    side = np.where(
+        np.isnan(side) & (np.abs(turn).min(axis=0) > np.radians(_OUT_DEG)) & (turn[0] * turn[1] > 0.0),
+        np.sign(turn[0]),
+        side,
+    )
+    chosen = np.flatnonzero((reach > least) & ~np.isnan(side))
+    best: NarrowFeature | None = None
+    for some in np.split(chosen, np.flatnonzero(np.diff(long[chosen])) + 1):
+        if len(some):
+            run = starts[some], int(steps[long[some[0]], 0])
+            best = _deeper(best, places, run, (along[some], width[some], least[some], side[some]), pitch_px)
+    return best
+
+
+def _deeper(
+    best: NarrowFeature | None,
+    places: Float64s,
+    run: tuple[Indices, int],
+    foot: tuple[Float64s, Float64s, Float64s, Float64s],
+    pitch_px: float,
+) -> NarrowFeature | None:
+    """The deepest of those that begin at `run`'s places and are its steps long, or `best` where none is deeper."""
+    starts, steps = run
+    along, width, least, side = foot
+    path = places[(starts[:, None] + np.arange(steps + 1)) % len(places)] - places[starts][:, None, :]
+    off = path[:, :, 0] * along[:, 1:] - path[:, :, 1] * along[:, :1]
+    farthest = np.abs(off).argmax(axis=1)
+    row = np.arange(len(starts))
+    depth = np.abs(off[row, farthest])
+    # Contours in pixels have the block on their left as seen with y down: what lies on the right is out.
+    middle = off.mean(axis=1)
+    out = middle < 0
+    upright = out & (depth < _HIGH * pitch_px) & (np.abs(_areas(path)) > _UPRIGHT * width * depth)
+    depth = np.where((depth > least) & (side * middle <= 0.0) & (upright | (width < WIDTH * pitch_px)), depth, 0.0)
+    one = int(depth.argmax())
+    if depth[one] <= ((best.depth_pitches + _DEEPER) * pitch_px if best else 0.0):
+        return best
+    x, y = places[(starts[one] + farthest[one]) % len(places)].tolist()
+    return NarrowFeature(float(depth[one]) / pitch_px, float(width[one]) / pitch_px, (x, y), bool(out[one]))
+
+
+def _areas(path: Float64s) -> Float64s:
+    """Areas between paths (N, M, 2) and their feet, signed, shape (N,)."""
+    following = path[:, 1:] - path[:, :-1]
+    return np.asarray(0.5 * (path[:, :-1, 0] * following[:, :, 1] - path[:, :-1, 1] * following[:, :, 0]).sum(axis=1))
+
+
+def _unit(vectors: Float64s) -> Float64s:
+    return np.asarray(vectors / np.maximum(np.hypot(*vectors.T)[:, None], 1e-9), np.float64)

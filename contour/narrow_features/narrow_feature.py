@@ -1,0 +1,25 @@
+"""What of an outline is too narrow to be the block's own."""
+
+from __future__ import annotations
+
+from contour.geometry.rings import Contour, area
+from contour.narrow_features.arms import arms, slits
+from contour.narrow_features.bumps import deepest_bump
+from contour.narrow_features.feature import NarrowFeature
+from contour.narrow_features.steps import horns, steps
+
+# Blocks of few cells have arms and steps as narrow; but chips and strips are less than this share of a block.
+_LARGE = 1.0 / 7.0
+
+
+def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
+    """The deepest bump or dent of a contour in pixels on an edge that goes on in its own direction, or that stands out
+    of a curve or a corner at both its feet; None without one.
+
+    A corner is none, nor is the end of an arm: there the edges beside it run another way, and no foot is beside them.
+    """
+    found = [one for ring in contour.rings for one in [deepest_bump(ring, pitch_px)] if one is not None]
+    large = _LARGE * area(contour) / pitch_px**2
+    found += arms(contour, pitch_px, large) + slits(contour, pitch_px)
+    found += [one for ring in contour.rings for one in (*steps(ring, pitch_px, large), *horns(ring, pitch_px))]
+    return max(found, key=lambda one: one.depth_pitches) if found else None

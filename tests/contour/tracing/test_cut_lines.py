@@ -1,0 +1,40 @@
+"""A straight cut is told by what touches its line at every cell; rows of closed cells are none."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from contour.geometry.arrays import Float64s
+from contour.geometry.rings import Contour
+from contour.tracing.closed_cells import Apart, MaterialEdge
+from contour.tracing.cut_lines import touched_cuts
+
+PITCH = 60.0
+
+
+def material(deep_px: Float64s, bow_px: float = 0.0) -> MaterialEdge:
+    """A block along whose upper edge lie openings so deep, one a pitch; that edge is bent by so much at its middle."""
+    width = round(PITCH * len(deep_px))
+    x = np.arange(width)
+    place = x / PITCH % 1.0
+    top = 100.0 + bow_px * (2.0 * x / width - 1.0) ** 2
+    top += np.where((place > 0.2) & (place < 0.8), np.repeat(deep_px, round(PITCH)), 0.0)
+    region = np.zeros((500, width + 100), np.uint8)
+    region[:400, 50:-50] = np.arange(400)[:, None] >= np.rint(top)[None]
+    border, _ = cv2.findContours(region, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    rings = tuple(ring[:, 0].astype(np.float64) for ring in border)
+    return MaterialEdge(Contour(rings[0]), 1.0, rings, Apart(region, region, region, 5.0))
+
+
+def test_openings_that_differ_were_cut_open_and_alike_ones_were_not() -> None:
+    deep = np.array([12.0, 20.0, 33.0, 15.0, 28.0, 40.0, 18.0, 25.0])
+    (cut,) = touched_cuts(material(deep), PITCH)
+    assert np.allclose(cut[0, :, 1], 100.0, atol=1.0)
+    assert abs(cut[0, 1, 0] - cut[0, 0, 0]) > 7.9 * PITCH
+    assert touched_cuts(material(np.full(8, 20.0)), PITCH) == []
+    assert len(touched_cuts(material(np.full(8, 20.0)), PITCH, alike=True)) == 1
+
+
+def test_a_row_of_closed_cells_that_a_lens_bends_is_none() -> None:
+    assert touched_cuts(material(np.full(12, 20.0), bow_px=3.5), PITCH) == []

@@ -65,6 +65,7 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
             if part is not None and part.length_pitches > long:
                 bare.append(part)
         if number == 0:
+            goes_on &= ~_loose_beside(traced, lengths, at, out_px)
             part = longest_part(judged & goes_on, lengths, at, _SPACING)
             beyond = part if part is not None and part.length_pitches > _GOES_ON else None
     return max(bare, key=lambda one: one.length_pitches) if bare else None, beyond
@@ -85,6 +86,15 @@ def _known(traced: Trace, ring: int, at: Float64s, beside_px: float) -> Bools:
     told = [one for one in traced.evidence or () if one.ring == ring and (one.state != "seen" or one.by is not None)]
     within = [(at > one.from_px - beside_px) & (at < one.to_px + beside_px) for one in told]
     return np.asarray(np.any(within, axis=0) if within else np.zeros(at.shape, np.bool_))
+
+
+def _loose_beside(traced: Trace, lengths: RingLengths, at: Float64s, out_px: float) -> Bools:
+    """At which lengths along a ring pieces that were told from the block lie beyond it or within a cell of there."""
+    if traced.look is None:
+        return np.zeros(at.shape, np.bool_)
+    place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * abs(out_px))
+    there = np.any([traced.look.loose_at(place + pitches * outward) for pitches in _BEYOND], axis=0)
+    return np.asarray(with_sides(there, _CELL / _SPACING).any(axis=1))
 
 
 def _out_of_line(lengths: RingLengths, at: Float64s, out_px: float) -> Float64s:

@@ -94,6 +94,10 @@ class TableLook:
         """Which points (N, 2), pixels, are lighter than the table, shape (N,)."""
         return self._at(self.lighter, points)
 
+    def loose_at(self, points: Float64s) -> Bools:
+        """At which points (N, 2), pixels, a piece of comb lies that was told from the block, shape (N,)."""
+        return np.zeros(len(points), np.bool_) if self.loose is None else self._at(self.loose, points)
+
     def _at(self, part: Bools, points: Float64s) -> Bools:
         grid = samples_of(points, self.step)
         return sample_at(part.astype(np.uint8) * np.uint8(255), grid[:, 0], grid[:, 1]) > 127.0

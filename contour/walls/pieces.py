@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -26,6 +27,8 @@ _CLOSING_PITCHES = 0.72
 # to be in two, parts as large as this may be its own. No such strip has less wall, pitches times pixels.
 _LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
 _LEAST_CELL = 0.2
+# A shaving is as long as several walls: of the block's own walls fewer may stand alone, between two that do not show.
+_SHAVING_PITCHES = 1.5
 _HEXAGON = 2 / np.sqrt(3)
 
 
@@ -77,9 +80,12 @@ def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) 
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
 
 
-def without_loose_pieces(mask: Bytes, pitch_px: float) -> Bytes:
+def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes] | None = None) -> Bytes:
     """A wall mask (H, W), uint8, 255 on walls, without small pieces of comb whose walls nowhere touch the block's,
     however near they lie: strips of swarf, chips. Where no piece holds most of the walls, nothing is taken out.
+
+    `faint` makes the mask by a lower threshold: shavings without cells, too, are loose where no faint wall leads from
+    the block to them, as one does to every wall of its own.
     """
     count, labels = cv2.connectedComponents(mask, connectivity=8)
     places = np.flatnonzero(mask > 0)
@@ -97,7 +103,17 @@ def without_loose_pieces(mask: Bytes, pitch_px: float) -> Bytes:
         rings, around = cv2.findContours(walls, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
         holes = [ring for ring, outer in zip(rings, around[0, :, 3], strict=True) if outer >= 0]
         loose[number] = sum(cv2.contourArea(hole) > _LEAST_CELL * pitch_px**2 for hole in holes) >= _LOOSE_CELLS
+    long = small & ~loose & (np.hypot(*(boxes[2:] - boxes[:2])) > _SHAVING_PITCHES * pitch_px)
+    if faint is not None and long.any():
+        loose |= long & ~_hang_together(np.asarray(labels, np.int32), int(area.argmax()), mask | faint())
     return np.where(loose[labels], np.uint8(0), mask) if loose.any() else mask
+
+
+def _hang_together(labels: Int32s, main: int, walls: Bytes) -> Bools:
+    """Which of numbered pieces, (H, W), hang together with the main one by `walls`, (H, W), shape (count,)."""
+    _, joined = cv2.connectedComponents(walls, connectivity=8)
+    with_main = joined == joined[labels == main][0]
+    return np.bincount(labels[with_main], minlength=int(labels.max()) + 1) > 0
 
 
 def _boxes(places: tuple[Int64s, Int64s], piece: Int32s, count: int) -> Int64s:

@@ -92,7 +92,8 @@ def see_block(
         seen = replace(seen, mask=with_faint_links(seen.mask, seen.faint, cells.pitch_px / scale))
     on_mask()
     every = seen.mask
-    seen = replace(seen, mask=without_loose_pieces(every, cells.pitch_px / scale))
+    faint = seen.faint if midway is None else None
+    seen = replace(seen, mask=without_loose_pieces(every, cells.pitch_px / scale, faint))
     loose = None if seen.mask is every else np.asarray(cv2.subtract(every, seen.mask), np.uint8)
     coarse = coarse_block(seen.mask, small, cells.pitch_px / scale)
     others = pieces_beside(every, coarse.rings[0].vertices, cells.pitch_px / scale, scale)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from contour.acceptance.findings import Limits, Refusal
 from contour.acceptance.trace_check import CheckedTrace
 from contour.edge.edge_parts import EdgePart
 from contour.edge.stretches import Hider, State, Stretch
+from contour.edge.table_look import TableLook
 from contour.geometry.rings import Contour, Ring, oriented
 from contour.polygon.polygon import Polygon
 from contour.tracing.trace import Trace
@@ -142,6 +145,17 @@ def test_faint_walls_beyond_an_outline_over_more_than_four_cells_are_told_with_t
     assert beyond(with_faint_rim(70), SHORT) is None
     assert beyond(with_faint_rim(110), BLOCK) is None
     assert beyond(with_faint_rim(110), SHORT, Stretch(0, 0.0, float(SHORT.length), "covered", "object", 1.0)) is None
+
+
+def test_comb_beyond_that_was_told_from_the_block_is_left_out() -> None:
+    picture = with_faint_rim(110)
+    loose = np.zeros((240, 240), np.bool_)
+    loose[:, 192:] = True
+    none, away = np.zeros_like(loose), np.full(loose.shape, 1e6, np.float32)
+    look = TableLook(none, none, none, 2, PITCH, none, none, away, picture, loose)
+    trace = replace(traced(picture, SHORT), look=look)
+    assert comb_at_edge(trace, PITCH)[1] is None
+    assert comb_at_edge(replace(trace, look=replace(look, loose=None)), PITCH)[1] is not None
 
 
 def test_a_speck_beside_the_edge_is_no_comb_nor_is_a_table_that_changes_everywhere() -> None:

@@ -150,3 +150,29 @@ def test_broken_walls_beside_the_block_stay_and_so_do_fragments_of_a_faint_one()
     for left in (40, 180, 320, 460):
         comb(fragments, left, 60, 5, 5)
     assert without_loose_pieces(fragments, PITCH) is fragments
+
+
+def with_shaving(*, length: float = 2.5, gap_px: int = 4) -> tuple[np.ndarray, np.ndarray]:
+    """A comb of 12 by 12 cells, and the same with a bent strip of one wall below it, so many pitches long."""
+    alone = empty()
+    comb(alone, 100, 40, 12, 12)
+    bottom = int(np.flatnonzero(alone.any(axis=1))[-1])
+    across = np.linspace(0.0, length * PITCH, 6)
+    zigzag = np.stack([150 + across, bottom + gap_px + 3 + 5 * (np.arange(6) % 2)], axis=1)
+    mask = alone.copy()
+    cv2.polylines(mask, [np.rint(zigzag).astype(np.int32)], False, 255, 3)
+    return alone, mask
+
+
+def test_a_shaving_is_taken_out_where_no_faint_wall_leads_to_it_from_the_block() -> None:
+    alone, mask = with_shaving()
+    assert (without_loose_pieces(mask, PITCH, lambda: mask) == alone).all()
+    bottom = int(np.flatnonzero(alone.any(axis=1))[-1])
+    linked = cv2.line(mask.copy(), (170, bottom - 20), (170, bottom + 10), 255, 2)
+    assert (without_loose_pieces(mask, PITCH, lambda: linked) == mask).all()
+    assert (without_loose_pieces(mask, PITCH) == mask).all()
+
+
+def test_a_wall_or_two_that_stand_alone_stay() -> None:
+    _, mask = with_shaving(length=1.0)
+    assert (without_loose_pieces(mask, PITCH, lambda: mask) == mask).all()

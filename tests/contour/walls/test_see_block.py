@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -228,3 +229,22 @@ def test_where_no_cells_are_it_is_told_what_both_readings_showed() -> None:
     table = np.random.default_rng(3).normal(90.0, 4.0, (300, 400))
     with pytest.raises(NoBlockFound, match=r"cells.* between bright walls and .*cells.* between dark walls, expected"):
         probe(np.clip(table, 0, 255).astype(np.uint8), "auto")
+
+
+def test_a_shaving_beside_the_block_is_told_from_it() -> None:
+    rendered = picture()
+    ring, pitch = rendered.truth_px.exterior, rendered.pitch_px
+    begin, end = ring[0], ring[1]
+    along = (end - begin) / np.hypot(*(end - begin))
+    out = np.array([-along[1], along[0]])
+    out = out if out @ (begin - ring.mean(axis=0)) > 0 else -out
+    steps = np.arange(6.0)[:, None]
+    strip = 0.5 * (begin + end) + 0.4 * pitch * steps * along + (0.5 + 0.25 * (steps % 2)) * pitch * out
+    swarf = rendered.picture.copy()
+    cv2.polylines(swarf, [np.rint(strip).astype(np.int32)], False, (200, 200, 200), 3)
+    seen = seen_in(swarf, "auto")
+    assert seen.loose is not None
+    middle = np.rint(strip[2]).astype(int)
+    near = seen.loose[middle[1] - 6 : middle[1] + 7, middle[0] - 6 : middle[0] + 7]
+    assert near.any()
+    assert signed_distance(rendered.truth_px, seen.rings[0].points).min() > -0.1 * pitch

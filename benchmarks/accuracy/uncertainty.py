@@ -22,15 +22,16 @@ from numpy.typing import NDArray
 from benchmarks.accuracy.shop_floor import WRONG_PITCHES, true_places
 from benchmarks.accuracy.uncertainty_plot import PLOT, write_plot
 from benchmarks.page_section import put_section, table
-from contour.edge.visible_edge import VisibleRing
+from contour.edge.visible_edge import VisibleRing, visible_rings
 from contour.errors import ContourError
 from contour.geometry.agreement import distances_to, rectified_edges
 from contour.outline.uncertainty import LEAST_PX, Coefficients, Stretches, bound, ring_stretches
 from contour.synthetic import Rendered, render
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
-from contour.tracing.wall_tips import looked_at, visible_rings
+from contour.tracing.wall_tips import looked_at
 from contour.walls.lightness import wall_light
+from contour.walls.see_block import see_walls
 from contour.walls.wall_evidence import BlockEvidence
 from tests.support.scenes.bench_scenes import BenchScene, measured_scenes
 from tests.support.scenes.random_scenes import random_scene
@@ -125,7 +126,9 @@ def case_of(scene: BenchScene | ShopFloorScene, rendered: Rendered) -> Case | st
         return scene.name
     if traced.uncertainty_px is None:
         return scene.name
-    seen, look = looked_at(rendered.picture, wall_light(rendered.picture), TraceSettings(), lambda _name: None)
+    seen, look = looked_at(
+        rendered.picture, see_walls(rendered.picture, wall_light(rendered.picture), "auto"), lambda _name: None
+    )
     rings = visible_rings(rendered.picture, seen, look, rectifier)
     places, clear = true_places(rendered)
     off = distances_to(places[clear], rectified_edges(traced.contour, rectifier))

@@ -12,6 +12,7 @@ from contour.acceptance.edge_contrast import alike_edge
 from contour.acceptance.quality import Quality, block_quality
 from contour.edge.border_beyond import border_beyond
 from contour.edge.edge_parts import EdgePart
+from contour.edge.reflection import reflection
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, densified
@@ -22,6 +23,8 @@ from contour.tracing.trace import Trace
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
 _BENT_PITCHES = 5.0
+# As much seems left out of hardly any right contour; less is not worth the look at both sides of it.
+_LEFT_OUT_PITCHES = 1.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,21 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
         lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat, loose),
         lambda: _checked_edge(picture, traced, pitch_px),
     )
-    return CheckedTrace(traced, quality, apart, *edge)
+    return _without_image(CheckedTrace(traced, quality, apart, *edge), pitch_px)
+
+
+def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:
+    """Without what a polished table says against a trace: what it shows beyond the edge is the block once more, so both
+    sides are alike, and it is neither comb that was left out nor a border of its own.
+    """
+    apart = checked.disagreement
+    left_out = apart is not None and not apart.claimed and apart.pitches > _LEFT_OUT_PITCHES
+    if checked.trace.evidence is None or not (left_out or checked.bare or checked.beyond or checked.runs_on):
+        return checked
+    if not reflection(checked.trace.light, checked.trace.contour, pitch_px).whole:
+        return checked
+    kept = replace(apart, pitches=0.0) if apart is not None and left_out else apart
+    return replace(checked, disagreement=kept, bare=None, beyond=None, runs_on=None)
 
 
 def _checked_edge(

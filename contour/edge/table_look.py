@@ -143,10 +143,11 @@ def beside(look: TableLook) -> float:
     return _BESIDE_PITCHES * look.pitch_px + look.step
 
 
-def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> TableLook:
+def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirrored: bool = False) -> TableLook:
     """What is table and what is neither table nor comb in a picture, grey (H, W) or BGR (H, W, 3), uint8.
 
-    `plain`: the table is known to be a plain one, from a look at the block before anything of it was left out.
+    `plain`: the table is known to be a plain one, from a look at the block before anything of it was left out;
+    `mirrored`: to be one that shows the block once more.
     """
     pitch_px = seen.pitch_px
     step = max(_FINEST_PX if pitch_px > _FINE_PITCH_PX else 1, int(pitch_px / _SAMPLES_PER_PITCH))
@@ -181,6 +182,9 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False) -> T
     shade &= ~_opened(every & shade & (block == 0), _WIDEST_SHADE * samples)
     maps = light.lighter, shade, _away(every, step), mean, loose
     look = TableLook(table, every, every, step, pitch_px, *maps)
+    if mirrored:
+        within = foreign & inside
+        return replace(look, foreign=within, away=_away(within, step), plain=False)
     if plain:
         return look
     exterior = seen.rings[0].points

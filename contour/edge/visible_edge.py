@@ -17,8 +17,8 @@ from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside, nearest
-from contour.outline.fit import FittedRing
-from contour.walls.wall_evidence import RingEvidence, WitnessKind
+from contour.outline.fit import FittedRing, fit_ring
+from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 
 SPACING_PITCHES = 0.25
 # Ends of walls beside a thing are the edge's own where they lie on the line of those that are seen well.
@@ -38,6 +38,7 @@ _LEAVES_PITCHES = 0.5
 _THING_PITCHES, _THING_ROOM = 1.0, 0.8
 # At half a pitch a round outline of five pitches across turns by less.
 _CORNER_DEG = 15.0
+_LEAST_WITNESSES = 8
 
 Fit = Callable[[RingEvidence], FittedRing]
 
@@ -67,6 +68,17 @@ class VisibleRing:
     def on_line(self) -> Float64s:
         """The witnesses that lie on the ring, shape (N, 2), pixels."""
         return self.evidence.points[self.fitted.inlier]
+
+
+def visible_rings(
+    picture: Bytes, seen: BlockEvidence, look: TableLook, rectifier: Rectifier | None
+) -> list[VisibleRing]:
+    """The rings of a block, exterior first, fitted to what is seen of their edges. Raises NoBlockFound."""
+    return [
+        fit_visible(ring, picture, look, rectifier, lambda evidence: _fitted(evidence, seen, rectifier))
+        for ring in seen.rings
+        if not (ring.is_hole and look.fills(ring))
+    ]
 
 
 def fit_visible(
@@ -203,3 +215,13 @@ def _without(evidence: RingEvidence, dropped: Bools, look: TableLook) -> RingEvi
         walls=evidence.walls.take(look.foreign_at(evidence.walls.points) >= beside(look)),
         beside=evidence.beside[look.foreign_at(evidence.beside) >= beside(look)],
     )
+
+
+def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:
+    if len(ring.points) < _LEAST_WITNESSES:
+        what = "a hole's edge" if ring.is_hole else "the block's edge"
+        raise NoBlockFound(
+            f"no block found: {len(ring.points)} wall ends along {what}, expected at least {_LEAST_WITNESSES}. "
+            "Check focus and light"
+        )
+    return fit_ring(ring, pitch_px=seen.pitch_px, wall_px=seen.wall_px, rectifier=rectifier)

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from contour.edge.edge_evidence import ring_evidence
+from contour.edge.mirrored_block import is_mirrored, mirrored_block
 from contour.edge.table_look import TableLook, table_look
-from contour.edge.visible_edge import VisibleRing, doubtful, fit_visible
+from contour.edge.visible_edge import doubtful, visible_rings
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
-from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import MaterialEdge, material_edge
 from contour.tracing.cut_lines import touched_cuts, with_cuts
@@ -25,11 +25,12 @@ from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import pieces_beside
-from contour.walls.see_block import see_block, see_walls
-from contour.walls.wall_evidence import BlockEvidence, RingEvidence
+from contour.walls.see_block import SeenWalls, see_block, see_walls
+from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import wall_mask
 
-_LEAST_WITNESSES = 8
+# Bounds that are wider than that share of a pitch are refused.
+_SURE_PITCHES = 0.25
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
 # What of a thing lay inside the block as it was first seen shows once the rest of it is known.
@@ -57,7 +58,8 @@ def wall_tips(
     solid = _Solid(picture, light, settings.polarity, on_stage)
     if settings.edge == "cells":
         return solid.closed()
-    seen, look = looked_at(picture, light, settings, on_stage)
+    walls = see_walls(picture, light, settings.polarity)
+    seen, look = looked_at(picture, walls, on_stage)
     plate = _plate(solid, seen) if settings.edge == "auto" else None
     if isinstance(plate, Trace):
         return plate
@@ -73,7 +75,7 @@ def wall_tips(
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
     try:
-        return _cut(picture, light, (seen, look), rectifier, on_stage)
+        return _cut_or_mirrored(picture, light, walls, (seen, look), rectifier, on_stage)
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
         closed = None if settings.edge == "cut" or plate is not None else _if_closed(solid, seen)[0]
@@ -81,6 +83,53 @@ def wall_tips(
             error.edge = "cut"
             raise
         return closed
+
+
+def _cut_or_mirrored(
+    picture: Bytes,
+    light: Bytes,
+    walls: SeenWalls,
+    looked: tuple[BlockEvidence, TableLook],
+    rectifier: Rectifier | None,
+    on_stage: OnStage,
+) -> Trace:
+    """As `_cut`; where that is in doubt, without the walls that a polished table mirrors."""
+    try:
+        found = _cut(picture, light, looked, rectifier, on_stage)
+    except NoBlockFound:
+        mirrored = _mirrored(picture, light, walls, None, rectifier, on_stage)
+        if mirrored is None:
+            raise
+        return mirrored
+    return found if _sure(found) else _mirrored(picture, light, walls, found.contour, rectifier, on_stage) or found
+
+
+def _sure(found: Trace) -> bool:
+    """Whether all of an outline is seen, and known to a share of a cell."""
+    seen = all(stretch.state == "seen" for stretch in found.evidence or ())
+    return seen and found.untold_px is None and (found.uncertainty_px or 0.0) <= _SURE_PITCHES * (found.pitch_px or 0.0)
+
+
+def _mirrored(
+    picture: Bytes,
+    light: Bytes,
+    walls: SeenWalls,
+    first: Contour | None,
+    rectifier: Rectifier | None,
+    on_stage: OnStage,
+) -> Trace | None:
+    """The outline along which the table mirrors the block, sure where one is; None without any."""
+    best = None
+    for looked in mirrored_block(picture, walls, first, rectifier):
+        try:
+            found = _cut(picture, light, looked, rectifier, on_stage)
+        except NoBlockFound:
+            continue
+        if is_mirrored(walls, found.contour):
+            if _sure(found):
+                return found
+            best = best or found
+    return best
 
 
 def _cut(
@@ -123,24 +172,10 @@ def _cut(
     return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold)
 
 
-def visible_rings(
-    picture: Bytes, seen: BlockEvidence, look: TableLook, rectifier: Rectifier | None
-) -> list[VisibleRing]:
-    """The rings of a block, exterior first, fitted to what is seen of their edges. Raises NoBlockFound."""
-    return [
-        fit_visible(ring, picture, look, rectifier, lambda evidence: _fitted(evidence, seen, rectifier))
-        for ring in seen.rings
-        if not (ring.is_hole and look.fills(ring))
-    ]
-
-
-def looked_at(
-    picture: Bytes, light: Bytes, settings: TraceSettings, on_stage: OnStage
-) -> tuple[BlockEvidence, TableLook]:
+def looked_at(picture: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[BlockEvidence, TableLook]:
     """What is seen of the block, and of what lies on it and around it: once more where that hides some of its edge."""
     hidden: Bytes | None = None
     plain = False
-    walls = see_walls(picture, light, settings.polarity)
     for _ in range(_LOOKS):
         seen = see_block(walls, lambda: on_stage("mask"), hidden=hidden)
         look = table_look(picture, seen, plain=plain)
@@ -264,13 +299,3 @@ def _plate(solid: _Solid, seen: BlockEvidence) -> Trace | BlockEvidence | None:
     if outline is None:
         return replace(seen, comb=comb)
     return replace(solid.around(outline), comb=comb, edge=edge)
-
-
-def _fitted(ring: RingEvidence, seen: BlockEvidence, rectifier: Rectifier | None) -> FittedRing:
-    if len(ring.points) < _LEAST_WITNESSES:
-        what = "a hole's edge" if ring.is_hole else "the block's edge"
-        raise NoBlockFound(
-            f"no block found: {len(ring.points)} wall ends along {what}, expected at least {_LEAST_WITNESSES}. "
-            "Check focus and light"
-        )
-    return fit_ring(ring, pitch_px=seen.pitch_px, wall_px=seen.wall_px, rectifier=rectifier)

@@ -74,6 +74,20 @@ def see_walls(picture: Bytes, light: Bytes, polarity: str) -> SeenWalls:
     return SeenWalls(light, small, scale, cells, seen)
 
 
+def strong_walls(walls: SeenWalls, least: float) -> SeenWalls:
+    """Those of the walls that rise by `least` of what walls of the wider region do, and no fainter ones."""
+    cells, scale = walls.cells, walls.scale
+    seen = wall_mask(
+        walls.small,
+        cells.pitch_px / scale,
+        bright=cells.bright,
+        contrast=cells.contrast,
+        wall=cells.wall_px / scale,
+        least=least,
+    )
+    return replace(walls, mask=replace(seen, faint=lambda: seen.mask))
+
+
 def see_block(
     walls: SeenWalls, on_mask: Callable[[], None] = lambda: None, *, hidden: Bytes | None = None
 ) -> BlockEvidence:

@@ -66,7 +66,15 @@ class WallMask:
         return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
-def wall_mask(light: Bytes, pitch_px: float, *, bright: bool, contrast: float = 0.0, wall: float = 0.0) -> WallMask:
+def wall_mask(
+    light: Bytes,
+    pitch_px: float,
+    *,
+    bright: bool,
+    contrast: float = 0.0,
+    wall: float = 0.0,
+    least: float = _REGION_RISE,
+) -> WallMask:
     """Walls of `light` (H, W) where cells are about `pitch_px` apart and walls are brighter (or darker) than cells.
 
     Walls are what stands out on both sides over less than a cell, whatever the light: a table as light as the walls is
@@ -74,7 +82,7 @@ def wall_mask(light: Bytes, pitch_px: float, *, bright: bool, contrast: float = 
     walls, a mean weighted with itself, whatever share of the area is wall; it is never below NOISE_FLOOR times the
     noise. `contrast`, where it is known, sets one more floor, and above 40 levels allows a faster way. Where the width
     of walls is known, `wall` in pixels, what is both wider and fainter than they is none: a table's light between its
-    holes, or between a groove and the block.
+    holes, or between a groove and the block. `least`: the share of the region's walls that a wall rises by at least.
     """
     step = max(1, int(pitch_px / _MAP_SAMPLES))
     smooth, unit = _smoothed(light, step, contrast)
@@ -88,15 +96,15 @@ def wall_mask(light: Bytes, pitch_px: float, *, bright: bool, contrast: float = 
     noise = _noise_level(smooth, pitch_px, unit)
     walls, region, typical = _heights(height, beside, pitch_px / step)
     share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch_px) / 8, 0, 1))
-    rise = np.maximum(np.maximum(share * walls, _REGION_RISE * region), _PICTURE_RISE * contrast * unit)
-    least = NOISE_FLOOR * noise
+    rise = np.maximum(np.maximum(share * walls, least * region), _PICTURE_RISE * contrast * unit)
+    floor = NOISE_FLOOR * noise
     size = _odd(_WIDE_WALLS * wall + _HALO_PX)
     wide: Float32s | float = 0.0
     if wall and size < _BESIDE_PITCHES * pitch_px:
         wide = np.minimum(sign * _shrunk(_opened(smooth, size, closed=not bright), step) - beside, _TALL * region)
 
     def standing_out(part: float) -> Bytes:
-        level = np.maximum(_OVER * part * rise, least)
+        level = np.maximum(_OVER * part * rise, floor)
         level += wide
         np.maximum(level, part * rise, out=level)
         level += beside

@@ -6,14 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from contour.acceptance.bare_edge import comb_at_edge
 from contour.acceptance.disagreement import disagreement
 from contour.acceptance.quality import block_quality
 from contour.acceptance.trace_check import check_trace
+from contour.edge.border_beyond import border_beyond
 from contour.geometry.rectifier import CroppedRectifier
 from contour.geometry.rings import Contour
-from contour.tracing.trace import TraceSettings
+from contour.synthetic import render
+from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.tracing import trace
 from tests.support.pictures.small_scenes import block
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+from tests.support.scenes.trials import calibration_for
 
 
 class Magnifier:
@@ -97,3 +102,52 @@ def test_a_table_at_full_scale_beside_dark_walls_is_no_overexposed_block() -> No
     checked = check_trace(bright, traced, None)
     assert checked.quality is not None
     assert checked.quality.clipped_share == 0.0
+
+
+def mirrored(strength: float, *, fading_px: float = 12.0, rim: float = 1.0) -> tuple[np.ndarray, Contour]:
+    """A grid for cells of 16 px with thick walls each way, on a table that mirrors it; its outline, 4 px off each.
+
+    rim: how light its last walls are on the left, above, of what they are elsewhere.
+    """
+    lines = np.arange(480) % 16 < 3
+    picture = np.where(lines | lines[:, None], 200, 60).astype(float)
+    rng = np.random.default_rng(3)
+    picture *= np.kron(rng.uniform(0.6, 1.0, (30, 30)), np.ones((16, 16)))
+    picture[120:280, 104:120] = 60 + rim * (picture[120:280, 104:120] - 60)
+    rows = np.abs(np.arange(480) - 240.0)
+    image = np.arange(480)
+    image = np.where(rows > 136, np.where(image > 240, 2 * 376 - image, 2 * 104 - image), image)
+    away = np.maximum(rows[:, None], rows) - 136.0
+    shown = 20.0 + strength * np.exp(-np.maximum(away, 0.0) / fading_px) * (picture[image][:, image] - 20.0)
+    outline = np.array([[103.5, 103.5], [103.5, 376.5], [376.5, 376.5], [376.5, 103.5]])
+    return np.rint(np.where(away > 0.0, shown, picture)).astype(np.uint8), Contour(outline)
+
+
+def test_what_a_table_mirrors_beyond_the_edge_is_no_comb_that_goes_on() -> None:
+    for strength, goes_on in ((0.7, False), (2.0, True)):
+        picture, outline = mirrored(strength)
+        traced = Trace("wall-tips", "bright", 16.0, outline, picture, evidence=())
+        assert comb_at_edge(traced, 16.0)[1] is not None
+        assert (check_trace(picture, traced, None).beyond is not None) == goes_on
+
+
+def test_what_it_mirrors_is_not_left_out_and_faint_walls_within_have_alike_ones_beyond() -> None:
+    picture, outline = mirrored(0.7, fading_px=100.0)
+    traced = Trace("wall-tips", "bright", 16.0, outline, picture, evidence=())
+    apart, checked = disagreement(picture, outline, 16.0), check_trace(picture, traced, None).disagreement
+    assert not apart.claimed
+    assert apart.pitches > 2.0
+    assert checked == replace(apart, pitches=0.0)
+    picture, outline = mirrored(0.7, fading_px=100.0, rim=0.4)
+    traced = Trace("wall-tips", "bright", 16.0, outline, picture, evidence=())
+    assert comb_at_edge(traced, 16.0)[0] is not None
+    assert check_trace(picture, traced, None).bare is None
+
+
+def test_no_border_of_a_mirrored_block_goes_on_past_its_corner() -> None:
+    rendered = render(shop_floor_scene("mirror", 1059110).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+    assert traced.pitch_px is not None
+    assert border_beyond(traced.light, traced.contour, traced.pitch_px) is not None
+    assert check_trace(rendered.picture, traced, rectifier).runs_on is None

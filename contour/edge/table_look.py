@@ -44,8 +44,8 @@ _BESIDE_PITCHES = 0.6
 # Of the gradient's usual mean over a cell of comb.
 _QUIET, _SMOOTH, _GOOD_SHARE = 0.45, 0.3, 0.3
 _MOST = 0.5
-# What fills a hole ends where it is half as light. Pitches into it: its rim, and its middle (or so much of the deepest);
-# how light that rim is. Where light is blown out no shade shows.
+# What fills a hole ends where it is half as light. Pitches into it: its rim, and its middle (or so much of the
+# deepest); how light that rim is. Where light is blown out no shade shows.
 _HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT, _BLOWN_OUT = (0.2, 0.5), (1.0, 0.6), 0.93, 250.0
 # Shadows, sides of the block and its mirror image make a band beside it that has no room for a disc of this radius, or
 # for few here and there; where walls are lost in a cell or two, the cells are flat.

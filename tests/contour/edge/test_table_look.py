@@ -145,7 +145,7 @@ def test_a_hole_with_the_table_in_it_is_one_and_a_filled_one_is_none() -> None:
     assert look_at(lambda picture: painted(picture, ring, 150), "holed").fills(hole)
     assert not look_at(lambda picture: painted(picture, ring, 10), "holed").fills(hole)
     within = ring + 0.6 * PITCH * (ring.mean(axis=0) - ring) / np.hypot(*(ring.mean(axis=0) - ring).T)[:, None]
-    assert look_at(lambda picture: painted(painted(picture, ring, 10), within, 150), "holed").fills(hole), "cells around"
+    assert look_at(lambda picture: painted(painted(picture, ring, 10), within, 150), "holed").fills(hole)
     for shade_px, level in ((20.0, 150.0), (10.0, 150.0), (10.0, 900.0)):
         lamp = partial(lit_by_a_lamp, hole=ring, shade_px=shade_px, level=level)
         assert not look_at(lamp, "holed").fills(hole)

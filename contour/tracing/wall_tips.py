@@ -24,7 +24,7 @@ from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
-from contour.walls.pieces import pieces_beside
+from contour.walls.pieces import Piece, pieces_beside, with_earlier
 from contour.walls.see_block import SeenWalls, see_block, see_walls
 from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import wall_mask
@@ -176,8 +176,11 @@ def looked_at(picture: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[Bloc
     """What is seen of the block, and of what lies on it and around it: once more where that hides some of its edge."""
     hidden: Bytes | None = None
     plain = False
+    earlier: tuple[Piece, ...] = ()
     for _ in range(_LOOKS):
         seen = see_block(walls, lambda: on_stage("mask"), hidden=hidden)
+        earlier = with_earlier(seen.others, earlier, seen.rings[0].coarse)
+        seen = replace(seen, others=earlier)
         look = table_look(picture, seen, plain=plain)
         if not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
             break

@@ -45,6 +45,18 @@ class Piece:
     outline_px: Ring = field(default_factory=lambda: np.empty((0, 2)), compare=False)
     width_px: float = field(default=np.inf, compare=False)
 
+    @property
+    def middle_px(self) -> tuple[float, float]:
+        """(x, y) of the box's middle."""
+        left, top, right, bottom = self.box_px
+        return 0.5 * (left + right), 0.5 * (top + bottom)
+
+    def holds(self, other: Piece) -> bool:
+        """Whether the middle of another piece's box lies in the box of this one."""
+        left, top, right, bottom = self.box_px
+        x, y = other.middle_px
+        return left <= x <= right and top <= y <= bottom
+
     def moved(self, x: int, y: int) -> Piece:
         """The piece in a picture whose first pixel lies (x, y) before this one's."""
         left, top, right, bottom = self.box_px
@@ -78,6 +90,19 @@ def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) 
             width = np.inf if _at_border((x, y, x + w, y + h), walls.shape) else _width(filled) * whole
             found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring, width))
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
+
+
+def with_earlier(pieces: tuple[Piece, ...], earlier: tuple[Piece, ...], exterior: Ring) -> tuple[Piece, ...]:
+    """Pieces beside `exterior`, and those of an earlier look that lie outside of it, each as the look saw it that saw
+    more of it, largest first.
+
+    What hides a block's edge may be another block: at a later look its walls count no more, yet it lies there.
+    """
+    around = np.asarray(exterior, np.float32)
+    outside = [one for one in earlier if cv2.pointPolygonTest(around, one.middle_px, measureDist=False) < 0]
+    kept = [one for one in pieces if not any(one.area_px2 <= other.area_px2 and other.holds(one) for other in outside)]
+    kept += [one for one in outside if not any(one.area_px2 < other.area_px2 and other.holds(one) for other in pieces)]
+    return tuple(sorted(kept, key=lambda piece: -piece.area_px2))
 
 
 def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes] | None = None) -> Bytes:

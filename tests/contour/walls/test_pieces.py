@@ -9,7 +9,7 @@ import pytest
 from contour.geometry.rings import Contour, area
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
-from contour.walls.pieces import pieces_beside, without_loose_pieces
+from contour.walls.pieces import Piece, pieces_beside, with_earlier, without_loose_pieces
 from tests.support.pictures.small_scenes import block
 
 PITCH = 20.0
@@ -176,3 +176,34 @@ def test_a_shaving_is_taken_out_where_no_faint_wall_leads_to_it_from_the_block()
 def test_a_wall_or_two_that_stand_alone_stay() -> None:
     _, mask = with_shaving(length=1.0)
     assert (without_loose_pieces(mask, PITCH, lambda: mask) == mask).all()
+
+
+def test_a_piece_that_a_later_look_does_not_see_still_lies_there() -> None:
+    def piece(left: int, right: int, area_px2: float) -> Piece:
+        return Piece(area_px2, (left, 300, right, 400))
+
+    first, less, far = piece(100, 200, 9000.0), piece(150, 200, 3000.0), piece(400, 450, 4000.0)
+    assert with_earlier((), (first, far), RING) == (first, far), "largest first"
+    assert with_earlier((less,), (first,), RING) == (first,), "of one piece the look counts that saw more of it"
+    assert with_earlier((first,), (less,), RING) == (first,)
+    assert with_earlier((first,), (first,), RING) == (first,)
+    within = Piece(5000.0, (100, 100, 200, 200))
+    assert with_earlier((far,), (within,), RING) == (far,), "what the outline holds now is the block"
+
+
+def test_a_second_block_so_near_that_it_hides_the_edge_is_a_piece_all_the_same() -> None:
+    rendered = block("rectangle")
+    picture, ring = np.roll(rendered.picture, -95, axis=1), rendered.truth_px.exterior - [95.0, 0.0]
+    longest = max(np.roll(ring, -1, axis=0) - ring, key=lambda side: float(np.hypot(*side)))
+    along = longest / np.hypot(*longest) * np.sign(longest[0])
+    part = np.zeros(picture.shape, np.uint8)
+    cv2.fillPoly(part, [np.rint(ring).astype(np.int32)], 255)
+    x, y = np.meshgrid(np.arange(picture.shape[1]), np.arange(picture.shape[0]))
+    part[x * along[0] + y * along[1] < (ring @ along).max() - 110.0] = 0
+    apart = np.column_stack((np.eye(2), (110.0 + 0.8 * rendered.pitch_px) * along))
+    size = picture.shape[::-1]
+    there = cv2.warpAffine(cv2.dilate(part, np.ones((5, 5), np.uint8)), apart, size) > 127
+    two = np.where(there, np.maximum(cv2.warpAffine(picture, apart, size), picture), picture)
+    traced = trace(two, TraceSettings())
+    assert "covered" in {stretch.state for stretch in traced.evidence or ()}, "it is looked at once more"
+    assert len(traced.others) == 1

@@ -72,9 +72,9 @@ def test_a_halt_holds_over_a_restart_until_it_is_resumed(cell: Cell, terminal: T
     cell.service.kill()
     cell.service = cell.start_service()
     until(lambda: cell.service.text.count("-> Halted") == 2, what="Halted again")
+    until(lambda: "state     Halted" in called("status", *config).stdout, what="a daemon that answers")
     status = called("status", *config)
     assert status.returncode == 1
-    assert "state     Halted" in status.stdout
     assert "blade is being changed" in status.stdout
     resumed = called("resume", *config)
     assert resumed.returncode == 0, resumed.stderr

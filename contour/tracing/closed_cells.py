@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Bytes, Float64s, median
+from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, median
 from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.opencv import fewer_vertices, pieces_and_areas
 from contour.image.pixel_sampling import sample_at
@@ -41,11 +41,11 @@ _LARGEST_CELL, _LARGE_CELLS, _LEAST_OPENING, _LEAST_BAY = 1.2, 0.9, 0.2, 0.1
 _HOLE = 5.0
 _SIMPLE_PX = 0.25
 # How near to a cut the outline runs along it: what is drawn is off by as much as pixels are, and walls end round.
-_ON_CUT_PX = 2.0
+_ON_CUT_PX, _PARTED_PX = 2.0, 2
 _NO_CUTS = np.empty((0, 2, 2))
 # Where cells differ from the table by so many grey levels, what differs by less than this share of that is a bay that a
-# cut closed, no cell that it opened. Nearer to a wall its blur tells nothing.
-_FLOOR_LEVELS, _LIKE_FLOOR, _FROM_WALL_PX = 6.0, 0.35, 7
+# cut closed, no cell that it opened. Nearer to a wall its blur tells nothing, nor does what little is left of it then.
+_FLOOR_LEVELS, _LIKE_FLOOR, _FROM_WALL_PX, _LEAST_FREE = 6.0, 0.35, 7, 0.1
 # Of the width of the edge: half a level off moves the outline by so much. And of a wall's: the outermost one leans,
 # shows its side, or stands on a foot: in photographs nobody can say which of that is the edge. Webs of a sheet do not.
 _LEAST_BOUND_PX, _BOUND_OF_WIDTH, _BOUND_OF_WALL = 0.3, 0.4, 0.5
@@ -103,17 +103,25 @@ def closed_along(material: MaterialEdge, cuts: Float64s, pitch_px: float) -> Mat
 
     `cuts`: where each begins and ends, (N, 2, 2), pixels.
     """
-    shut = material.apart.region.copy()
+    shut, parted = material.apart.region.copy(), material.apart.region.copy()
     for cut in cuts:
         start, end = (tuple(np.rint(place).astype(int).tolist()) for place in cut)
         cv2.line(shut, start, end, 1)
-    region = _without_bays(_filled(shut, pitch_px), shut, material.apart, pitch_px)
+        cv2.line(parted, start, end, 1, 2 * _PARTED_PX + 1)
+    region = _without_bays(_filled(shut, pitch_px), shut, parted, material.apart, pitch_px)
     return _outlined(replace(material.apart, region=region), cuts)
 
 
-def _without_bays(closed: Bytes, shut: Bytes, apart: Apart, pitch_px: float) -> Bytes:
+def outlined(material: MaterialEdge, region: Bytes) -> MaterialEdge:
+    """The outline around a part of material, `region` (H, W), 1 where it is: the rest of it is none."""
+    apart = material.apart
+    difference = np.where(apart.region > region, np.uint8(0), apart.difference)
+    return _outlined(replace(apart, difference=difference, region=region))
+
+
+def _without_bays(closed: Bytes, shut: Bytes, parted: Bytes, apart: Apart, pitch_px: float) -> Bytes:
     """A region without what cuts added, `shut` by them, to that of material and is larger than a cell, or shows the
-    table where cells do not.
+    table where cells do not. `parted`: shut by wide cuts, which walls reach that end short of them.
     """
     away = np.ones((_FROM_WALL_PX,) * 2, np.uint8)
     free = cv2.erode((apart.difference <= apart.level).astype(np.uint8), away) > 0
@@ -123,11 +131,16 @@ def _without_bays(closed: Bytes, shut: Bytes, apart: Apart, pitch_px: float) -> 
     whole = openings[1:][openings[1:] > _LEAST_OPENING * pitch_px * pitch_px]
     cell = float(np.quantile(whole, _LARGE_CELLS)) if len(whole) else pitch_px * pitch_px
     labels, area = pieces_and_areas(closed & (1 - shut), 4)
-    bay = area > _LARGEST_CELL * cell
+    parts, part_area = pieces_and_areas(closed & (1 - parted), 4)
+    owner = np.zeros(len(part_area), np.intp)
+    owner[parts] = labels
+    bay = np.zeros(len(area), np.bool_)
+    bay[owner[part_area > _LARGEST_CELL * cell]] = True
     bay[0] = False
     for number in 1 + np.flatnonzero(area[1:] > _LEAST_BAY * pitch_px * pitch_px) if floor >= _FLOOR_LEVELS else ():
         inner = apart.difference[(labels == number) & free]
-        bay[number] |= len(inner) and median(inner.astype(np.float64)) <= _LIKE_FLOOR * floor
+        enough = len(inner) > _LEAST_FREE * area[number]
+        bay[number] |= enough and median(inner.astype(np.float64)) <= _LIKE_FLOOR * floor
     # With the cut across its mouth.
     bays = cv2.dilate(bay.astype(np.uint8)[labels], np.ones((3, 3), np.uint8))
     return np.where(bays > 0, apart.region, closed)
@@ -244,7 +257,7 @@ def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s, cuts: Float64s
     quarter of a pixel; and how wide the edge is at each point of the chain, pixels: what material differs by over the
     steepest fall.
     """
-    smooth = _cyclic_mean(chain, 2)
+    smooth = cyclic_mean(chain, 2)
     tangent = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
     # findContours has the free side at (−dy, dx) of its direction.
@@ -261,33 +274,35 @@ def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s, cuts: Float64s
     part = (high - level[:, 0]) / np.maximum(high - low, 1e-6)
     shift = np.where(falls.any(axis=1), along[index] + 0.25 * part, 0.5)
     # Over an opened cell there is no edge to be seen.
-    feet, on_cut = _on_cuts(smooth, cuts)
-    moved, seen = np.where(on_cut[:, None], feet, smooth + shift[:, None] * normal), ~on_cut
-    if on_cut.all():
-        seen = on_cut
+    feet, cut = _on_cuts(smooth, cuts)
+    seen = cut < 0
+    moved = np.where(seen[:, None], smooth + shift[:, None] * normal, feet)
+    if not seen.any():
+        seen = ~seen
     steepest = (values[seen, :-4] - values[seen, 4:]).max(axis=1)
     behind = chain[seen].astype(np.intp)
     widths = 2.0 * levels[behind[:, 1], behind[:, 0]] / np.maximum(steepest, 1.0)
     # One run along a cut is straight from its first point to its last.
-    moved = moved[seen | np.roll(seen, 1) | np.roll(seen, -1)]
+    moved = moved[seen | (cut != np.roll(cut, 1)) | (cut != np.roll(cut, -1))]
     return fewer_vertices(moved, _SIMPLE_PX), widths
 
 
-def _on_cuts(points: Float64s, cuts: Float64s) -> tuple[Float64s, Bools]:
-    """The points, those near a cut moved straight onto it, and which these are."""
-    near = np.zeros(len(points), np.bool_)
-    for start, end in cuts:
+def _on_cuts(points: Float64s, cuts: Float64s) -> tuple[Float64s, Indices]:
+    """The points, those near a cut moved straight onto it, and the number of that, -1 away from all."""
+    cut = np.full(len(points), -1, np.intp)
+    for number, (start, end) in enumerate(cuts):
         length = float(np.hypot(*(end - start)))
         along = (end - start) / length
         place = (points - start) @ along
         foot = start + place[:, None] * along
         nearby = (np.hypot(*(points - foot).T) < _ON_CUT_PX) & (place > 0) & (place < length)
         points = np.where(nearby[:, None], foot, points)
-        near |= nearby
-    return points, near
+        cut[nearby] = number
+    return points, cut
 
 
-def _cyclic_mean(points: Float64s, half: int) -> Float64s:
+def cyclic_mean(points: Float64s, half: int) -> Float64s:
+    """Each point of a ring, (N, 2), as the mean of itself and `half` of its neighbours on both sides."""
     total = sum(np.roll(points, shift, axis=0) for shift in range(-half, half + 1))
     return np.asarray(total / (2 * half + 1), np.float64)
 

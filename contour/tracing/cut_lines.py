@@ -14,7 +14,7 @@ from contour.geometry.rings import densified
 from contour.geometry.segments import BoxTree, distances_to_tree
 from contour.image.opencv import fewer_vertices
 from contour.tracing.closed_cells import MaterialEdge, closed_along
-from contour.tracing.edge_kind import sure_ends
+from contour.tracing.edge_kind import side_px, sure_ends
 from contour.walls.wall_evidence import BlockEvidence
 
 # Ends of walls and corners of cells lie within this of the line they were cut along, and nothing stands out of it.
@@ -32,9 +32,15 @@ _LEFT_PX = 3.0
 # A cut as long as the first is touched at every cell, so far apart at most (of 80 lattices cut once the most is 1.12).
 # So are rows of closed cells, whose openings are alike: of those so deep the second deepest and the second shallowest
 # differ by 0.09 at most in 78 closed borders, by 0.11 or more in cut ones. In pitches: a lens bends rows by as much as
-# still counts as near. And by more than pixels make of what is alike: closed cells of 6 to 12 px passed for cut.
-_LEAST_LONG, _TOUCHED, _OPENING, _DIFFER = 4.0, 1.25, 0.15, 0.1
+# still counts as near. And by more than pixels make of what is alike: closed cells of 6 to 12 px passed for cut. Rows
+# of flexed cells wave, but leave shallow openings: 0.31 where they differed by more; the second deepest of 27 cuts is
+# 0.51 or more.
+_LEAST_LONG, _TOUCHED, _OPENING, _DIFFER, _DEEP = 4.0, 1.25, 0.15, 0.1, 0.4
 _DIFFER_PX, _OPENING_PX, _ALONG_PX = 3.0, 1.0, 0.5
+_FEWEST_OPENINGS = 4
+# Teeth of closed triangles are as deep as these are high, 0.73 of that where blur rounds tips and roots (of four); what
+# is shallower was cut (0.47 and 0.51 of two).
+_SHALLOW, _FEWEST_SHALLOW = 0.6, 3
 
 
 def with_cuts(material: MaterialEdge, seen: BlockEvidence, touched: list[Float64s]) -> MaterialEdge | None:
@@ -44,7 +50,7 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence, touched: list[Float64
     ring = seen.rings[0]
     sure = sure_ends(material, ring, seen)
     lines = touched or straight_cuts(
-        material, ring.points[sure], ring.normal[sure], seen.pitch_px, open_px=_OPEN_PITCHES * seen.pitch_px
+        material, ring.points[sure], ring.normal[sure], seen.pitch_px, open_px=_OPEN_PITCHES * side_px(seen)
     )
     if not lines:
         return None
@@ -55,9 +61,12 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence, touched: list[Float64
     return None if (off > _LEFT_PX).any() else closed
 
 
-def touched_cuts(material: MaterialEdge, pitch_px: float, *, alike: bool = False) -> list[Float64s]:
+def touched_cuts(
+    material: MaterialEdge, pitch_px: float, *, alike: bool = False, tooth_px: float = 0.0
+) -> list[Float64s]:
     """Straight cuts along edges of the material's convex hull, pixels, (1, 2, 2) each: touched at every cell, with
-    openings between that differ, or may be `alike`, as where what is closed has none.
+    openings between that differ, or may be `alike`, as where what is closed has none, or are shallower than those
+    between `tooth_px` deep teeth of closed cells.
 
     They need no ends of walls: where walls meet a saw at a slant, none is seen to end. A closed border that runs along
     rows of cells is touched as often, but its openings are alike; along other directions it is touched more seldom.
@@ -66,7 +75,7 @@ def touched_cuts(material: MaterialEdge, pitch_px: float, *, alike: bool = False
     border = np.concatenate([densified(ring, 0.5) for ring in material.border])
     hull = cv2.convexHull(border.astype(np.float32))[:, 0].astype(np.float64)
     corners = fewer_vertices(hull, near)
-    least = 0.0 if alike else max(_DIFFER * pitch_px, _DIFFER_PX)
+    least = near + _OPENING_PX if alike else max(_OPENING * pitch_px, near + _OPENING_PX)
     cuts = []
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         length = float(np.hypot(*(end - start)))
@@ -74,15 +83,28 @@ def touched_cuts(material: MaterialEdge, pitch_px: float, *, alike: bool = False
         out = np.array([along[1], -along[0]])
         line = _Line(start, along, out * np.sign(out @ (start - corners.mean(axis=0))), np.zeros(0, np.bool_))
         long = length > _LEAST_LONG * pitch_px
-        differ = _openings_differ(material.apart.region, line, length, near, pitch_px) if long else None
-        if differ is not None and differ >= least:
+        depths = _openings(material.apart.region, line, length, near, pitch_px) if long else np.empty(0)
+        depths = depths[depths > least]
+        if _opened(depths, pitch_px, tooth_px, alike=alike):
             cuts.append(_from_corner_to_corner(border, np.empty((0, 2)), line, near, _OPEN_PITCHES * pitch_px))
     return [cut for cut in cuts if len(cut)]
 
 
-def _openings_differ(region: Bytes, line: _Line, length: float, near: float, pitch_px: float) -> float | None:
-    """By how much openings differ in depth where the region touches a line within `near` at every cell over its
-    `length` from its point on, all in pixels; None where it does not, or too few openings are deep.
+def _opened(depths: Float64s, pitch_px: float, tooth_px: float, *, alike: bool) -> bool:
+    """Whether openings so deep, ascending, pixels, were cut into cells: they differ and two are deep, or may be
+    `alike`, or none is as deep as those between teeth.
+    """
+    if len(depths) >= _FEWEST_SHALLOW and depths[-1] < _SHALLOW * tooth_px:
+        return True
+    if len(depths) < _FEWEST_OPENINGS:
+        return False
+    differ = depths[-2] - depths[1]
+    return alike or bool(differ >= max(_DIFFER * pitch_px, _DIFFER_PX) and depths[-2] > _DEEP * pitch_px)
+
+
+def _openings(region: Bytes, line: _Line, length: float, near: float, pitch_px: float) -> Float64s:
+    """How deep openings are, ascending, where the region touches a line within `near` at every cell over its `length`
+    from its point on, all in pixels; none where it does not.
     """
     # How far behind the line the region begins.
     depth = np.arange(-near, 1.5 * pitch_px, _ALONG_PX)
@@ -93,10 +115,8 @@ def _openings_differ(region: Bytes, line: _Line, length: float, near: float, pit
     runs = np.split(begins, np.flatnonzero(np.diff(begins > near)) + 1)
     openings = [run for run in runs if run[0] > near]
     if max(map(len, openings), default=0) * _ALONG_PX > _TOUCHED * pitch_px:
-        return None
-    deepest = np.array([run.max() for run in openings])
-    deep = np.sort(deepest[deepest > max(_OPENING * pitch_px, near + _OPENING_PX)])
-    return float(deep[-2] - deep[1]) if len(deep) > 3 else None
+        return np.empty(0)
+    return np.sort([run.max() for run in openings])
 
 
 def straight_cuts(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -9,6 +12,7 @@ from contour.errors import EdgeContradicted
 from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
+from contour.geometry.segments import BoxTree, distances_to_tree
 from contour.geometry.signed_distance import nearest
 from contour.tracing.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
@@ -31,6 +35,8 @@ _SAME_PITCHES = 0.4
 # other fine cells, whose pixels make ends of corners: into one of 90 degrees it gets to 0.4 of a radius.
 _THIN_WALLS, _THIN_PX, _THIN_RADII = 0.6, 1.0, 1.15
 _FINE_PITCH_PX, _THIN_FINE_RADII = 12.0, 0.7
+# Of a triangle over the pitch of a hexagon as large.
+_TRIANGLE_SIDE = math.sqrt(2.0)
 
 
 def may_be_closed(seen: BlockEvidence) -> bool:
@@ -43,11 +49,16 @@ def may_be_closed(seen: BlockEvidence) -> bool:
     return float(gaps[gaps > _FAR_PITCHES * seen.pitch_px].sum()) > _MOST_WITHOUT_ENDS * float(gaps.sum())
 
 
-def edge_kind(material: MaterialEdge, seen: BlockEvidence) -> Edge:
-    """What a border with few ends is, by those that the edge of material shows as well: cut, where they lie on several
-    sides of the block, mixed, where they lie on one, cells, where there are none.
+def edge_kind(material: MaterialEdge, seen: BlockEvidence, cuts: Sequence[Float64s] = ()) -> Edge:
+    """What a border with few ends is, by those that the edge of material shows as well, and by `cuts` that it shows,
+    (N, 2, 2) each, pixels: cut, where they lie on several sides of the block, mixed, where they lie on one, cells,
+    where there are none.
     """
     sure = [ring.position[sure_ends(material, ring, seen)] for ring in seen.rings]
+    if cuts:
+        exterior, lines = seen.rings[0], np.concatenate(cuts)
+        off = distances_to_tree(exterior.points, BoxTree.of_segments(lines[:, 0], lines[:, 1]))
+        sure[0] = np.append(sure[0], exterior.position[off < _SAME_PITCHES * seen.pitch_px])
     if not any(len(ends) for ends in sure):
         return "cells"
     gaps = _gaps(seen, sure[0])
@@ -62,6 +73,16 @@ def sure_ends(material: MaterialEdge, ring: RingEvidence, seen: BlockEvidence) -
     if not len(tips):
         return np.zeros(len(ring.points), np.bool_)
     return (ring.kind <= WitnessKind.BLUNT) & (nearest(ring.points, tips) < _SAME_PITCHES * seen.pitch_px)
+
+
+def side_px(seen: BlockEvidence) -> float:
+    """How far apart walls meet a line mostly, pixels: a pitch, or the side of a triangle."""
+    return seen.pitch_px * (_TRIANGLE_SIDE if _triangular(seen) else 1.0)
+
+
+def tooth_px(seen: BlockEvidence) -> float:
+    """How deep the teeth of closed cells are: of triangles as deep as these are high, pixels; 0 of other cells."""
+    return math.sqrt(0.75) * side_px(seen) if _triangular(seen) else 0.0
 
 
 def _triangular(seen: BlockEvidence) -> bool:

@@ -27,6 +27,7 @@ _LIKE_TABLE = 0.45
 # A disc of so many pitches' radius does not get into a hole that was cut open by less than most of it.
 # It does not get into an inner corner, either, over 0.04 squares of the pitch.
 _BAY_PITCHES, _LEAST_BAY, _LARGE_BAY = 0.45, 0.06, 0.12
+_OF_ONE_BAY = 2
 # Corners of webs are rounded: what stands out farthest of them within so many pitches lies on the cut.
 _ROUND_PITCHES = 0.2
 # Edges of webs run along the cut itself, so near and so straight.
@@ -60,6 +61,9 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
         return None
     pitch_px = holes.pitch_px
     corners, normals = _bays(material.apart.region, _LEAST_BAY, pitch_px)
+    if len(corners) == _OF_ONE_BAY:
+        # It may be the rounded corner of a dent.
+        corners, normals = _bays(material.apart.region, _LARGE_BAY, pitch_px)
     if len(corners):
         corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
         lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
@@ -68,6 +72,9 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
         lines = touched_cuts(material, pitch_px, alike=True)
         if not lines:
             return material, "cells"
+    if not lines and holes.circled <= _ROUND:
+        # Teeth of a print's closed cells, which are not told from holes: a sheet is drilled within straight edges.
+        return None
     if len(lines) != 1:
         return None, "cut"
     cuts = np.array([_along_webs(material.contour.rings, cut) for cut in lines[0]])

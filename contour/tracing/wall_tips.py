@@ -18,7 +18,7 @@ from contour.geometry.rings import Contour
 from contour.outline.uncertainty import uncertainty
 from contour.tracing.closed_cells import MaterialEdge, material_edge
 from contour.tracing.cut_lines import touched_cuts, with_cuts
-from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed
+from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed, tooth_px
 from contour.tracing.evidence_check import check_against_evidence
 from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
@@ -59,8 +59,14 @@ def wall_tips(
     if settings.edge == "cells":
         return solid.closed()
     walls = see_walls(picture, light, settings.polarity)
+    return _of_comb(solid, walls, settings.edge, rectifier)
+
+
+def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None) -> Trace:
+    """The outline of a block of cells, or of a sheet with holes, whose border is `auto`, or promised to be `cut`."""
+    picture, light, on_stage = solid.picture, solid.light, solid.on_stage
     seen, look = looked_at(picture, walls, on_stage)
-    plate = _plate(solid, seen) if settings.edge == "auto" else None
+    plate = _plate(solid, seen) if promise == "auto" else None
     if isinstance(plate, Trace):
         return plate
     if plate is not None:
@@ -69,7 +75,7 @@ def wall_tips(
         closed, kind = _if_closed(solid, seen)
         # A sheet whose holes are open is not closed. And where something hides the border no walls end either.
         if not (plate is not None and kind == "cells") and (kind != "mixed" or not doubtful(seen.rings[0], look).any()):
-            check_promise(settings.edge, kind, traced=closed is not None)
+            check_promise(promise, kind, traced=closed is not None)
             if closed is not None:
                 return closed
     if seen.leaves_picture:
@@ -78,7 +84,7 @@ def wall_tips(
         return _cut_or_mirrored(picture, light, walls, (seen, look), rectifier, on_stage)
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
-        closed = None if settings.edge == "cut" or plate is not None else _if_closed(solid, seen)[0]
+        closed = None if promise == "cut" or plate is not None else _if_closed(solid, seen)[0]
         if closed is None:
             error.edge = "cut"
             raise
@@ -277,10 +283,13 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
         # Webs of a sheet do not end as walls do.
         (found, kind), comb = sheet, replace(comb, plate=True)
     else:
-        touched = [] if kind == "cut" else touched_cuts(material, seen.pitch_px)
+        touched = [] if kind == "cut" else touched_cuts(material, seen.pitch_px, tooth_px=tooth_px(seen))
         kind = "mixed" if touched else kind
         cut = with_cuts(material, seen, touched) if kind == "mixed" else None
         found = material if kind == "cells" else cut
+        if touched:
+            # It may be cut on all sides, and what few ends are sure lie on others than are touched.
+            kind = edge_kind(material, seen, touched)
     return None if found is None else replace(solid.around(found), comb=comb, edge=kind), kind
 
 

@@ -178,9 +178,11 @@ def _part_cells(
     if best is None:
         return None
     again = cells_of(part, best.pitch_px, bright=best.bright, least=least)
-    # Faint fine cells are seen better through a wide window.
-    same = again is None or abs(again.pitch_px - best.pitch_px) < _SAME_PITCH * best.pitch_px
-    return best if again is None or (same and again.score < best.score) else again
+    if again is None or again.score >= best.score:
+        return again or best
+    # Faint fine cells are seen better through a wide window. And of webs as wide as holes their rims alone may be left.
+    same = abs(again.pitch_px - best.pitch_px) < _SAME_PITCH * best.pitch_px
+    return best if same or (again.comb.scattered and not best.comb.scattered) else again
 
 
 def _in_senses(part: Bytes, guess: float, senses: list[bool], least: int) -> Sequence[CellScale | None]:

@@ -63,6 +63,11 @@ class Comb:
         """Whether patches are convex as cells, or lie as cells do."""
         return self.solid >= _CONVEX or self.order >= _LEAST_ORDER
 
+    @property
+    def scattered(self) -> bool:
+        """Whether patches are many, but lie nowhere as cells do."""
+        return self.count >= _FEW_CELLS and self.order < _ORDER_OF_SCATTERED
+
 
 def surely_comb(comb: Comb) -> bool:
     """Whether cells are so many, convex and orderly that they make a comb, in however many pieces it lies."""
@@ -93,7 +98,7 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
             f"{100 * _LEAST_ORDER:.0f} % are expected of cells: a print. Check that a block lies in view, and remove "
             "prints and codes"
         )
-    if comb.count >= _FEW_CELLS and comb.order < _ORDER_OF_SCATTERED:
+    if comb.scattered:
         return (
             f"{100 * comb.order:.0f} % of {comb.count} patches have neighbours all around {comb.pitch_px:.0f} px away, "
             f"at least {100 * _ORDER_OF_SCATTERED:.0f} % are expected of cells. Check that a block lies in view, and "

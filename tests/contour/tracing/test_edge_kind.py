@@ -151,3 +151,35 @@ def test_closed_cells_that_were_cut_along_a_curve_are_refused() -> None:
     with pytest.raises(EdgeContradicted, match="was cut there") as refused:
         wall_tips(np.where(away, one.picture[0, 0], one.picture), TraceSettings())
     assert refused.value.edge == "mixed"
+
+
+@pytest.mark.parametrize(
+    ("seed", "cells", "border", "kind"),
+    [
+        (1081002, "flex", "closed", "cells"),
+        (1081005, "hexagonal", "closed", "cells"),
+        (1081010, "round", "closed", "cells"),
+        (1081007, "round", "mixed", "mixed"),
+        (1081004, "round", "cut", "cut"),
+        (1081009, "triangular", "cut", "cut"),
+        (1081001, "square", "mixed", "mixed"),
+        (1084011, "triangular", "mixed", "mixed"),
+    ],
+    ids=[
+        "a row that waves",
+        "fine cells that may be round",
+        "a sheet's inner corner",
+        "holes opened by little",
+        "webs as wide as holes",
+        "rows of shallow teeth on several sides",
+        "a wall that ends short of the cut",
+        "fine triangles",
+    ],
+)
+def test_borders_that_were_once_mistaken_are_told_and_traced(
+    seed: int, cells: Cells, border: Border, kind: str
+) -> None:
+    one = lattice(seed, cells, border)
+    found = traced(one)
+    assert found.edge == kind
+    assert agreement(found.contour, one.outline).hausdorff_px < 0.25 * one.pitch_px

@@ -23,6 +23,7 @@ BORDERS: tuple[Border, ...] = ("closed", "cut", "mixed")
 
 WIDTH, HEIGHT = 900, 700
 _FINER = 3
+_MARGIN_PX = 6.0
 _ROW = np.sqrt(3.0) / 2.0
 
 Floats = NDArray[np.float32]
@@ -73,13 +74,15 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
 
 
 def _box(rng: np.random.Generator, x: Floats, y: Floats, pitch: float, *, holed: bool) -> NDArray[np.bool_]:
-    """An L or a rectangle, turned."""
+    """An L or a rectangle, turned, all of it in view with the cells that it touches."""
     angle = float(rng.uniform(0, np.pi))
     cx, cy = WIDTH / 2 + rng.uniform(-30, 30), HEIGHT / 2 + rng.uniform(-20, 20)
     u = (x - cx) * np.cos(angle) + (y - cy) * np.sin(angle)
     v = -(x - cx) * np.sin(angle) + (y - cy) * np.cos(angle)
     half = float(rng.uniform(200, 250))
     a, b = half, half * float(rng.uniform(0.6, 0.95))
+    tall = a * abs(np.sin(angle)) + b * abs(np.cos(angle))
+    a, b = np.array([a, b]) * min(1.0, (HEIGHT / 2 - abs(cy - HEIGHT / 2) - _MARGIN_PX - pitch) / tall)
     box = (np.abs(u) < a) & (np.abs(v) < b)
     if rng.random() < 0.4:
         box &= ~((u > 0.1 * a) & (v > 0.0))

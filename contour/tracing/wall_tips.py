@@ -20,6 +20,7 @@ from contour.tracing.closed_cells import MaterialEdge, material_edge
 from contour.tracing.cut_lines import touched_cuts, with_cuts
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed, tooth_px
 from contour.tracing.evidence_check import check_against_evidence
+from contour.tracing.foam import foam_edge
 from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
@@ -59,7 +60,8 @@ def wall_tips(
     if settings.edge == "cells":
         return solid.closed()
     walls = see_walls(picture, light, settings.polarity)
-    return _of_comb(solid, walls, settings.edge, rectifier)
+    foam = None if walls.cells.comb.cellular else solid.foam()
+    return foam or _of_comb(solid, walls, settings.edge, rectifier)
 
 
 def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None) -> Trace:
@@ -249,8 +251,20 @@ class _Solid:
         """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
         _ = self.walls
         self.on_stage("mask")
+        foam = None if self.cells.comb.cellular else self.foam()
+        if foam is not None:
+            return replace(foam, edge="cells")
         check_closed(self.edge.contour.exterior, self.cells.pitch_px, self.cells.wall_px)
         return self.around(self.edge)
+
+    def foam(self) -> Trace | None:
+        """The outline of a slab of foam, cut as it mostly is; None where it is none."""
+        _ = self.walls
+        try:
+            slab = foam_edge(self.light, self.edge, self.cells.pitch_px)
+        except NoBlockFound:
+            return None
+        return None if slab is None else replace(self.around(slab), edge="cut")
 
     def around(self, outline: MaterialEdge) -> Trace:
         """The trace of such an outline."""

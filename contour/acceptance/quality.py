@@ -168,9 +168,13 @@ def _tile_places(shape: tuple[int, ...], exterior: Ring, pitch_px: float) -> _Ti
     size = np.maximum(np.ceil((high - low) / step), 1).astype(int) + 1
     inside = np.zeros((size[1], size[0]), np.uint8)
     cv2.fillPoly(inside, [np.rint((exterior - low) / step).astype(np.int32)], 1)
-    rows, columns = np.nonzero(inside)
+    # Every so many rows and columns: one in so many of all, row by row, would lie along the sides.
+    hop = max(1, round(float(np.sqrt(np.count_nonzero(inside) / count))))
+    if not inside[hop // 2 :: hop, hop // 2 :: hop].any():
+        hop = 1
+    rows, columns = np.nonzero(inside[hop // 2 :: hop, hop // 2 :: hop])
     chosen = np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(int)
-    centres = low + step * np.column_stack([columns[chosen], rows[chosen]])
+    centres = low + step * (hop * np.column_stack([columns[chosen], rows[chosen]]) + hop // 2)
     left = np.clip(np.rint(centres[:, 0] - side / 2), 0, width - side).astype(int)
     top = np.clip(np.rint(centres[:, 1] - side / 2), 0, height - side).astype(int)
     return _TilePlaces(left, top, side)

@@ -80,3 +80,23 @@ def test_corners_of_fine_squares_are_no_ends_of_walls(seed: int, pitch_px: float
     small = np.asarray(cv2.resize(one.picture, None, fx=share, fy=share, interpolation=cv2.INTER_AREA), np.uint8)
     found = Measurer(None).measure(small, PlainRecipe(), 0.0)
     assert (found.reasons, found.edge) == ((), "cells")
+
+
+def test_white_walls_a_pixel_wide_in_large_cells_are_bright_enough() -> None:
+    picture = np.zeros((900, 1200), np.uint8)
+    turn = np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+    around = np.radians(30.0 + 60.0 * np.arange(6))
+    cell = 26.0 * np.stack([np.cos(around), np.sin(around)], axis=1)
+    for row in range(-18, 19):
+        for column in range(-18, 19):
+            corners = (cell + np.array([45.0 * (column + 0.5 * (row % 2)), 39.0 * row])) @ turn + np.array(
+                [600.0, 450.0]
+            )
+            cv2.polylines(picture, [np.rint(corners).astype(np.int32)], True, 255, 1)
+    block = np.zeros_like(picture)
+    block[120:781, 150:1051] = picture[120:781, 150:1051]
+    found = Measurer(None).measure(block, PlainRecipe(), 0.0)
+    assert found.reasons == ()
+    assert found.pixels is not None
+    truth = Contour(np.array([[149.5, 119.5], [149.5, 780.5], [1050.5, 780.5], [1050.5, 119.5]]))
+    assert agreement(found.pixels, truth).hausdorff_px < 1.0

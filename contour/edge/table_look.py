@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from contour.edge.table_light import table_light
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
+from contour.image.opencv import deep, within
 from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
@@ -157,18 +158,18 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     slope = _slope(small)
     whole = _drawn(seen.rings[:1], small.shape, step)
     border = _borders(small, slope, (block, whole), samples)
-    room = np.asarray(cv2.distanceTransform(1 - border, cv2.DIST_L2, 3), np.float32)
     inside = cv2.erode(block, np.ones((3, 3), np.uint8)) > 0
-    reach = np.where(inside, _CELL_ROOM * samples - _RIM, _GAP * samples)
-    _, numbered = cv2.connectedComponents((room > reach).astype(np.uint8), connectivity=4)
+    reach = _CELL_ROOM * samples - _RIM, _GAP * samples
+    roomy = deep(1 - border, reach[0])
+    _, numbered = cv2.connectedComponents(np.where(inside, roomy, deep(1 - border, reach[1])), connectivity=4)
     parts = np.asarray(numbered, np.int32)
     area = np.bincount(parts[block == 0], minlength=int(parts.max()) + 1)
     area[:1] = 0
     light = table_light(small, parts, area, samples)
     table_part = light.parts
-    table = _grown(table_part, reach)
+    table = _grown(table_part, inside, reach)
     # Small flat parts outside lie between walls that stick out, and between specks.
-    flat = _grown(_wide((parts > 0) & ~table_part, room, _CELL_ROOM * samples - _RIM), reach)
+    flat = _grown(_wide((parts > 0) & ~table_part, roomy > 0), inside, reach)
     busy = _busy(slope, block, samples)
     quiet = (busy < _QUIET) & ~table
     loose = None if seen.loose is None else _loose(seen.loose, (whole == 0) & light.alike, samples)
@@ -251,11 +252,10 @@ def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
 
 def _opened(part: Bools, radius: float) -> Bools:
     """The part without what is too narrow for a disc of this radius."""
-    room = cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 3)
-    core = (room > radius).astype(np.uint8)
+    core = deep(part, radius)
     if not core.any():
         return np.zeros(part.shape, np.bool_)
-    return np.asarray(part & (cv2.distanceTransform(1 - core, cv2.DIST_L2, 3) <= radius + 1), np.bool_)
+    return np.asarray(part & (within(core, radius + 1) > 0), np.bool_)
 
 
 def _borders(small: Bytes, slope: NDArray[np.int16], block: tuple[Bytes, Bytes], samples: float) -> Bytes:
@@ -287,16 +287,16 @@ def _long(part: Bools, least: float) -> Bools:
     return np.asarray(long[pieces], np.bool_)
 
 
-def _wide(flat: Bools, room: Float32s, radius: float) -> Bools:
-    """The parts of `flat` in which a disc of this radius has room."""
+def _wide(flat: Bools, roomy: Bools) -> Bools:
+    """The parts of `flat` that have such room somewhere."""
     count, parts = cv2.connectedComponents(flat.astype(np.uint8), connectivity=4)
     wide = np.zeros(count, np.bool_)
-    wide[parts[room > radius]] = True
+    wide[parts[roomy & flat]] = True
     wide[0] = False
     return np.asarray(wide[parts], np.bool_)
 
 
-def _grown(part: Bools, reach: Float64s) -> Bools:
-    """A part that was seen through gaps of a border, up to that border."""
-    away = cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 3)
-    return np.asarray((away <= reach + _RIM), np.bool_)
+def _grown(part: Bools, inside: Bools, reach: tuple[float, float]) -> Bools:
+    """A part that was seen through gaps of a border, so wide inside of the block and beside it, up to that border."""
+    within_block, beside_it = (within(part, one + _RIM) > 0 for one in reach)
+    return np.where(inside, within_block, beside_it)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple, TypeVar, cast
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, Int64s
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, Int64s
 
 Anything = TypeVar("Anything", Bytes, NDArray[np.uint16], Float32s)
+
+_LARGEST_DISC = 9.0
+"""Pixels: larger discs take longer than distances."""
 
 _LENS_STEPS = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 """undistortPoints stops after 5 steps by itself, which leaves tenths of a pixel in the corners of wide lenses."""
@@ -170,13 +174,36 @@ def region_boxes_and_areas(mask: Bytes) -> tuple[Int32s, Int32s]:
     return table[:, :4], table[:, cv2.CC_STAT_AREA]
 
 
+def within(mask: Bytes | Bools, radius: float, neighbours: int = 3) -> Bytes:
+    """1 where a one of a mask of 0 and 1, (H, W), lies within the radius, pixels; nothing lies beyond its border.
+
+    By the distances of cv2.distanceTransform over 3 or 5 `neighbours`: dilating with what these call a disc is the same
+    to the pixel, in a sixth of the time.
+    """
+    part = mask.view(np.uint8)
+    if radius > _LARGEST_DISC:
+        return (cv2.distanceTransform(1 - part, cv2.DIST_L2, neighbours) <= radius).astype(np.uint8)
+    return np.asarray(cv2.dilate(part, _disc(radius, neighbours)), np.uint8)
+
+
+def deep(mask: Bytes | Bools, radius: float, neighbours: int = 3) -> Bytes:
+    """1 where all zeros of a mask of 0 and 1, (H, W), lie farther than the radius; as `within`."""
+    return np.asarray(1 - within(1 - mask.view(np.uint8), radius, neighbours), np.uint8)
+
+
+@lru_cache(64)
+def _disc(radius: float, neighbours: int) -> Bytes:
+    point = np.ones((2 * int(radius) + 3,) * 2, np.uint8)
+    point[int(radius) + 1, int(radius) + 1] = 0
+    return (cv2.distanceTransform(point, cv2.DIST_L2, neighbours) <= radius).astype(np.uint8)
+
+
 def closed_by_disc(mask: Bytes, radius: float) -> Bytes:
-    """A mask of 0 and 1, (H, W), closed with a disc, by two distance transforms; nothing lies beyond its border."""
+    """A mask of 0 and 1, (H, W), closed with a disc; nothing lies beyond its border."""
     pad = int(radius) + 2
     wide = cv2.copyMakeBorder(mask, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
-    grown = (cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5) <= radius).astype(np.uint8)
-    shrunk = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > radius).astype(np.uint8)
-    return np.asarray(shrunk[pad:-pad, pad:-pad] | mask, np.uint8)
+    closed = deep(within(wide, radius, 5), radius, 5)
+    return np.asarray(closed[pad:-pad, pad:-pad] | mask, np.uint8)
 
 
 def fewer_vertices(ring: Float64s, off: float) -> Float64s:

@@ -7,7 +7,8 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes
+from contour.geometry.arrays import Bytes
+from contour.image.opencv import within
 from contour.image.pixel_grid import averaged, enlarged
 
 _SAMPLES_PER_PITCH = 6.5
@@ -38,13 +39,13 @@ def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -
     strand[0] = False
     if not strand.any():
         return mask
-    near = _within(main, _REACH_PITCHES * samples)
+    near = within(main, _REACH_PITCHES * samples) > 0
     strand &= np.bincount(labels[near], minlength=count) > 0
     if not strand.any():
         return mask
     strands = strand[labels]
     weak = faint()
-    links = near & _within(strands, _REACH_PITCHES * samples) & (_coarse(weak, step) > 0) & (walls == 0)
+    links = near & (within(strands, _REACH_PITCHES * samples) > 0) & (_coarse(weak, step) > 0) & (walls == 0)
     _, joined = cv2.connectedComponents((main | strands | links).astype(np.uint8), connectivity=8)
     count, parts = cv2.connectedComponents((strands | links).astype(np.uint8), connectivity=8)
     leads = np.bincount(parts[strands], minlength=count) > 0
@@ -55,8 +56,3 @@ def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -
 def _coarse(mask: Bytes, step: int) -> Bytes:
     """1 where an eighth of a square of `step` pixels is wall, the last squares filled up."""
     return (averaged(mask, step) > 255 * _COVERAGE).astype(np.uint8)
-
-
-def _within(places: Bools, radius: float) -> Bools:
-    """Where a sample of `places` lies within `radius` samples."""
-    return np.asarray(cv2.distanceTransform((~places).astype(np.uint8), cv2.DIST_L2, 3) <= radius, np.bool_)

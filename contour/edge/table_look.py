@@ -161,7 +161,8 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     inside = cv2.erode(block, np.ones((3, 3), np.uint8)) > 0
     reach = _CELL_ROOM * samples - _RIM, _GAP * samples
     roomy = deep(1 - border, reach[0])
-    _, numbered = cv2.connectedComponents(np.where(inside, roomy, deep(1 - border, reach[1])), connectivity=4)
+    room = (roomy & inside) | (deep(1 - border, reach[1]) & ~inside)
+    _, numbered = cv2.connectedComponents(room, connectivity=4)
     parts = np.asarray(numbered, np.int32)
     area = np.bincount(parts[block == 0], minlength=int(parts.max()) + 1)
     area[:1] = 0
@@ -215,7 +216,7 @@ def _mostly(part: Bools, kind: Bools) -> Bools:
     size = np.maximum(np.bincount(pieces.ravel(), minlength=count), 1)
     kept = np.bincount(pieces[kind], minlength=count) > _GOOD_SHARE * size
     kept[0] = False
-    return np.asarray(kept[pieces], np.bool_)
+    return kept.take(pieces)
 
 
 def _away(foreign: Bools, step: int) -> Float32s:
@@ -245,16 +246,16 @@ def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
     if not len(comb):
         return np.ones(slope.shape, np.float32)
     size = 2 * round(0.5 * samples) + 1
-    busy = cv2.blur(np.minimum(slope, quantile(comb, 0.9)).astype(np.float32), (size, size))
+    busy = cv2.blur(np.minimum(slope.astype(np.float32), quantile(comb, 0.9)), (size, size))
     usual = median(busy[::2, ::2][block[::2, ::2] > 0])
     return np.asarray(busy / max(usual, 1e-3), np.float32)
 
 
 def _opened(part: Bools, radius: float) -> Bools:
     """The part without what is too narrow for a disc of this radius."""
-    core = deep(part, radius)
+    core = deep(part, radius) if part.any() else np.zeros(part.shape, np.uint8)
     if not core.any():
-        return np.zeros(part.shape, np.bool_)
+        return core > 0
     return np.asarray(part & (within(core, radius + 1) > 0), np.bool_)
 
 
@@ -267,14 +268,14 @@ def _borders(small: Bytes, slope: NDArray[np.int16], block: tuple[Bytes, Bytes],
     if len(walls):
         level = min(level, _OF_WALLS * median(walls))
     # Glare and half shadows have borders as steep, but wide ones.
-    beside = np.where(material == 0, slope, np.int16(0))
+    beside = slope * (material == 0)
     wide = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((_SOFT, _SOFT), np.uint8))
     light = small if small.ndim == 2 else small.max(axis=2)
     table = light[::2, ::2][material[::2, ::2] == 0]
     lit = light > median(table) if len(table) else np.zeros(light.shape, np.bool_)
     # Dark things on a table have soft sides, too.
     soft = (whole > material) | (lit & (wide > _SOFT_SHARE * level)) | (wide > level)
-    return _long(np.where(soft, slope - wide, slope) > level, _SPECK_PITCHES * samples).astype(np.uint8)
+    return _long(slope - wide * soft > level, _SPECK_PITCHES * samples).astype(np.uint8)
 
 
 def _long(part: Bools, least: float) -> Bools:
@@ -284,7 +285,7 @@ def _long(part: Bools, least: float) -> Bools:
     _, pieces, stats, _ = cv2.connectedComponentsWithStats(part.astype(np.uint8), connectivity=8)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > least
     long[0] = False
-    return np.asarray(long[pieces], np.bool_)
+    return long.take(pieces)
 
 
 def _wide(flat: Bools, roomy: Bools) -> Bools:
@@ -293,10 +294,10 @@ def _wide(flat: Bools, roomy: Bools) -> Bools:
     wide = np.zeros(count, np.bool_)
     wide[parts[roomy & flat]] = True
     wide[0] = False
-    return np.asarray(wide[parts], np.bool_)
+    return wide.take(parts)
 
 
 def _grown(part: Bools, inside: Bools, reach: tuple[float, float]) -> Bools:
     """A part that was seen through gaps of a border, so wide inside of the block and beside it, up to that border."""
     within_block, beside_it = (within(part, one + _RIM) > 0 for one in reach)
-    return np.where(inside, within_block, beside_it)
+    return (within_block & inside) | (beside_it & ~inside)

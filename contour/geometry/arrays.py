@@ -39,7 +39,9 @@ def _parted(values: NDArray[Any], place: int, axis: int = 0) -> tuple[NDArray[An
     """The values that come before a place along an axis where they rise along it, in any order, and the one there."""
     # Parted at one place, as numpy does with vectors for all but bytes: at two of them it takes ten times as long.
     wide = values.astype(np.int16) if values.dtype == np.uint8 else values
-    ordered = np.moveaxis(np.partition(wide, place, axis=axis), axis, 0)
+    ordered = np.partition(wide, place, axis=axis)
+    if axis:
+        ordered = ordered.transpose(axis, *(other for other in range(values.ndim) if other != axis))
     return ordered[:place], ordered[place].astype(np.float64)
 
 

@@ -164,7 +164,17 @@ def pieces_and_areas(mask: Bytes, connectivity: int) -> tuple[Int32s, Int64s]:
     """
     count, labels = cv2.connectedComponents(mask, connectivity=connectivity)
     pieces = np.asarray(labels, np.int32)
+    if count == 2:
+        return pieces, np.array([0, cv2.countNonZero(mask)])
     return pieces, np.bincount(pieces[mask > 0], minlength=count)
+
+
+def median_where(picture: Bytes, where: Bytes | Bools) -> float:
+    """The median of the pixels, (H, W), where a mask is not 0, at one of them at least: told from their counts."""
+    counts = cv2.calcHist([picture], [0], where.view(np.uint8), [256], [0, 256])
+    reached = np.cumsum(np.asarray(counts, np.int64).ravel())
+    middle = np.searchsorted(reached, [(reached[-1] - 1) // 2, reached[-1] // 2], side="right")
+    return 0.5 * float(middle.sum())
 
 
 def region_boxes_and_areas(mask: Bytes) -> tuple[Int32s, Int32s]:

@@ -148,9 +148,11 @@ def with_rings(filled: Bytes, walls: Bytes, strands: Bytes, step: int, samples: 
     index_of_label[labels[joined[:, 1], joined[:, 0]]] = np.arange(len(joined))
     inside = cv2.distanceTransform(filled, cv2.DIST_L2, 5)
     outside = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
-    depth = np.where(filled > 0, inside - 0.5, 0.5 - outside).astype(np.float32) * step
-    nearest = index_of_label[labels]
-    return CoarseBlock(tuple(rings), filled, walls, strands, depth.astype(np.float32), nearest, step, leaves)
+    depth = np.asarray(inside, np.float32) - np.asarray(outside, np.float32)
+    depth += np.float32(0.5) - filled
+    depth *= step
+    nearest = index_of_label.take(labels)
+    return CoarseBlock(tuple(rings), filled, walls, strands, depth, nearest, step, leaves)
 
 
 def _ring(chain: Int32s, is_hole: bool, step: int, samples: float) -> CoarseRing:

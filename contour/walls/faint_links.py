@@ -43,13 +43,13 @@ def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -
     strand &= np.bincount(labels[near], minlength=count) > 0
     if not strand.any():
         return mask
-    strands = strand[labels]
+    strands = strand.take(labels)
     weak = faint()
     links = near & (within(strands, _REACH_PITCHES * samples) > 0) & (_coarse(weak, step) > 0) & (walls == 0)
     _, joined = cv2.connectedComponents((main | strands | links).astype(np.uint8), connectivity=8)
     count, parts = cv2.connectedComponents((strands | links).astype(np.uint8), connectivity=8)
     leads = np.bincount(parts[strands], minlength=count) > 0
-    links &= (joined == joined[main][0]) & leads[parts]
+    links &= (joined == joined[main][0]) & leads.take(parts)
     return np.asarray(np.where(enlarged(links, step, mask.shape), mask | weak, mask), np.uint8)
 
 

@@ -29,6 +29,7 @@ _LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
 _LEAST_CELL = 0.2
 # A shaving is as long as several walls: of the block's own walls fewer may stand alone, between two that do not show.
 _SHAVING_PITCHES = 1.5
+_SAMPLED = 8
 _HEXAGON = 2 / np.sqrt(3)
 
 
@@ -113,9 +114,13 @@ def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes
     the block to them, as one does to every wall of its own.
     """
     count, labels = cv2.connectedComponents(mask, connectivity=8)
-    places = np.flatnonzero(mask > 0)
-    piece = np.asarray(labels, np.int32).ravel()[places]
+    # Nearly all walls are of one piece: only the pixels of the others are gathered.
+    seen = np.bincount(labels[::_SAMPLED, ::_SAMPLED].ravel(), minlength=count)
+    main = 1 + int(seen[1:].argmax()) if count > 1 else 0
+    places = np.flatnonzero(cv2.bitwise_and(mask, (labels != main).view(np.uint8)).view(np.bool_))
+    piece = np.asarray(labels, np.int32).ravel().take(places)
     area = np.bincount(piece, minlength=count)
+    area[main] = cv2.countNonZero(mask) - len(places)
     if area.max() <= _MOST_WALLS * area.sum():
         return mask
     small = (area > _LEAST_WALL * pitch_px) & (area < _LOOSE_SHARE * area.max())
@@ -131,7 +136,7 @@ def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes
     long = small & ~loose & (np.hypot(*(boxes[2:] - boxes[:2])) > _SHAVING_PITCHES * pitch_px)
     if faint is not None and long.any():
         loose |= long & ~_hang_together(np.asarray(labels, np.int32), int(area.argmax()), mask | faint())
-    return np.where(loose[labels], np.uint8(0), mask) if loose.any() else mask
+    return (~loose).astype(np.uint8).take(labels) * mask if loose.any() else mask
 
 
 def _hang_together(labels: Int32s, main: int, walls: Bytes) -> Bools:

@@ -18,7 +18,7 @@ import numpy as np
 from contour.acceptance.block_level import exclusive_levels, table_activity
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median, quantile
 from contour.geometry.rings import Contour, Ring, signed_area
-from contour.image.opencv import fewer_vertices, pieces_and_areas
+from contour.image.opencv import fewer_vertices, pieces_and_areas, pieces_of
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
 _PITCH_PX = 6
@@ -192,7 +192,7 @@ def _fixed_point(ring: Ring) -> Int32s:
 
 def _touched(mask: Bytes, ours: Bytes) -> Bytes:
     """The parts of `mask` that meet `ours`."""
-    count, labels = cv2.connectedComponents(mask, connectivity=4)
+    count, labels = pieces_of(mask, 4)
     meets = np.bincount(labels[ours > 0], minlength=count) > 0
     meets[0] = False
     return meets.astype(np.uint8).take(labels) * np.uint8(255)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from contour.edge.table_light import table_light
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
-from contour.image.opencv import deep, within
+from contour.image.opencv import deep, pieces_and_boxes, pieces_of, within
 from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
@@ -162,8 +162,7 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     reach = _CELL_ROOM * samples - _RIM, _GAP * samples
     roomy = deep(1 - border, reach[0])
     room = (roomy & inside) | (deep(1 - border, reach[1]) & ~inside)
-    _, numbered = cv2.connectedComponents(room, connectivity=4)
-    parts = np.asarray(numbered, np.int32)
+    _, parts = pieces_of(room, 4)
     area = np.bincount(parts[block == 0], minlength=int(parts.max()) + 1)
     area[:1] = 0
     light = table_light(small, parts, area, samples)
@@ -212,7 +211,7 @@ def _loose(walls: Bytes, alike: Bools, samples: float) -> Bools | None:
 
 def _mostly(part: Bools, kind: Bools) -> Bools:
     """The pieces of a part that are of that kind to a good share."""
-    count, pieces = cv2.connectedComponents(part.astype(np.uint8), connectivity=8)
+    count, pieces = pieces_of(part, 8)
     size = np.maximum(np.bincount(pieces.ravel(), minlength=count), 1)
     kept = np.bincount(pieces[kind], minlength=count) > _GOOD_SHARE * size
     kept[0] = False
@@ -282,7 +281,7 @@ def _long(part: Bools, least: float) -> Bools:
     """The pieces of a part that are longer than that, samples."""
     if not part.any():
         return part
-    _, pieces, stats, _ = cv2.connectedComponentsWithStats(part.astype(np.uint8), connectivity=8)
+    pieces, stats = pieces_and_boxes(part.astype(np.uint8), 8)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > least
     long[0] = False
     return long.take(pieces)
@@ -290,7 +289,7 @@ def _long(part: Bools, least: float) -> Bools:
 
 def _wide(flat: Bools, roomy: Bools) -> Bools:
     """The parts of `flat` that have such room somewhere."""
-    count, parts = cv2.connectedComponents(flat.astype(np.uint8), connectivity=4)
+    count, parts = pieces_of(flat, 4)
     wide = np.zeros(count, np.bool_)
     wide[parts[roomy & flat]] = True
     wide[0] = False

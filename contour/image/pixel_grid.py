@@ -46,7 +46,7 @@ def averaged(picture: Bytes, step: int, border: int = cv2.BORDER_CONSTANT) -> By
 def _filled_averaged(part: Bytes, step: int, border: int) -> Bytes:
     wide, high = -part.shape[1] % step, -part.shape[0] % step
     even = cv2.copyMakeBorder(part, 0, high, 0, wide, border, value=0) if wide or high else part
-    return _averaged(even, step)
+    return _averaged(np.asarray(even, np.uint8), step)
 
 
 def whole_averaged(picture: Bytes, step: int) -> Bytes:
@@ -67,4 +67,5 @@ def _averaged(even: Bytes, step: int) -> Bytes:
 
 def enlarged(grid: Values, step: int, shape: tuple[int, ...]) -> Values:
     """The grid's value at each pixel of a picture of `shape` (H, W)."""
-    return np.repeat(np.repeat(grid, step, axis=0), step, axis=1)[: shape[0], : shape[1]]
+    # Columns first: rows are then copied whole.
+    return np.repeat(np.repeat(grid, step, axis=1), step, axis=0)[: shape[0], : shape[1]]

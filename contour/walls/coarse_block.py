@@ -7,7 +7,15 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Int32s
-from contour.image.opencv import closed_by_disc, deep, median_where, pieces_and_areas, within
+from contour.image.opencv import (
+    closed_by_disc,
+    deep,
+    median_where,
+    pieces_and_areas,
+    pieces_and_boxes,
+    pieces_of,
+    within,
+)
 from contour.image.pixel_grid import averaged
 from contour.walls.coarse_rings import PAD, CoarseBlock, sides, walls_at_frame, with_rings
 
@@ -50,8 +58,7 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = _padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch_px / step
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
-    pieces = np.asarray(labels, np.int32), np.asarray(stats, np.int32)
+    pieces = pieces_and_boxes(walls, 8)
     kept = _main_piece(pieces, samples)
     filled, kept = _linked(pieces, kept, closed_by_disc(kept, _CLOSING_PITCHES * samples), samples)
     filled = without_threads(_largest(filled | kept), samples)
@@ -91,7 +98,7 @@ def _main_piece(pieces: Pieces, samples: float) -> Bytes:
     beside = labels[cv2.dilate(main.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0]
     touching = np.bincount(beside, minlength=len(area)) >= _CONTACTS
     kept = large & touching
-    return (main | kept.take(labels)).astype(np.uint8)
+    return np.asarray(main | kept.take(labels), np.uint8)
 
 
 def _linked(pieces: Pieces, kept: Bytes, filled: Bytes, samples: float) -> tuple[Bytes, Bytes]:
@@ -107,7 +114,7 @@ def _linked(pieces: Pieces, kept: Bytes, filled: Bytes, samples: float) -> tuple
     small = (size > _SPECK_PITCHES * samples) & (size < _FRAGMENT_PITCHES * samples)
     small[0] = False
     strand = kept | small.take(labels).astype(np.uint8)
-    count, parts = cv2.connectedComponents(deep(1 - strand, reach, 5), connectivity=4)
+    count, parts = pieces_of(deep(1 - strand, reach, 5), 4)
     # Cells are such parts too; only wide ones can be holes.
     wide = np.zeros(count, np.bool_)
     wide[parts[deep(1 - strand, _HOLE_RADIUS_PITCHES * samples, 5) > 0]] = True
@@ -147,7 +154,7 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, shade: Bytes, radius: float
 
     Looked into at a slant, black cells show nothing but wall: no mask of walls against cells, and no hole either.
     """
-    count, labels = cv2.connectedComponents(1 - filled, connectivity=4)
+    count, labels = pieces_of(1 - filled, 4)
     opening = np.zeros(count, np.bool_)
     opening[labels[deep(1 - filled, radius, 5) > 0]] = True
     outside = labels[0, 0]
@@ -166,7 +173,7 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, shade: Bytes, radius: float
 
 def _strands(walls: Bytes, samples: float) -> Bytes:
     """Those of the walls that are as long as a cell's wall and more, no specks."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    labels, stats = pieces_and_boxes(walls, 8)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > _STRAND_PITCHES * samples
     long[0] = False
     return long.astype(np.uint8).take(labels)
@@ -181,7 +188,7 @@ def without_threads(filled: Bytes, samples: float) -> Bytes:
     size = 2 * round(0.5 * _THIN_PITCHES * samples) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     wide = np.asarray(cv2.morphologyEx(filled, cv2.MORPH_OPEN, disc), np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(filled & ~wide, connectivity=8)
+    labels, stats = pieces_and_boxes(filled & ~wide, 8)
     length = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
     long = length > _OUT_PITCHES * samples
     long[0] = False

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bytes
-from contour.image.opencv import within
+from contour.image.opencv import pieces_and_boxes, within
 from contour.image.pixel_grid import averaged, enlarged
 
 _SAMPLES_PER_PITCH = 6.5
@@ -29,13 +29,14 @@ def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -
     step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
     samples = pitch_px / step
     walls = _coarse(mask, step)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    labels, stats = pieces_and_boxes(walls, 8)
+    count = len(stats)
     if count < 3:
         return mask
     main = labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
     size = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
     strand = (size > _STRAND_PITCHES[0] * samples) & (size < _STRAND_PITCHES[1] * samples)
-    strand[labels[main][0]] = False
+    strand[1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))] = False
     strand[0] = False
     if not strand.any():
         return mask

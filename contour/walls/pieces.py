@@ -10,7 +10,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Int32s, Int64s
 from contour.geometry.rings import Ring
-from contour.image.opencv import closed_by_disc
+from contour.image.opencv import closed_by_disc, pieces_and_boxes, pieces_and_lesser
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
 _SAMPLES_PER_PITCH = 6.5
@@ -29,7 +29,6 @@ _LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
 _LEAST_CELL = 0.2
 # A shaving is as long as several walls: of the block's own walls fewer may stand alone, between two that do not show.
 _SHAVING_PITCHES = 1.5
-_SAMPLED = 8
 _HEXAGON = 2 / np.sqrt(3)
 
 
@@ -77,7 +76,7 @@ def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) 
     outline = np.rint(samples_of(exterior, step)).astype(np.int32)
     cv2.fillPoly(walls, [outline], 0)
     cv2.polylines(walls, [outline], True, 0, max(1, round(2 * _MARGIN_PITCHES * samples)))
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    labels, stats = pieces_and_boxes(walls, 8)
     wide = np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _LEAST_SIZE_PITCHES * samples
     wide[0] = False
     found = []
@@ -113,14 +112,8 @@ def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes
     `faint` makes the mask by a lower threshold: shavings without cells, too, are loose where no faint wall leads from
     the block to them, as one does to every wall of its own.
     """
-    count, labels = cv2.connectedComponents(mask, connectivity=8)
-    # Nearly all walls are of one piece: only the pixels of the others are gathered.
-    seen = np.bincount(labels[::_SAMPLED, ::_SAMPLED].ravel(), minlength=count)
-    main = 1 + int(seen[1:].argmax()) if count > 1 else 0
-    places = np.flatnonzero(cv2.bitwise_and(mask, (labels != main).view(np.uint8)).view(np.bool_))
-    piece = np.asarray(labels, np.int32).ravel().take(places)
-    area = np.bincount(piece, minlength=count)
-    area[main] = cv2.countNonZero(mask) - len(places)
+    labels, area, places = pieces_and_lesser(mask, 8)
+    count, piece = len(area), labels.ravel().take(places)
     if area.max() <= _MOST_WALLS * area.sum():
         return mask
     small = (area > _LEAST_WALL * pitch_px) & (area < _LOOSE_SHARE * area.max())
@@ -135,7 +128,7 @@ def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes
         loose[number] = sum(cv2.contourArea(hole) > _LEAST_CELL * pitch_px**2 for hole in holes) >= _LOOSE_CELLS
     long = small & ~loose & (np.hypot(*(boxes[2:] - boxes[:2])) > _SHAVING_PITCHES * pitch_px)
     if faint is not None and long.any():
-        loose |= long & ~_hang_together(np.asarray(labels, np.int32), int(area.argmax()), mask | faint())
+        loose |= long & ~_hang_together(labels, int(area.argmax()), mask | faint())
     return (~loose).astype(np.uint8).take(labels) * mask if loose.any() else mask
 
 

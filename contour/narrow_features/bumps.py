@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.arrays import Float64s, Indices, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.narrow_features.feature import DEPTH, WIDTH, NarrowFeature
@@ -40,7 +40,7 @@ class _Beside:
     @classmethod
     def of(cls, places: Float64s, way: int, half: int) -> _Beside:
         """Before (-1) or after (1) each place, halves of so many places."""
-        one, two = (np.roll(places, -way * reach, axis=0) for reach in (half, 2 * half))
+        one, two = (rolled(places, -way * reach) for reach in (half, 2 * half))
         return cls(_unit(way * (one - places)), _unit(way * (two - one)), (one + two) / 2)
 
     def take(self, chosen: Indices) -> _Beside:

@@ -14,7 +14,7 @@ from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, Int32s, med
 from contour.image.opencv import pieces_and_areas
 from contour.image.side_by_side import side_by_side
 from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
-from contour.walls.wall_mask import FINE_PITCH, wall_mask
+from contour.walls.wall_mask import FINE_PITCH, Smooth, wall_mask
 
 _TILE_PX = 512
 _TILES = 4
@@ -186,15 +186,18 @@ def _part_cells(
 def _in_senses(part: Bytes, guess: float, senses: list[bool], least: int) -> Sequence[CellScale | None]:
     if len(senses) == 1:
         return [cells_of(part, guess, bright=senses[0], least=least)]
+    smooth = Smooth.of(part, guess)
     return side_by_side(
-        lambda: cells_of(part, guess, bright=True, least=least),
-        lambda: cells_of(part, guess, bright=False, least=least),
+        lambda: cells_of(part, guess, bright=True, least=least, smooth=smooth),
+        lambda: cells_of(part, guess, bright=False, least=least, smooth=smooth),
     )
 
 
-def cells_of(light: Bytes, pitch_px: float, *, bright: bool, least: int = _LEAST_CELL) -> CellScale | None:
+def cells_of(
+    light: Bytes, pitch_px: float, *, bright: bool, least: int = _LEAST_CELL, smooth: Smooth | None = None
+) -> CellScale | None:
     """Cells of `least` pixels enclosed by the wall mask of `light` made for `pitch_px`; None where fewer than six."""
-    seen = wall_mask(light, pitch_px, bright=bright)
+    seen = wall_mask(light, pitch_px, bright=bright, smooth=smooth)
     mask = seen.mask
     floor = cv2.bitwise_not(mask)
     _, labels, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)

@@ -66,6 +66,23 @@ class WallMask:
         return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """A lightly blurred picture, filled up to a whole number of samples both ways, its units a grey level, and its
+    noise in these: what masks of bright and of dark walls have in common.
+    """
+
+    levels: Levels
+    unit: int
+    noise: float
+
+    @classmethod
+    def of(cls, light: Bytes, pitch_px: float, contrast: float = 0.0) -> Smooth:
+        """As `wall_mask` takes it."""
+        levels, unit = _smoothed(light, _step(pitch_px), contrast)
+        return cls(levels, unit, _noise_level(levels, pitch_px, unit))
+
+
 def wall_mask(
     light: Bytes,
     pitch_px: float,
@@ -74,6 +91,7 @@ def wall_mask(
     contrast: float = 0.0,
     wall: float = 0.0,
     least: float = _REGION_RISE,
+    smooth: Smooth | None = None,
 ) -> WallMask:
     """Walls of `light` (H, W) where cells are about `pitch_px` apart and walls are brighter (or darker) than cells.
 
@@ -84,17 +102,17 @@ def wall_mask(
     of walls is known, `wall` in pixels, what is both wider and fainter than they is none: a table's light between its
     holes, or between a groove and the block. `least`: the share of the region's walls that a wall rises by at least.
     """
-    step = max(1, int(pitch_px / _MAP_SAMPLES))
-    smooth, unit = _smoothed(light, step, contrast)
+    step = _step(pitch_px)
+    seen = smooth or Smooth.of(light, pitch_px, contrast)
+    levels, unit, noise = seen.levels, seen.unit, seen.noise
     sign = 1 if bright else -1
-    beside = _beside(_shrunk(smooth, step), pitch_px / step, closed=not bright)
+    beside = _beside(_shrunk(levels, step), pitch_px / step, closed=not bright)
     beside *= sign
     # Every step-th pixel, not their average: an average would take the walls' contrast away.
-    height = smooth[step // 2 :: step, step // 2 :: step].astype(np.float32)
+    height = levels[step // 2 :: step, step // 2 :: step].astype(np.float32)
     height *= sign
     height -= beside
     np.maximum(height, 0.0, out=height)
-    noise = _noise_level(smooth, pitch_px, unit)
     walls, region, typical = _heights(height, beside, pitch_px / step)
     share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch_px) / 8, 0, 1))
     rise = share * walls
@@ -104,7 +122,7 @@ def wall_mask(
     size = _odd(_WIDE_WALLS * wall + _HALO_PX)
     wide: Float32s | float = 0.0
     if wall and size < _BESIDE_PITCHES * pitch_px:
-        broad = _shrunk(_opened(smooth, size, closed=not bright), step).astype(np.float32)
+        broad = _shrunk(_opened(levels, size, closed=not bright), step).astype(np.float32)
         broad *= sign
         broad -= beside
         wide = np.minimum(broad, _TALL * region, out=broad)
@@ -115,9 +133,13 @@ def wall_mask(
         np.maximum(level, part * rise, out=level)
         level += beside
         level *= sign
-        return _beyond(smooth, level, unit, light.shape, bright=bright)
+        return _beyond(levels, level, unit, light.shape, bright=bright)
 
     return WallMask(standing_out(1.0), noise / unit, _typical(typical) / unit, lambda: standing_out(_FAINT))
+
+
+def _step(pitch_px: float) -> int:
+    return max(1, int(pitch_px / _MAP_SAMPLES))
 
 
 def _beyond(smooth: Levels, level: Float32s, unit: int, shape: tuple[int, ...], *, bright: bool) -> Bytes:

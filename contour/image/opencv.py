@@ -207,14 +207,14 @@ def pieces_and_boxes(mask: Bytes, connectivity: int) -> tuple[Int32s, Int32s]:
 
 
 def _pieces(mask: Bytes, connectivity: int) -> tuple[int, Int32s, int, Indices]:
-    """How many white pieces a mask has, black counted as one, each pixel's, (H, W), the one that most of it seems to
-    be, and the places of all others, (M,), in the flat mask.
+    """How many white pieces a mask of 0 and 1, or 255, has, black counted as one, each pixel's, (H, W), the one that
+    most of it seems to be, and the places of all others, (M,), in the flat mask.
     """
     count, pieces = pieces_of(mask, connectivity)
     seen = np.bincount(pieces[::_SAMPLED, ::_SAMPLED].ravel(), minlength=count)
     main = 1 + int(seen[1:].argmax()) if count > 1 else 0
-    others = (mask > 0) & (pieces != main)
-    return count, pieces, main, np.flatnonzero(others)
+    others = cv2.bitwise_and(mask, (pieces != main).view(np.uint8))  # 1 where it is 1 or 255
+    return count, pieces, main, np.flatnonzero(others.view(np.bool_))
 
 
 def median_where(picture: Bytes, where: Bytes | Bools) -> float:

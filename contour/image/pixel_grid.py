@@ -12,10 +12,17 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float64s, Int64s
 
+_SAMPLES_PER_PITCH = 6.5
+"""They hold a wall's place and make every later pass cheap."""
 _BLURRED = (3, 5)
 """Means over so many pixels are had from those about all of them in half the time, and of odd numbers round alike."""
 
 Values = TypeVar("Values", Bytes, Bools)
+
+
+def coarse_step(pitch_px: float) -> int:
+    """Pixels of a sample of the grids that a block is looked for on; whole ones: averaging is several times faster."""
+    return max(1, round(pitch_px / _SAMPLES_PER_PITCH))
 
 
 def pixels_of(samples: Float64s | Int64s, step: int) -> Float64s:

@@ -16,11 +16,9 @@ from contour.image.opencv import (
     pieces_of,
     within,
 )
-from contour.image.pixel_grid import averaged
+from contour.image.pixel_grid import averaged, coarse_step
 from contour.walls.coarse_rings import PAD, CoarseBlock, sides, walls_at_frame, with_rings
 
-# About six and a half samples a pitch hold a wall's place and make every later pass cheap.
-_SAMPLES_PER_PITCH = 6.5
 # A disc of 0.72 pitch bridges an open cell (1.15 pitches across its corners) and a wall broken out of it.
 _CLOSING_PITCHES = 0.72
 # A gap in a ring of single cells around an opening, up to a cell wide, is a missing wall and no way out.
@@ -47,14 +45,13 @@ Pieces = tuple[Int32s, Int32s]
 """The number of the piece of walls each sample lies in, (H, W), 0 in none, and OpenCV's statistics of each."""
 
 
-def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
+def coarse_block(mask: Bytes, light: Bytes, pitch_px: float, small: Bytes | None = None) -> CoarseBlock:
     """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch_px` pixels wide.
 
-    Raises NoBlockFound.
+    `small`: the mask's `averaged` by samples of `coarse_step`, where it is known. Raises NoBlockFound.
     """
-    # A whole number of pixels a sample: averaging is several times faster so.
-    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
-    small = averaged(mask, step)
+    step = coarse_step(pitch_px)
+    small = averaged(mask, step) if small is None else small
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = _padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch_px / step
@@ -63,8 +60,7 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
     filled, kept = _linked(pieces, kept, closed_by_disc(kept, _CLOSING_PITCHES * samples), samples)
     filled = without_threads(_largest(filled | kept), samples)
     kept &= filled
-    shade = _padded(averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
-    filled = _fill_missing_cells(filled, kept, shade, _HOLE_RADIUS_PITCHES * samples)
+    filled = _fill_missing_cells(filled, kept, (light, step), _HOLE_RADIUS_PITCHES * samples)
     left = sides(filled, walls_at_frame(mask, kept, step), samples)
     if len(left) == 4:
         raise NoBlockFound(
@@ -149,10 +145,11 @@ def _padded(grid: Bytes, border: int) -> Bytes:
     return np.asarray(cv2.copyMakeBorder(grid, PAD, PAD, PAD, PAD, border, value=0), np.uint8)
 
 
-def _fill_missing_cells(filled: Bytes, walls: Bytes, shade: Bytes, radius: float) -> Bytes:
+def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], radius: float) -> Bytes:
     """The block with every inner opening filled in which no disc of `radius` fits, or that is as dark as dark walls.
 
     Looked into at a slant, black cells show nothing but wall: no mask of walls against cells, and no hole either.
+    `seen`: the picture, and its pixels a sample.
     """
     count, labels = pieces_of(1 - filled, 4)
     opening = np.zeros(count, np.bool_)
@@ -160,6 +157,7 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, shade: Bytes, radius: float
     outside = labels[0, 0]
     opening[[0, outside]] = False
     if opening.any():
+        shade = _padded(averaged(*seen, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
         table = median_where(shade, labels == outside)
         wall = median_where(shade, walls)
         for number in np.flatnonzero(opening):

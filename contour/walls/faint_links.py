@@ -9,9 +9,8 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes
 from contour.image.opencv import pieces_and_boxes, within
-from contour.image.pixel_grid import averaged, enlarged
+from contour.image.pixel_grid import averaged, coarse_step, enlarged
 
-_SAMPLES_PER_PITCH = 6.5
 _COVERAGE = 0.12
 # A wall is 0.58 pitch long: a strand any farther off hangs by more than one faint wall, or is a chip.
 _REACH_PITCHES = 0.7
@@ -19,16 +18,16 @@ _REACH_PITCHES = 0.7
 _STRAND_PITCHES = (0.8, 6.0)
 
 
-def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -> Bytes:
+def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float, small: Bytes | None = None) -> Bytes:
     """The wall mask (H, W), uint8, with the walls that lead from its largest piece to strands beside it, of the mask by
-    a lower threshold that `faint` makes.
+    a lower threshold that `faint` makes. `small`: its `averaged` by samples of `coarse_step`, where it is known.
 
     Foils differ in brightness by a factor of three, and where a dim one ends at the cut, the bright walls of the
     outermost cells would hang on nothing and be taken for chips.
     """
-    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
+    step = coarse_step(pitch_px)
     samples = pitch_px / step
-    walls = _coarse(mask, step)
+    walls = _coarse(averaged(mask, step) if small is None else small)
     labels, stats = pieces_and_boxes(walls, 8)
     count = len(stats)
     if count < 3:
@@ -46,7 +45,7 @@ def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -
         return mask
     strands = strand.take(labels)
     weak = faint()
-    links = near & (within(strands, _REACH_PITCHES * samples) > 0) & (_coarse(weak, step) > 0) & (walls == 0)
+    links = near & (within(strands, _REACH_PITCHES * samples) > 0) & (_coarse(averaged(weak, step)) > 0) & (walls == 0)
     _, joined = cv2.connectedComponents((main | strands | links).astype(np.uint8), connectivity=8)
     count, parts = cv2.connectedComponents((strands | links).astype(np.uint8), connectivity=8)
     leads = np.bincount(parts[strands], minlength=count) > 0
@@ -54,6 +53,6 @@ def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float) -
     return np.asarray(np.where(enlarged(links, step, mask.shape), mask | weak, mask), np.uint8)
 
 
-def _coarse(mask: Bytes, step: int) -> Bytes:
-    """1 where an eighth of a square of `step` pixels is wall, the last squares filled up."""
-    return (averaged(mask, step) > 255 * _COVERAGE).astype(np.uint8)
+def _coarse(small: Bytes) -> Bytes:
+    """1 where an eighth of a sample is wall."""
+    return (small > 255 * _COVERAGE).astype(np.uint8)

@@ -11,9 +11,8 @@ import numpy as np
 from contour.geometry.arrays import Bools, Bytes, Int32s, Int64s
 from contour.geometry.rings import Ring
 from contour.image.opencv import closed_by_disc, pieces_and_boxes, pieces_and_lesser
-from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
+from contour.image.pixel_grid import coarse_step, pixels_of, samples_of, whole_averaged
 
-_SAMPLES_PER_PITCH = 6.5
 _WALL_COVERAGE = 0.12
 # What lies within this of the traced outline is the block itself: its side seen at a slant, its broken walls.
 _MARGIN_PITCHES = 0.6
@@ -64,23 +63,29 @@ class Piece:
         return replace(self, box_px=box, outline_px=self.outline_px + np.array([x, y]))
 
 
-def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) -> tuple[Piece, ...]:
+def pieces_beside(
+    mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1, small: Bytes | None = None
+) -> tuple[Piece, ...]:
     """Pieces of comb outside `exterior`, largest first, in a wall mask (H, W), uint8, 255 on walls.
 
     `exterior` and `pitch_px` are in the mask's pixels, the result in those of a picture `scale` times as large. A piece
-    hangs together, is wider than three pitches, and encloses seven cells or more.
+    hangs together, is wider than three pitches, and encloses seven cells or more. `small`: the mask's `averaged` by
+    samples of `coarse_step`, where it is known.
     """
-    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
+    step = coarse_step(pitch_px)
     samples = pitch_px / step
-    walls = (whole_averaged(mask, step) > 255 * _WALL_COVERAGE).astype(np.uint8)
+    if small is None or min(mask.shape) < step:
+        small = whole_averaged(mask, step)
+    high, wide = max(1, mask.shape[0] // step), max(1, mask.shape[1] // step)
+    walls = (small[:high, :wide] > 255 * _WALL_COVERAGE).astype(np.uint8)
     outline = np.rint(samples_of(exterior, step)).astype(np.int32)
     cv2.fillPoly(walls, [outline], 0)
     cv2.polylines(walls, [outline], True, 0, max(1, round(2 * _MARGIN_PITCHES * samples)))
     labels, stats = pieces_and_boxes(walls, 8)
-    wide = np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _LEAST_SIZE_PITCHES * samples
-    wide[0] = False
+    large = np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _LEAST_SIZE_PITCHES * samples
+    large[0] = False
     found = []
-    for number in np.flatnonzero(wide):
+    for number in np.flatnonzero(large):
         x, y, w, h = (int(value) for value in stats[number, :4])
         filled = _filled(labels[y : y + h, x : x + w] == number, samples)
         if filled is not None:

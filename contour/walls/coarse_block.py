@@ -91,10 +91,10 @@ def _main_piece(pieces: Pieces, samples: float) -> Bytes:
         return large.astype(np.uint8).take(labels)
     main = labels == int(np.argmax(area))
     # Another large piece that all but hangs together with it at several walls is a part behind a faint row.
-    beside = labels[cv2.dilate(main.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0]
-    touching = np.bincount(beside, minlength=len(area)) >= _CONTACTS
+    near = cv2.dilate(main.view(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    touching = np.bincount(labels[near & (labels > 0) & ~main], minlength=len(area)) >= _CONTACTS
     kept = large & touching
-    return np.asarray(main | kept.take(labels), np.uint8)
+    return np.asarray(main | kept.take(labels) if kept.any() else main, np.uint8)
 
 
 def _linked(pieces: Pieces, kept: Bytes, filled: Bytes, samples: float) -> tuple[Bytes, Bytes]:
@@ -133,7 +133,7 @@ def _linked(pieces: Pieces, kept: Bytes, filled: Bytes, samples: float) -> tuple
     line[line] = closed[low[line]] | closed[nearest[line]]
     across = labels[line & (cv2.dilate(filled, np.ones((3, 3), np.uint8)) == 0)]
     joined = (np.bincount(across, minlength=len(small)) > 0) & small
-    return filled | line.astype(np.uint8), kept | joined.take(labels).astype(np.uint8)
+    return filled | line.view(np.uint8), kept | joined.take(labels).view(np.uint8)
 
 
 def _largest(filled: Bytes) -> Bytes:
@@ -174,7 +174,7 @@ def _strands(walls: Bytes, samples: float) -> Bytes:
     labels, stats = pieces_and_boxes(walls, 8)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > _STRAND_PITCHES * samples
     long[0] = False
-    return long.astype(np.uint8).take(labels)
+    return long.take(labels).view(np.uint8)
 
 
 def without_threads(filled: Bytes, samples: float) -> Bytes:

@@ -40,7 +40,7 @@ def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float, s
     if not strand.any():
         return mask
     near = within(main, _REACH_PITCHES * samples) > 0
-    strand &= np.bincount(labels[near], minlength=count) > 0
+    strand &= np.bincount(labels[near & (walls > 0) & ~main], minlength=count) > 0
     if not strand.any():
         return mask
     strands = strand.take(labels)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from contour.geometry.arrays import Bytes, Float32s, median, quantile
 from contour.image.opencv import pieces_and_areas
+from contour.image.pixel_grid import whole_averaged
 
 AnyFloat = NDArray[np.floating[Any] | np.integer[Any]]
 Levels = Bytes | NDArray[np.uint16]
@@ -175,6 +176,8 @@ def _smoothed(light: Bytes, step: int, contrast: float) -> tuple[Levels, int]:
 
 
 def _shrunk(smooth: L, step: int) -> L:
+    if smooth.dtype == np.uint8:
+        return cast(L, whole_averaged(cast(Bytes, smooth), step))
     size = (smooth.shape[1] // step, smooth.shape[0] // step)
     return cast(L, cv2.resize(smooth, size, interpolation=cv2.INTER_AREA)) if step > 1 else smooth
 

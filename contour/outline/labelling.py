@@ -77,7 +77,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     facing = (tangent * witnesses.normal.conj()[:, None]).imag
     unary = np.where(facing > -0.2, unary, unary + 20.0)
     step = _steps(witnesses, proposals, here, foot, tangent, reached)
-    step = step + rolled(unary, -1)[:, None, :]
+    step += rolled(unary, -1)[:, None, :]
     path, energy = _cheapest_cycle(step, unary)
     return Labelling(here[np.arange(count), path], energy)
 
@@ -138,10 +138,10 @@ def _steps(
         sigma=np.maximum(witnesses.outer, rolled(witnesses.outer, -1))[:, None, None],
     )
     last = _Foot(foot[:, :, None], tangent[:, :, None])
-    joint = _joint_cost(last, _Foot(after(foot), after(tangent)), between, witnesses.pitch_px, witnesses.rare)
-    price = np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
-    same = here[:, :, None] == following[:, None, :]
-    return np.where(same, 0.0, price + joint)
+    step = _joint_cost(last, _Foot(after(foot), after(tangent)), between, witnesses.pitch_px, witnesses.rare)
+    step += np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
+    step[here[:, :, None] == following[:, None, :]] = 0.0
+    return step
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,15 +204,21 @@ def _joint_cost(last: _Foot, following: _Foot, between: _Between, pitch_px: floa
     corner += np.multiply(np.maximum(hidden, 0.0, out=hidden), _UNSEEN_PER_PITCH, out=hidden)
     corner[~bent] = np.inf
     aside /= np.maximum(np.sqrt((ax + bx) ** 2 + (ay + by) ** 2), 1e-6)
-    aside /= between.sigma
+    smooth = _smooth(aside, between.sigma, size, ahead=cosine > 0.0)
+    reflex += _JUMP
+    return np.minimum(np.minimum(corner, smooth, out=corner), reflex, out=corner)
+
+
+def _smooth(aside: Float64s, sigma: Float64s, sine: Float64s, *, ahead: Bools) -> Float64s:
+    """Nats of a smooth join with such a step aside and such a turn, in the place of both."""
+    aside /= sigma
     aside *= aside
     aside *= 0.25
-    size *= size
-    size[cosine <= 0.0] = 1.0
-    size *= 12.0
-    aside += size
-    reflex += _JUMP
-    return np.minimum(np.minimum(corner, aside, out=corner), reflex, out=corner)
+    sine *= sine
+    sine[~ahead] = 1.0
+    sine *= 12.0
+    aside += sine
+    return aside
 
 
 def _excess(reach: Float64s, pitch_px: float, gap: Float64s) -> Float64s:

@@ -104,8 +104,8 @@ def wall_mask(
     holes, or between a groove and the block. `least`: the share of the region's walls that a wall rises by at least.
     """
     step = _step(pitch_px)
-    seen = smooth or Smooth.of(light, pitch_px, contrast)
-    levels, unit, noise = seen.levels, seen.unit, seen.noise
+    smooth = smooth or Smooth.of(light, pitch_px, contrast)
+    levels, unit = smooth.levels, smooth.unit
     sign = 1 if bright else -1
     beside = _beside(_shrunk(levels, step), pitch_px / step, closed=not bright)
     beside *= sign
@@ -116,17 +116,15 @@ def wall_mask(
     np.maximum(height, 0.0, out=height)
     walls, region, typical = _heights(height, beside, pitch_px / step)
     share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch_px) / 8, 0, 1))
-    rise = share * walls
-    np.maximum(rise, least * region, out=rise)
+    rise = np.maximum(share * walls, least * region)
     np.maximum(rise, _PICTURE_RISE * contrast * unit, out=rise)
-    floor = NOISE_FLOOR * noise
+    floor = NOISE_FLOOR * smooth.noise
     size = _odd(_WIDE_WALLS * wall + _HALO_PX)
     wide: Float32s | float = 0.0
     if wall and size < _BESIDE_PITCHES * pitch_px:
-        broad = _shrunk(_opened(levels, size, closed=not bright), step).astype(np.float32)
-        broad *= sign
-        broad -= beside
-        wide = np.minimum(broad, _TALL * region, out=broad)
+        wide = sign * _shrunk(_opened(levels, size, closed=not bright), step).astype(np.float32)
+        wide -= beside
+        np.minimum(wide, _TALL * region, out=wide)
 
     def standing_out(part: float) -> Bytes:
         level = np.maximum(_OVER * part * rise, floor)
@@ -136,7 +134,7 @@ def wall_mask(
         level *= sign
         return _beyond(levels, level, unit, light.shape, bright=bright)
 
-    return WallMask(standing_out(1.0), noise / unit, _typical(typical) / unit, lambda: standing_out(_FAINT))
+    return WallMask(standing_out(1.0), smooth.noise / unit, _typical(typical) / unit, lambda: standing_out(_FAINT))
 
 
 def _step(pitch_px: float) -> int:

@@ -10,10 +10,10 @@ from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any
 
-import cv2
-
 from contour.errors import ParameterError
+from contour.image.side_by_side import keep_to_one_thread
 from service.low_priority import NICENESS
+from service.malloc import keep_freed
 
 
 class WorkerEnded(Exception):
@@ -60,7 +60,8 @@ def _work(there: Connection, work: Callable[..., Any], gives_way: bool) -> None:
     """Answer question after question, until nobody is left who asks."""
     if gives_way:
         os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
-    cv2.setNumThreads(1)
+    keep_to_one_thread()
+    keep_freed()
     with suppress(OSError, EOFError):
         while True:
             question = there.recv()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from contour.edge.edge_parts import EdgePart, light_beside, longest_part, with_sides
+from contour.edge.edge_parts import EdgePart, changes, light_beside, longest_part, with_sides
 from contour.edge.ring_places import runs_of
 from contour.geometry.arrays import Bools, Bytes, Float64s, median
 from contour.geometry.ring_lengths import RingLengths
@@ -135,4 +135,4 @@ def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> 
 
 def _changes(light: Float64s) -> Float64s:
     """The most that light along lines beside a ring, (K, N), changes by over a cell about each place, (N,)."""
-    return np.asarray(np.ptp(with_sides(light, _CELL / _SPACING), axis=2).max(axis=0))
+    return np.asarray(changes(light, _CELL / _SPACING).max(axis=0))

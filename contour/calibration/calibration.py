@@ -8,6 +8,7 @@ Pixel (0, 0) is the centre of the top-left pixel, x right, y down.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -240,10 +241,14 @@ class CameraCalibration(CalibrationBase):
         values.flags.writeable = False
         object.__setattr__(self, name, values)
 
-    @property
+    @cached_property
     def camera_position(self) -> Float64s:
         """The camera's centre in the work frame, shape (3,), mm."""
-        return np.asarray(-rotation_matrix(self.rotation_vector).T @ self.translation_mm)
+        return np.asarray(-self._rotation.T @ self.translation_mm)
+
+    @cached_property
+    def _rotation(self) -> Float64s:
+        return rotation_matrix(self.rotation_vector)
 
     def height_known(self, height_mm: float) -> bool:
         """True: the camera model holds at any height."""
@@ -264,7 +269,7 @@ class CameraCalibration(CalibrationBase):
         points_px = np.asarray(points_px, dtype=np.float64)
         rays = camera_rays(points_px, self.camera_matrix, self.distortion_coefficients)
         self._check_rays(rays, points_px)
-        rays = rays @ rotation_matrix(self.rotation_vector)
+        rays = rays @ self._rotation
         sine = -rays[:, 2] / np.linalg.norm(rays, axis=1)
         if len(rays) and not sine.min() >= _GRAZING:
             x, y = points_px[int(np.argmin(sine))]
@@ -289,7 +294,7 @@ class CameraCalibration(CalibrationBase):
         """Pixels of machine points on the plane z = `height_mm`; CalibrationError for points behind the camera."""
         work = self._to_work_frame(np.asarray(points_machine, dtype=np.float64))
         points = np.column_stack([work, np.full(len(work), float(height_mm))])
-        depth = points @ rotation_matrix(self.rotation_vector)[2] + self.translation_mm[2]
+        depth = points @ self._rotation[2] + self.translation_mm[2]
         if len(depth) and depth.min() <= 0:
             x, y = work[int(np.argmin(depth))]
             raise CalibrationError(

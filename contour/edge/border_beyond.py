@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contour.edge.edge_parts import EdgePart, light_beside
+from contour.edge.ring_places import runs_of
 from contour.geometry.arrays import Bools, Bytes, Complexes, Float64s, Indices, median, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, signed_area
@@ -21,8 +22,8 @@ from contour.geometry.signed_distance import depth_inside
 from contour.image.pixel_sampling import sample_at
 
 # Places along a ring, pitches apart; a corner is where it turns by more between its chords before and behind, degrees,
-# so many places long and away from it, and most among its neighbours.
-_SPACING, _CHORD, _SKIP, _CORNER_DEG, _NEIGHBOURS = 0.1, 20, 2, 25.0, 8
+# so many places long and away from it, and most among its neighbours, or less by so much, radians.
+_SPACING, _CHORD, _SKIP, _CORNER_DEG, _NEIGHBOURS, _ALIKE = 0.1, 20, 2, 25.0, 8, 1e-6
 # Pitches beyond the corner at which a ray begins, where the block's next edge is so far out of the way; its parts.
 _NEAREST, _FREE, _PARTS, _OF_PART = 0.6, 0.75, 5, 5
 # Pitches across the ray, and how far from each place its two sides are; so near to the ray a border is the edge's own,
@@ -116,7 +117,9 @@ def _rays(ring: Ring, side: float, pitch_px: float) -> _Rays:
     behind = rolled(place, -_SKIP - _CHORD) - rolled(place, -_SKIP)
     turn = np.abs(np.angle(behind * before.conj()))
     most = np.max([rolled(turn, k) for k in range(-_NEIGHBOURS, _NEIGHBOURS + 1)], axis=0)
-    corners = np.flatnonzero((turn == most) & (turn > np.radians(_CORNER_DEG)))
+    # Between straight edges several places turn alike, but for rounding: the middle one is the corner.
+    alike = runs_of((turn > most - _ALIKE) & (turn > np.radians(_CORNER_DEG)))
+    corners = np.array([run[len(run) // 2] for run in alike], np.intp)
     index: Indices = np.concatenate([corners, corners])
     way = np.repeat([1, -1], len(corners))
     heading: Complexes = np.where(way > 0, before[index], -behind[index])
@@ -163,7 +166,11 @@ def _clearest(parts: Float64s, clear: Bools, middle: Float64s) -> tuple[Float64s
     inner = (rows >= 0) & (rows < len(at))
     taken = np.take_along_axis(steps[None], np.clip(rows, 0, len(at) - 1), axis=2)
     taken = np.where(inner, taken, np.nan)
-    weakest = np.maximum(taken.min(axis=3), (-taken).min(axis=3))  # nan where a part is nan
+    parts_taken = np.moveaxis(taken, 3, 0)  # five slices: a last axis of five takes several times longer
+    low, high = parts_taken[0], parts_taken[0]
+    for part in parts_taken[1:]:
+        low, high = np.minimum(low, part), np.maximum(high, part)
+    weakest = np.maximum(low, -high)  # nan where a part is nan
     weakest = np.where(np.isnan(weakest), 0.0, weakest)
     own = np.where(np.abs(at) <= _OWN, weakest, 0.0).transpose(1, 0, 2)
     other = np.where(np.abs(at) >= _ANOTHER, weakest, 0.0).max(axis=(0, 2))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from contour.edge.ring_places import runs_of
@@ -37,6 +38,15 @@ def light_beside(plane: Bytes, place: Float64s, outward: Float64s, pitches: Floa
     """Light so many pitches, (K,), out of places (N, 2), pixels, by vectors of one pitch outwards (N, 2): (K, N)."""
     x, y = (place[:, axis] + pitches[:, None] * outward[:, axis] for axis in (0, 1))
     return sample_at(plane, x, y)
+
+
+def changes(values: Float64s, count: float) -> Float64s:
+    """By how much values at places around a ring, (K, N), change over so many places about each, (K, N)."""
+    half = round(0.5 * count)
+    turned = np.take(values, np.arange(-half, values.shape[-1] + half), axis=-1, mode="wrap")
+    window = np.ones((1, 2 * half + 1), np.uint8)
+    spread = cv2.dilate(turned, window) - cv2.erode(turned, window)
+    return np.asarray(spread[:, half : half + values.shape[-1]], np.float64)
 
 
 def with_sides(values: Float64s, count: float) -> Float64s:

@@ -55,16 +55,18 @@ def table_light(small: Bytes, parts: Int32s, area: Indices, samples: float) -> T
     main = int(np.argmax(area)) if area.any() else 0
     table_parts = np.zeros(len(area), np.bool_)
     table_parts[main] = main > 0
-    numbers = parts.ravel().astype(np.intp)
+    flat = np.flatnonzero(parts)
+    numbers = parts.ravel().take(flat).astype(np.intp)
     sizes = np.maximum(np.bincount(numbers, minlength=len(area)), 1)
+    light = np.asarray(cv2.blur(small, (3, 3)), np.float32).reshape(*small.shape[:2], -1)
     # Plates of a table lie side by side under one lamp: those told from the first tell what the next ones look like.
     for _ in range(_ROUNDS):
-        level, spread = _table_level(small, table_parts[parts], samples)
-        off = np.asarray(cv2.blur(small, (3, 3)).reshape(level.shape) - level, np.float32)
-        known, table_parts = table_parts, _table_parts(off, spread, (numbers, sizes), main)
+        level, spread = _table_level(small, table_parts.take(parts), samples)
+        off = light - level
+        known, table_parts = table_parts, _table_parts(off, spread, (flat, numbers, sizes), main)
         if (known == table_parts).all() or area[table_parts & ~known].sum() < _FEW_SAMPLES * samples**2:
             break
-    return TableLight(table_parts[parts], off, level, spread)
+    return TableLight(table_parts.take(parts), off, level, spread)
 
 
 def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, Float64s]:
@@ -72,29 +74,30 @@ def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, F
     channels = small.reshape(*main.shape, -1).astype(np.float32)
     size = 2 * round(0.5 * _LEVEL_PITCHES * samples) + 1
     share = cv2.blur(main.astype(np.float32), (size, size))
+    unknown = ~(share > _SHARE_KNOWN)
+    np.maximum(share, 1e-3, out=share)
     level = np.empty_like(channels)
     spread = np.zeros(channels.shape[2])
     for k in range(channels.shape[2]):
         plane, some = channels[:, :, k], (slice(None, None, 3), slice(None, None, 3))
         here = plane[some][main[some]]
         lowest, highest = quantiles(here, (0.02, 0.98)).tolist() if len(here) else (0.0, 0.0)
-        local = np.asarray(cv2.blur(plane * main, (size, size)), np.float32) / np.maximum(share, 1e-3)
+        local = np.divide(cv2.blur(plane * main, (size, size)), share, out=level[:, :, k])
         if len(here):
             spread[k] = 1.4826 * median(np.abs(here - local[some][main[some]]))
         # Far from any of it, in a hole, the table may be as light as it is anywhere, and a little more so.
-        anywhere = np.clip(plane, lowest - spread[k], highest + spread[k])
-        level[:, :, k] = np.where(share > _SHARE_KNOWN, local, anywhere)
+        local[unknown] = np.clip(plane[unknown], lowest - spread[k], highest + spread[k])
     return level, spread
 
 
-def _table_parts(off: Float32s, spread: Float64s, parts: tuple[Indices, Indices], main: int) -> Bools:
-    """Which flat parts are as light as the table around them; `off`: the picture less that light, `parts`: the number
-    of each sample's part, and the samples of each.
+def _table_parts(off: Float32s, spread: Float64s, parts: tuple[Indices, Indices, Indices], main: int) -> Bools:
+    """Which flat parts are as light as the table around them; `off`: the picture less that light, `parts`: the samples
+    that are flat, the number of each one's part, and how many there are of each.
     """
-    numbers, sizes = parts
+    flat, numbers, sizes = parts
     table = np.ones(len(sizes), np.bool_)
     for k in range(off.shape[2]):
-        mean = np.bincount(numbers, weights=off[:, :, k].ravel(), minlength=len(sizes)) / sizes
+        mean = np.bincount(numbers, weights=off[:, :, k].ravel().take(flat), minlength=len(sizes)) / sizes
         table &= np.abs(mean) < _APART + _APART_SPREADS * spread[k]
     table[0] = False
     table[main] = main > 0

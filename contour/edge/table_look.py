@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from contour.edge.table_light import table_light
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
+from contour.image.opencv import deep, pieces_and_boxes, pieces_of, within
 from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
@@ -157,18 +158,18 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     slope = _slope(small)
     whole = _drawn(seen.rings[:1], small.shape, step)
     border = _borders(small, slope, (block, whole), samples)
-    room = np.asarray(cv2.distanceTransform(1 - border, cv2.DIST_L2, 3), np.float32)
     inside = cv2.erode(block, np.ones((3, 3), np.uint8)) > 0
-    reach = np.where(inside, _CELL_ROOM * samples - _RIM, _GAP * samples)
-    _, numbered = cv2.connectedComponents((room > reach).astype(np.uint8), connectivity=4)
-    parts = np.asarray(numbered, np.int32)
+    reach = _CELL_ROOM * samples - _RIM, _GAP * samples
+    roomy = deep(1 - border, reach[0])
+    room = (roomy & inside) | (deep(1 - border, reach[1]) & ~inside)
+    _, parts = pieces_of(room, 4)
     area = np.bincount(parts[block == 0], minlength=int(parts.max()) + 1)
     area[:1] = 0
     light = table_light(small, parts, area, samples)
     table_part = light.parts
-    table = _grown(table_part, reach)
+    table = _grown(table_part, inside, reach)
     # Small flat parts outside lie between walls that stick out, and between specks.
-    flat = _grown(_wide((parts > 0) & ~table_part, room, _CELL_ROOM * samples - _RIM), reach)
+    flat = _grown(_wide((parts > 0) & ~table_part, roomy > 0), inside, reach)
     busy = _busy(slope, block, samples)
     quiet = (busy < _QUIET) & ~table
     loose = None if seen.loose is None else _loose(seen.loose, (whole == 0) & light.alike, samples)
@@ -210,11 +211,11 @@ def _loose(walls: Bytes, alike: Bools, samples: float) -> Bools | None:
 
 def _mostly(part: Bools, kind: Bools) -> Bools:
     """The pieces of a part that are of that kind to a good share."""
-    count, pieces = cv2.connectedComponents(part.astype(np.uint8), connectivity=8)
+    count, pieces = pieces_of(part, 8)
     size = np.maximum(np.bincount(pieces.ravel(), minlength=count), 1)
     kept = np.bincount(pieces[kind], minlength=count) > _GOOD_SHARE * size
     kept[0] = False
-    return np.asarray(kept[pieces], np.bool_)
+    return kept.take(pieces)
 
 
 def _away(foreign: Bools, step: int) -> Float32s:
@@ -244,18 +245,17 @@ def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
     if not len(comb):
         return np.ones(slope.shape, np.float32)
     size = 2 * round(0.5 * samples) + 1
-    busy = cv2.blur(np.minimum(slope, quantile(comb, 0.9)).astype(np.float32), (size, size))
+    busy = cv2.blur(np.minimum(slope.astype(np.float32), quantile(comb, 0.9)), (size, size))
     usual = median(busy[::2, ::2][block[::2, ::2] > 0])
     return np.asarray(busy / max(usual, 1e-3), np.float32)
 
 
 def _opened(part: Bools, radius: float) -> Bools:
     """The part without what is too narrow for a disc of this radius."""
-    room = cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 3)
-    core = (room > radius).astype(np.uint8)
+    core = deep(part, radius) if part.any() else np.zeros(part.shape, np.uint8)
     if not core.any():
-        return np.zeros(part.shape, np.bool_)
-    return np.asarray(part & (cv2.distanceTransform(1 - core, cv2.DIST_L2, 3) <= radius + 1), np.bool_)
+        return core > 0
+    return np.asarray(part & (within(core, radius + 1) > 0), np.bool_)
 
 
 def _borders(small: Bytes, slope: NDArray[np.int16], block: tuple[Bytes, Bytes], samples: float) -> Bytes:
@@ -267,36 +267,36 @@ def _borders(small: Bytes, slope: NDArray[np.int16], block: tuple[Bytes, Bytes],
     if len(walls):
         level = min(level, _OF_WALLS * median(walls))
     # Glare and half shadows have borders as steep, but wide ones.
-    beside = np.where(material == 0, slope, np.int16(0))
+    beside = slope * (material == 0)
     wide = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((_SOFT, _SOFT), np.uint8))
     light = small if small.ndim == 2 else small.max(axis=2)
     table = light[::2, ::2][material[::2, ::2] == 0]
     lit = light > median(table) if len(table) else np.zeros(light.shape, np.bool_)
     # Dark things on a table have soft sides, too.
     soft = (whole > material) | (lit & (wide > _SOFT_SHARE * level)) | (wide > level)
-    return _long(np.where(soft, slope - wide, slope) > level, _SPECK_PITCHES * samples).astype(np.uint8)
+    return _long(slope - wide * soft > level, _SPECK_PITCHES * samples).astype(np.uint8)
 
 
 def _long(part: Bools, least: float) -> Bools:
     """The pieces of a part that are longer than that, samples."""
     if not part.any():
         return part
-    _, pieces, stats, _ = cv2.connectedComponentsWithStats(part.astype(np.uint8), connectivity=8)
+    pieces, stats = pieces_and_boxes(part.astype(np.uint8), 8)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > least
     long[0] = False
-    return np.asarray(long[pieces], np.bool_)
+    return long.take(pieces)
 
 
-def _wide(flat: Bools, room: Float32s, radius: float) -> Bools:
-    """The parts of `flat` in which a disc of this radius has room."""
-    count, parts = cv2.connectedComponents(flat.astype(np.uint8), connectivity=4)
+def _wide(flat: Bools, roomy: Bools) -> Bools:
+    """The parts of `flat` that have such room somewhere."""
+    count, parts = pieces_of(flat, 4)
     wide = np.zeros(count, np.bool_)
-    wide[parts[room > radius]] = True
+    wide[parts[roomy & flat]] = True
     wide[0] = False
-    return np.asarray(wide[parts], np.bool_)
+    return wide.take(parts)
 
 
-def _grown(part: Bools, reach: Float64s) -> Bools:
-    """A part that was seen through gaps of a border, up to that border."""
-    away = cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 3)
-    return np.asarray((away <= reach + _RIM), np.bool_)
+def _grown(part: Bools, inside: Bools, reach: tuple[float, float]) -> Bools:
+    """A part that was seen through gaps of a border, so wide inside of the block and beside it, up to that border."""
+    within_block, beside_it = (within(part, one + _RIM) > 0 for one in reach)
+    return (within_block & inside) | (beside_it & ~inside)

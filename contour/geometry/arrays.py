@@ -31,9 +31,18 @@ def median(values: NDArray[Any]) -> float:
 def medians(values: NDArray[Any], axis: int) -> Float64s:
     """The medians along an axis, without it; as `median`."""
     middle, odd = divmod(values.shape[axis], 2)
-    ordered = np.partition(values, middle if odd else (middle - 1, middle), axis=axis)
-    high = ordered.take(middle, axis=axis).astype(np.float64)
-    return np.asarray(high if odd else 0.5 * (ordered.take(middle - 1, axis=axis) + high), np.float64)
+    below, high = _parted(values, middle, axis)
+    return np.asarray(high if odd else 0.5 * (below.max(axis=0) + high), np.float64)
+
+
+def _parted(values: NDArray[Any], place: int, axis: int = 0) -> tuple[NDArray[Any], Float64s]:
+    """The values that come before a place along an axis where they rise along it, in any order, and the one there."""
+    # Parted at one place, as numpy does with vectors for all but bytes: at two of them it takes ten times as long.
+    wide = values.astype(np.int16) if values.dtype == np.uint8 else values
+    ordered = np.partition(wide, place, axis=axis)
+    if axis:
+        ordered = ordered.transpose(axis, *(other for other in range(values.ndim) if other != axis))
+    return ordered[:place], ordered[place].astype(np.float64)
 
 
 def quantile(values: NDArray[Any], share: float) -> float:
@@ -43,13 +52,14 @@ def quantile(values: NDArray[Any], share: float) -> float:
 
 def quantiles(values: NDArray[Any], shares: tuple[float, ...]) -> Float64s:
     """What these shares of the values along the first axis lie below, linear between two, in its place."""
-    place = np.array(shares) * (len(values) - 1)
-    low = np.floor(place).astype(np.intp)
-    high = np.minimum(low + 1, len(values) - 1)
-    ordered = np.partition(values, sorted({*low.tolist(), *high.tolist()}), axis=0)
-    below, above = ordered[low].astype(np.float64), ordered[high].astype(np.float64)
-    part = (place - low).reshape(-1, *(1 for _ in values.shape[1:]))
-    return np.asarray(below + (above - below) * part, np.float64)
+    found = []
+    for share in shares:
+        place = share * (len(values) - 1)
+        low = int(place)
+        lower, above = _parted(values, min(low + 1, len(values) - 1))
+        below = lower.max(axis=0).astype(np.float64) if low + 1 < len(values) else above
+        found.append(below + (above - below) * (place - low))
+    return np.array(found, np.float64)
 
 
 def distinct(numbers: NDArray[Any]) -> Indices:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.arrays import Float64s, Indices, rolled
 from contour.geometry.rings import Ring
 
 _AT_ONCE = 256
@@ -27,7 +27,7 @@ class RingLengths:
     @classmethod
     def of(cls, ring: Ring) -> RingLengths:
         """The lengths along a ring."""
-        edges = np.roll(ring, -1, axis=0) - ring
+        edges = rolled(ring, -1) - ring
         ends = np.cumsum(np.hypot(*edges.T))
         return cls(ring, edges, np.concatenate([[0.0], ends[:-1]]), float(ends[-1]))
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple, TypeVar, cast
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, Int64s
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int32s, Int64s
 
 Anything = TypeVar("Anything", Bytes, NDArray[np.uint16], Float32s)
+
+_SAMPLED, _MOST_OTHERS = 8, 8192
+"""The largest piece is told from every so many rows and columns; so many pixels of others are gathered one by one."""
+
+_LARGEST_DISC = 9.0
+"""Pixels: larger discs take longer than distances."""
 
 _LENS_STEPS = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 """undistortPoints stops after 5 steps by itself, which leaves tenths of a pixel in the corners of wide lenses."""
@@ -154,13 +161,68 @@ def above(picture: Bytes, threshold: float) -> Bytes:
     return cast(Bytes, cv2.threshold(picture, threshold, 255, cv2.THRESH_BINARY)[1])
 
 
+def pieces_of(mask: Bytes | Bools, connectivity: int) -> tuple[int, Int32s]:
+    """How many white pieces a mask has, black counted as one, and the number of each pixel's, (H, W), 0 on black."""
+    count, labels = cv2.connectedComponents(mask.view(np.uint8), connectivity=connectivity)
+    return count, np.asarray(labels, np.int32)
+
+
 def pieces_and_areas(mask: Bytes, connectivity: int) -> tuple[Int32s, Int64s]:
     """The number of each pixel's white piece, (H, W), 0 on black, and the area of each, (N,), 0 for black: of what
     connectedComponentsWithStats tells this is had in a third of the time.
     """
-    count, labels = cv2.connectedComponents(mask, connectivity=connectivity)
-    pieces = np.asarray(labels, np.int32)
-    return pieces, np.bincount(pieces[mask > 0], minlength=count)
+    return pieces_and_lesser(mask, connectivity)[:2]
+
+
+def pieces_and_lesser(mask: Bytes, connectivity: int) -> tuple[Int32s, Int64s, Indices]:
+    """As `pieces_and_areas`, and the places in the flat mask of all but the one piece that most of it seems to be,
+    (M,).
+    """
+    count, pieces, main, others = _pieces(mask, connectivity)
+    area = np.bincount(pieces.ravel().take(others), minlength=count)
+    area[main] = cv2.countNonZero(mask) - len(others)
+    return pieces, area, others
+
+
+def pieces_and_boxes(mask: Bytes, connectivity: int) -> tuple[Int32s, Int32s]:
+    """What connectedComponentsWithStats tells of a mask, in half the time where most of it is one piece: the number of
+    each pixel's white piece, (H, W), and left, top, width, height and area of each, (N, 5), 0 for black.
+    """
+    count, pieces, main, others = _pieces(mask, connectivity)
+    if len(others) > _MOST_OTHERS:
+        _, _, counted, _ = cv2.connectedComponentsWithStats(mask, connectivity=connectivity)
+        return pieces, np.asarray(counted, np.int32)
+    stats = np.zeros((count, 5), np.int32)
+    number, (rows, columns) = pieces.ravel().take(others), np.divmod(others, mask.shape[1])
+    first, last = np.full((2, count), np.iinfo(np.int32).max), np.full((2, count), -1)
+    for axis, places in enumerate((columns, rows)):
+        np.minimum.at(first[axis], number, places)
+        np.maximum.at(last[axis], number, places)
+    stats[1:, :2], stats[1:, 2:4] = first[:, 1:].T, (last - first + 1)[:, 1:].T
+    stats[:, 4] = np.bincount(number, minlength=count)
+    if main:
+        stats[main, :4] = cv2.boundingRect((pieces == main).view(np.uint8))
+        stats[main, 4] = cv2.countNonZero(mask) - len(others)
+    return pieces, stats
+
+
+def _pieces(mask: Bytes, connectivity: int) -> tuple[int, Int32s, int, Indices]:
+    """How many white pieces a mask of 0 and 1, or 255, has, black counted as one, each pixel's, (H, W), the one that
+    most of it seems to be, and the places of all others, (M,), in the flat mask.
+    """
+    count, pieces = pieces_of(mask, connectivity)
+    seen = np.bincount(pieces[::_SAMPLED, ::_SAMPLED].ravel(), minlength=count)
+    main = 1 + int(seen[1:].argmax()) if count > 1 else 0
+    others = cv2.bitwise_and(mask, (pieces != main).view(np.uint8))  # 1 where it is 1 or 255
+    return count, pieces, main, np.flatnonzero(others.view(np.bool_))
+
+
+def median_where(picture: Bytes, where: Bytes | Bools) -> float:
+    """The median of the pixels, (H, W), where a mask is not 0, at one of them at least: told from their counts."""
+    counts = cv2.calcHist([picture], [0], where.view(np.uint8), [256], [0, 256])
+    reached = np.cumsum(np.asarray(counts, np.int64).ravel())
+    middle = np.searchsorted(reached, [(reached[-1] - 1) // 2, reached[-1] // 2], side="right")
+    return 0.5 * float(middle.sum())
 
 
 def region_boxes_and_areas(mask: Bytes) -> tuple[Int32s, Int32s]:
@@ -170,13 +232,36 @@ def region_boxes_and_areas(mask: Bytes) -> tuple[Int32s, Int32s]:
     return table[:, :4], table[:, cv2.CC_STAT_AREA]
 
 
+def within(mask: Bytes | Bools, radius: float, neighbours: int = 3) -> Bytes:
+    """1 where a one of a mask of 0 and 1, (H, W), lies within the radius, pixels; nothing lies beyond its border.
+
+    By the distances of cv2.distanceTransform over 3 or 5 `neighbours`: dilating with what these call a disc is the same
+    to the pixel, in a sixth of the time.
+    """
+    part = mask.view(np.uint8)
+    if radius > _LARGEST_DISC:
+        return (cv2.distanceTransform(1 - part, cv2.DIST_L2, neighbours) <= radius).astype(np.uint8)
+    return np.asarray(cv2.dilate(part, _disc(radius, neighbours)), np.uint8)
+
+
+def deep(mask: Bytes | Bools, radius: float, neighbours: int = 3) -> Bytes:
+    """1 where all zeros of a mask of 0 and 1, (H, W), lie farther than the radius; as `within`."""
+    return np.asarray(1 - within(1 - mask.view(np.uint8), radius, neighbours), np.uint8)
+
+
+@lru_cache(64)
+def _disc(radius: float, neighbours: int) -> Bytes:
+    point = np.ones((2 * int(radius) + 3,) * 2, np.uint8)
+    point[int(radius) + 1, int(radius) + 1] = 0
+    return (cv2.distanceTransform(point, cv2.DIST_L2, neighbours) <= radius).astype(np.uint8)
+
+
 def closed_by_disc(mask: Bytes, radius: float) -> Bytes:
-    """A mask of 0 and 1, (H, W), closed with a disc, by two distance transforms; nothing lies beyond its border."""
+    """A mask of 0 and 1, (H, W), closed with a disc; nothing lies beyond its border."""
     pad = int(radius) + 2
-    wide = cv2.copyMakeBorder(mask, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
-    grown = (cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5) <= radius).astype(np.uint8)
-    shrunk = (cv2.distanceTransform(grown, cv2.DIST_L2, 5) > radius).astype(np.uint8)
-    return np.asarray(shrunk[pad:-pad, pad:-pad] | mask, np.uint8)
+    wide = np.asarray(cv2.copyMakeBorder(mask, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0), np.uint8)
+    closed = deep(within(wide, radius, 5), radius, 5)
+    return np.asarray(closed[pad:-pad, pad:-pad] | mask, np.uint8)
 
 
 def fewer_vertices(ring: Float64s, off: float) -> Float64s:

@@ -39,13 +39,12 @@ def picture_figures(pixels: Bytes) -> PictureFigures:
     """
     grey = pixels if pixels.ndim == 2 else np.asarray(cv2.cvtColor(pixels, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     mean, deviation = (float(value[0, 0]) for value in cv2.meanStdDev(grey))
-    across = cv2.Sobel(grey, cv2.CV_32F, 1, 0, scale=1 / 8)
-    down = cv2.Sobel(grey, cv2.CV_32F, 0, 1, scale=1 / 8)
-    energy = float(cv2.mean(cv2.multiply(across, across))[0] + cv2.mean(cv2.multiply(down, down))[0])
     total = grey.size
+    # In eighths of a grey level a pixel, whole numbers.
+    energy = sum(cv2.norm(way, cv2.NORM_L2SQR) for way in cv2.spatialGradient(grey)) / 64 / total
     return PictureFigures(
         sharpness=100 * float(np.sqrt(energy)) / deviation if deviation > 0 else 0.0,
         mean=mean,
-        dark_share=float(np.count_nonzero(grey <= DARKEST)) / total,
-        bright_share=float(np.count_nonzero(grey >= BRIGHTEST)) / total,
+        dark_share=cv2.countNonZero(cv2.inRange(grey, 0, DARKEST)) / total,
+        bright_share=cv2.countNonZero(cv2.inRange(grey, BRIGHTEST, 255)) / total,
     )

@@ -15,6 +15,8 @@ from contour.narrow_features.feature import WIDTH, NarrowFeature
 # In cell pitches.
 _ARM_END = 1.7
 _PITCH_SAMPLES = 6.0
+# What a step aside and down counts for in a distance, and a little more.
+_DIAGONAL = 1.42
 
 
 @dataclass(frozen=True)
@@ -62,10 +64,14 @@ def _narrow_parts(drawn: Bytes, first: Float64s, pitch_px: float, kind: _Kind) -
     step = pitch_px / _PITCH_SAMPLES
     height, width = drawn.shape
     room = np.asarray(cv2.distanceTransform(drawn, cv2.DIST_L2, 5), np.float32) / np.float32(_PITCH_SAMPLES)
+    wide = (room >= 0.5 * kind.narrow).astype(np.uint8)
+    # What is far from all of that lies amidst a square without any, and these are had at once.
+    half = int(_PITCH_SAMPLES * 0.5 * (kind.narrow + kind.long) / _DIAGONAL)
+    if not (drawn & (cv2.dilate(wide, np.ones((2 * half + 1, 2 * half + 1), np.uint8)) == 0)).any():
+        return []
     end = round(_ARM_END * _PITCH_SAMPLES)
     disc = np.hypot(*np.ogrid[-end : end + 1, -end : end + 1]) < _ARM_END * _PITCH_SAMPLES
     framed = cv2.copyMakeBorder(room, end, end, end, end, cv2.BORDER_CONSTANT)
-    wide = (room >= 0.5 * kind.narrow).astype(np.uint8)
     away = np.minimum(cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5), width + height) / _PITCH_SAMPLES
     away -= 0.5 * kind.narrow
     _, parts, stats, _ = cv2.connectedComponentsWithStats((drawn & (away > 0.5 * kind.long)).astype(np.uint8))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices
+from contour.geometry.arrays import Float64s, Indices, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.narrow_features.feature import DEPTH, WIDTH, NarrowFeature
@@ -40,7 +40,7 @@ class _Beside:
     @classmethod
     def of(cls, places: Float64s, way: int, half: int) -> _Beside:
         """Before (-1) or after (1) each place, halves of so many places."""
-        one, two = (np.roll(places, -way * reach, axis=0) for reach in (half, 2 * half))
+        one, two = (rolled(places, -way * reach) for reach in (half, 2 * half))
         return cls(_unit(way * (one - places)), _unit(way * (two - one)), (one + two) / 2)
 
     def take(self, chosen: Indices) -> _Beside:
@@ -76,18 +76,20 @@ def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     # All feet at once: of so many steps, shape (S, 1), from each place, shape (S, N).
     steps = np.arange(2, min(int(_LONGEST * pitch_px / spacing), count // 2))[:, None]
     ends = (np.arange(count) + steps) % count
-    foot = places[ends] - places
-    width = np.hypot(foot[:, :, 0], foot[:, :, 1])
+    foot_x, foot_y = (place.take(ends) - place for place in places.T.copy())
+    width = np.hypot(foot_x, foot_y)
     # A path so long reaches no farther out of its foot than half of it would, bent in its middle.
     reach = 0.5 * np.sqrt(np.maximum((steps * spacing) ** 2 - width**2, 0.0))
     long, starts = np.nonzero((width < _WIDE * pitch_px) & (reach > np.maximum(DEPTH * pitch_px, _SLOPE * width)))
-    foot, width, reach = foot[long, starts], width[long, starts], reach[long, starts]
+    foot = np.stack([foot_x[long, starts], foot_y[long, starts]], axis=1)
+    width, reach = width[long, starts], reach[long, starts]
     one, other = before.take(starts), after.take(ends[long, starts])
     along = foot / np.maximum(width, 1e-9)[:, None]
     least = np.maximum(np.maximum(DEPTH * pitch_px, _SLOPE * width), _STEP * one.apart(other))
     # Which way bumps may lie: 0 either, as seen along the outline 1 to the right and -1 to the left, nan none.
     side = np.where(np.minimum(one.along(along), other.along(along)) > aligned, 0.0, np.nan)
-    turn = np.stack([before.turning_to(after)[feet] for feet in (starts, ends[long, starts])])
+    turning = before.turning_to(after)
+    turn = np.stack([turning[feet] for feet in (starts, ends[long, starts])])
     side = np.where(
         np.isnan(side) & (np.abs(turn).min(axis=0) > np.radians(_OUT_DEG)) & (turn[0] * turn[1] > 0.0),
         np.sign(turn[0]),

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from contour.geometry.arrays import rolled
 from contour.geometry.rings import Ring
 from contour.image.opencv import fewer_vertices
 from contour.narrow_features.feature import DEPTH, NarrowFeature
@@ -31,17 +32,17 @@ def steps(ring: Ring, pitch_px: float, large: float) -> list[NarrowFeature]:
 
 
 def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
-    edges = np.roll(corners, -1, axis=0) - corners
+    edges = rolled(corners, -1) - corners
     long, heading = np.hypot(*edges.T) / pitch_px, edges[:, 0] + 1j * edges[:, 1]
-    turn = -np.angle(heading / np.roll(heading, 1))
+    turn = -np.angle(heading / rolled(heading, 1))
     least, turned = np.radians([_TURN_DEG, _TURNED_DEG])
-    after = np.roll(turn, -1)
+    after = rolled(turn, -1)
     high = long * np.sin(np.abs(after))
     rises = (turn < -least) & (after > least) & (np.abs(turn + after) < turned)
     rises &= (high > _STEP_HIGH[0]) & (high < _STEP_HIGH[1])
     found = []
     for foot in np.flatnonzero(rises).tolist():
-        top = np.roll(np.arange(len(corners)), -foot - 1)
+        top = rolled(np.arange(len(corners)), -foot - 1)
         turned_by = np.cumsum(turn[top[1:]])  # a corner may be a round one
         end = int(np.argmax(np.abs(turned_by) > least)) + 1
         # At its foot: slanting sides are as wide as they are long there.
@@ -56,9 +57,9 @@ def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
 def horns(ring: Ring, pitch_px: float) -> list[NarrowFeature]:
     """Sharp corners that stand out of the outline beside them."""
     corners = fewer_vertices(ring, _HORN_EVEN * pitch_px)
-    edges = np.roll(corners, -1, axis=0) - corners
+    edges = rolled(corners, -1) - corners
     long, heading = np.hypot(*edges.T) / pitch_px, edges[:, 0] + 1j * edges[:, 1]
-    turn_deg = -np.degrees(np.angle(heading / np.roll(heading, 1)))
+    turn_deg = -np.degrees(np.angle(heading / rolled(heading, 1)))
     found = []
     for tip in np.flatnonzero(turn_deg > 180.0 - _HORN_DEG).tolist():
         sides = ((long[tip - 1], turn_deg[tip - 1]), (long[tip], turn_deg[(tip + 1) % len(corners)]))

@@ -77,7 +77,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     facing = (tangent * witnesses.normal.conj()[:, None]).imag
     unary = np.where(facing > -0.2, unary, unary + 20.0)
     step = _steps(witnesses, proposals, here, foot, tangent, reached)
-    step = step + rolled(unary, -1)[:, None, :]
+    step += rolled(unary, -1)[:, None, :]
     path, energy = _cheapest_cycle(step, unary)
     return Labelling(here[np.arange(count), path], energy)
 
@@ -102,9 +102,11 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Indices, Indice
     high = np.minimum(here + _NEARBY + 1, (begin + reach)[which])
     score = running[high] - running[low] + 0.1 * np.clip(proposals.gain[which], 0.0, 200.0)
     score = np.where(proposals.gain[which] > _PRESENT, 1e3 + score, score)
-    order = np.lexsort((-score, place))
+    order = _falling(score)
+    order = order[np.argsort(place[order].astype(np.uint16), kind="stable")]
     ordered = place[order]
-    rank = np.arange(len(place)) - np.searchsorted(ordered, ordered)
+    many = np.bincount(ordered, minlength=count)
+    rank = np.arange(len(place)) - (np.cumsum(many) - many)[ordered]
     most = _STATES if count > FEW else min(_STATES_OF_FEW, _PLACES_OF_FEW // count)
     fits = rank < most
     order, at, rank = order[fits], ordered[fits], rank[fits]
@@ -112,6 +114,13 @@ def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Indices, Indice
     states = np.full((3, count, wide), -1, dtype=np.intp)
     states[:, at, rank] = which[order], last[order], following[order]
     return states[0], states[1], states[2]
+
+
+def _falling(values: Float64s) -> Indices:
+    """The order in which values fall, equal ones as they come: sorting so takes five times as long where none are."""
+    order = np.argsort(-values)
+    ordered = values[order]
+    return np.argsort(-values, kind="stable") if (ordered[1:] == ordered[:-1]).any() else order
 
 
 def _steps(
@@ -129,10 +138,10 @@ def _steps(
         sigma=np.maximum(witnesses.outer, rolled(witnesses.outer, -1))[:, None, None],
     )
     last = _Foot(foot[:, :, None], tangent[:, :, None])
-    joint = _joint_cost(last, _Foot(after(foot), after(tangent)), between, witnesses.pitch_px, witnesses.rare)
-    price = np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
-    same = here[:, :, None] == following[:, None, :]
-    return np.where(same, 0.0, price + joint)
+    step = _joint_cost(last, _Foot(after(foot), after(tangent)), between, witnesses.pitch_px, witnesses.rare)
+    step += np.where(proposals.bend, PRICE_ARC, PRICE_LINE)[np.maximum(following, 0)][:, None, :]
+    step[here[:, :, None] == following[:, None, :]] = 0.0
+    return step
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,30 +172,61 @@ def _joint_cost(last: _Foot, following: _Foot, between: _Between, pitch_px: floa
     A corner: the tangents meet ahead of the one and behind the other, within reach of the evidence. A smooth join:
     small turn, small step aside. Else a jump at a fixed price.
     """
-    way = following.at - last.at
-    turn = last.tangent.conj() * following.tangent
-    sine = turn.imag
+    # By x and y, and in place: this is the most of what a labelling takes.
+    (ax, ay), (bx, by) = ((foot.tangent.real.copy(), foot.tangent.imag.copy()) for foot in (last, following))
+    way_x, way_y = following.at.real - last.at.real, following.at.imag - last.at.imag
+    sine, cosine = ax * by - ay * bx, ax * bx + ay * by
+    ahead, behind = way_x * by - way_y * bx, ax * way_y - ay * way_x
+    aside = behind - ahead
+    size = np.abs(sine)
+    reflex = np.zeros(sine.shape)
     dear = rare * sine > 0.0
-    angle = np.arctan2(np.abs(sine), turn.real, where=dear, out=np.zeros(turn.shape))
-    reflex = _REFLEX_PER_RADIAN * angle
-    safe = np.where(np.abs(sine) > 0.05, sine, 1.0)
-    ahead = (way.conj() * following.tangent).imag / safe
-    behind = (last.tangent.conj() * way).imag / safe
-    slack, most = 0.3 * pitch_px, _REACH * pitch_px + between.gap
-    excess = (
-        np.maximum(np.maximum(-ahead - slack, ahead - most), 0.0) ** 2
-        + np.maximum(np.maximum(-behind - slack, behind - most), 0.0) ** 2
-    )
-    corner = _CORNER + reflex + _REFLEX * dear + 8.0 * excess / pitch_px**2
+    reflex[dear] = _REFLEX_PER_RADIAN * np.arctan2(size[dear], cosine[dear])
+    bent = size > 0.05
+    sine[~bent] = 1.0
+    ahead /= sine
+    behind /= sine
+    corner = _excess(ahead, pitch_px, between.gap)
+    corner += _excess(behind, pitch_px, between.gap)
+    corner *= 8.0 / pitch_px**2
+    corner += _CORNER
+    corner += reflex
+    corner += _REFLEX * dear
     # A cell in a corner touches its edges at a distance that goes with the cotangent of half the angle between them.
-    hidden = (between.unseen + ahead + behind) / pitch_px + 1.0 - np.abs(sine) / np.maximum(1.0 + turn.real, 0.2)
-    corner = corner + _MISSING_CELL * np.clip(hidden - _UNSEEN_CORNER + 2.0, 0.0, 1.0)
-    corner = corner + _UNSEEN_PER_PITCH * np.maximum(hidden - _UNSEEN_CORNER, 0.0)
-    corner = np.where(np.abs(sine) > 0.05, corner, np.inf)
-    middle = last.tangent + following.tangent
-    aside = (middle.conj() * way).imag / np.maximum(np.abs(middle), 1e-6)
-    smooth = 0.25 * (aside / between.sigma) ** 2 + 12.0 * np.where(turn.real > 0.0, sine**2, 1.0)
-    return np.minimum(np.minimum(corner, smooth), _JUMP + reflex)
+    hidden = ahead
+    hidden += behind
+    hidden += between.unseen
+    hidden /= pitch_px
+    hidden += 1.0 - _UNSEEN_CORNER
+    hidden -= size / np.maximum(1.0 + cosine, 0.2)
+    missing = np.maximum(hidden + 2.0, 0.0)
+    corner += np.multiply(np.minimum(missing, 1.0, out=missing), _MISSING_CELL, out=missing)
+    corner += np.multiply(np.maximum(hidden, 0.0, out=hidden), _UNSEEN_PER_PITCH, out=hidden)
+    corner[~bent] = np.inf
+    aside /= np.maximum(np.sqrt((ax + bx) ** 2 + (ay + by) ** 2), 1e-6)
+    smooth = _smooth(aside, between.sigma, size, ahead=cosine > 0.0)
+    reflex += _JUMP
+    return np.minimum(np.minimum(corner, smooth, out=corner), reflex, out=corner)
+
+
+def _smooth(aside: Float64s, sigma: Float64s, sine: Float64s, *, ahead: Bools) -> Float64s:
+    """Nats of a smooth join with such a step aside and such a turn, in the place of both."""
+    aside /= sigma
+    aside *= aside
+    aside *= 0.25
+    sine *= sine
+    sine[~ahead] = 1.0
+    sine *= 12.0
+    aside += sine
+    return aside
+
+
+def _excess(reach: Float64s, pitch_px: float, gap: Float64s) -> Float64s:
+    """The square of how far corners lie beyond what was seen, pixels."""
+    excess = np.maximum(reach - (_REACH * pitch_px + gap), -0.3 * pitch_px - reach)
+    np.maximum(excess, 0.0, out=excess)
+    excess *= excess
+    return excess
 
 
 def _cheapest_cycle(step: Float64s, first: Float64s) -> tuple[Indices, float]:
@@ -215,14 +255,15 @@ def _cheapest_path(step: Float64s, initial: Float64s, closing: int | None) -> tu
     room = np.empty((width, width))
     totals = np.empty((count, width))
     totals[0] = initial
-    for i in range(count - 1):
-        np.minimum.reduce(np.add(totals[i, :, None], step[i], out=room), axis=0, out=totals[i + 1])
+    add, least = np.add, np.minimum.reduce
+    for before, price, after in zip(totals[:, :, None], step, totals[1:], strict=False):
+        least(add(before, price, out=room), axis=0, out=after)
     last = totals[count - 1] if closing is None else totals[count - 1] + step[count - 1, :, closing]
     at = int(last.argmin())
     path = np.empty(count, dtype=np.intp)
     path[count - 1] = at
     for i in range(count - 2, -1, -1):
-        path[i] = at = int((totals[i] + step[i, :, at]).argmin())
+        path[i] = at = int(add(totals[i], step[i, :, at]).argmin())
     return path, float(last[path[count - 1]])
 
 

@@ -150,11 +150,14 @@ def _normal_step(
     The distance changes by -cosine with the offset, by +along with the turn (to the left) and by +bulge with the
     curvature.
     """
-    design = np.stack([-cosine, along, bulge * bend[:, None]], axis=1)
+    design = np.empty((len(along), 3, along.shape[1]))
+    np.negative(cosine, out=design[:, 0])
+    design[:, 1] = along
+    np.multiply(bulge, bend[:, None], out=design[:, 2])
     weighted = design * weights[:, None, :]
     normal = weighted @ design.transpose(0, 2, 1)
     right = -(weighted @ residual[:, :, None])
     trace = normal[:, 0, 0] + normal[:, 1, 1] + 1e-30
-    normal[:, [0, 1, 2], [0, 1, 2]] += (1e-9 * trace)[:, None]
+    normal.reshape(-1, 9)[:, ::4] += (1e-9 * trace)[:, None]
     normal[:, 2, 2] += np.where(bend, 0.0, trace)
     return np.linalg.solve(normal, right)[:, :, 0].astype(np.float64)

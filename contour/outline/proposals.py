@@ -145,8 +145,10 @@ def _different(witnesses: Witnesses, fits: Proposals) -> Indices:
     for best in np.lexsort((rising, -gain)).tolist():
         if left[best]:
             kept.append(best)
-            near = slice(begin[best], end[best])
-            left[near] &= np.abs(saved[near] - saved[best]).sum(axis=1) > _SAME * total[near]
+            near = np.flatnonzero(left[begin[best] : end[best]]) + begin[best]
+            apart = saved[near]
+            apart -= saved[best]
+            left[near] = np.abs(apart, out=apart).sum(axis=1) > _SAME * total[near]
     return rising[kept]
 
 

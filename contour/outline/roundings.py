@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -63,6 +65,12 @@ class _Corner:
     present: Float64s
     fixed: float
 
+    @cached_property
+    def told_by(self) -> Hashable:
+        """What the arcs in it depend on: all but where in its ring it lies."""
+        own = (self.edges.origin, self.edges.tangent, self.edges.curvature, self.index, self.part, self.present)
+        return (*(values.tobytes() for values in own), self.near, self.far, self.ends, self.fixed)
+
     @property
     def unexplained(self) -> float:
         """What the witnesses next to the corner cost now: about the most that an arc may save."""
@@ -90,9 +98,12 @@ def rounded(witnesses: Witnesses, segments: Segments, found: Joints) -> tuple[Se
     corner of a block mostly cut the others, too.
     """
     ring = _Ring(segments, found, np.zeros(len(segments), dtype=bool))
+    known: dict[Hashable, _Arcs | None] = {}
     while len(ring.segments) >= 3:
-        tried = [(corner, _best_arc(witnesses, corner)) for corner in _corners(witnesses, ring, (0, 1))]
-        better = [(corner, arc) for corner, arc in tried if arc is not None]
+        corners = _corners(witnesses, ring, (0, 1))
+        # An arc that was put in changes the corners beside it alone.
+        known.update((one.told_by, _best_arc(witnesses, one)) for one in corners if one.told_by not in known)
+        better = [(corner, arc) for corner in corners if (arc := known[corner.told_by]) is not None]
         if not better:
             break
         ring = _inserted(witnesses, ring, *max(better, key=lambda one: float(one[1].gain[0])))
@@ -200,8 +211,10 @@ def _arcs(witnesses: Witnesses, corner: _Corner, radii: Float64s) -> _Arcs:
     along = ahead & behind
     along[:, [0, -1]] = False  # either edge keeps a witness of its own
     on_arc = cost(witnesses, distance(arcs.take((slice(None), None)), points), corner.index)
-    on_edge = [cost(witnesses, distance(edge.take((slice(None), None)), points), corner.index) for edge in (one, other)]
-    beside = np.where(corner.part == 1, np.where(ahead, on_edge[1], on_edge[0]), corner.present)
+    beside = corner.present
+    if (corner.part == 1).any():
+        on_edge = [cost(witnesses, distance(corner.edges.take(side), points), corner.index) for side in (0, 1)]
+        beside = np.where(corner.part == 1, np.where(ahead, on_edge[1], on_edge[0]), corner.present)
     # An outline that goes on and on where nothing is seen would have lost more cells than one.
     seen = (along & (on_arc < 0.5 * witnesses.cap_inside[corner.index])).sum(axis=1)
     beyond = np.maximum(((leaves - corner.near) * leaving.conj()).real, 0.0)

@@ -26,7 +26,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices, medians
+from contour.geometry.arrays import Float64s, Indices, medians, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.outline.fit import FittedRing
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
@@ -138,7 +138,7 @@ def uncertainty(
         own = np.maximum(_NORMAL * deviation, whole) + _BEYOND * stretch.inside
         places = evidence.points[_on_line(evidence, fitted)]
         # A witness lies between two stretches.
-        found.append(RingBounds(whole, places, np.maximum(own, np.roll(own, 1))))
+        found.append(RingBounds(whole, places, np.maximum(own, rolled(own, 1))))
     return tuple(found)
 
 
@@ -163,7 +163,7 @@ def ring_stretches(
     on_line = _on_line(evidence, fitted)
     position = evidence.position[on_line]
     coarse = evidence.coarse
-    around = float(np.hypot(*(np.roll(coarse, -1, axis=0) - coarse).T).sum())
+    around = float(np.hypot(*(rolled(coarse, -1) - coarse).T).sum())
     length = np.maximum(np.diff(position, append=position[0] + around), 0.0)
     leverage = _leverage(evidence, fitted, np.mod(position + 0.5 * length, around), around)
     residual = np.clip(fitted.residual, -_CAP_PITCHES * pitch_px, _CAP_PITCHES * pitch_px)
@@ -189,7 +189,7 @@ def _inside(evidence: RingEvidence, fitted: FittedRing, on_line: Indices, deepes
     unless they lie `deepest_px` inside.
     """
     start = evidence.points[on_line]
-    along = np.roll(start, -1, axis=0) - start
+    along = rolled(start, -1) - start
     square = np.maximum((along**2).sum(axis=1), 1e-12)
     length = np.sqrt(square)
     off = fitted.ring[:, None] - start
@@ -234,9 +234,9 @@ def _blunt_corners(evidence: RingEvidence, fitted: FittedRing, on_line: Indices,
     found = np.zeros(len(on_line))
     ring = fitted.ring
     lengths = RingLengths.of(ring)
-    edges = np.roll(ring, -1, axis=0) - ring
+    edges = rolled(ring, -1) - ring
     heading = edges[:, 0] + 1j * edges[:, 1]
-    turn = np.angle(heading / np.roll(heading, 1))
+    turn = np.angle(heading / rolled(heading, 1))
     corners = np.flatnonzero((np.abs(turn) > _OBTUSE[0]) & (np.abs(turn) < _SHARP))
     if not len(corners):
         return found
@@ -257,11 +257,11 @@ def _blunt_corners(evidence: RingEvidence, fitted: FittedRing, on_line: Indices,
 
 def _middle_of_five(residual: Float64s) -> Float64s:
     """Median of each residual and its two neighbours on either side, around the ring."""
-    return medians(np.stack([np.roll(residual, shift) for shift in range(-2, 3)]), axis=0)
+    return medians(np.stack([rolled(residual, shift) for shift in range(-2, 3)]), axis=0)
 
 
 def _largest_between(values: Float64s, on_line: Indices) -> Float64s:
     """Largest of the values from each witness on the outline up to and with the next one on it, around the ring."""
-    turned = np.roll(values, -int(on_line[0]))
+    turned = rolled(values, -int(on_line[0]))
     largest = np.maximum.reduceat(turned, on_line - on_line[0])
-    return np.asarray(np.maximum(largest, np.roll(values[on_line], -1)), np.float64)
+    return np.asarray(np.maximum(largest, rolled(values[on_line], -1)), np.float64)

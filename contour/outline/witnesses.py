@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -58,10 +59,25 @@ class Witnesses:
     def __len__(self) -> int:
         return len(self.points)
 
-    @property
+    @cached_property
     def bound(self) -> Bools:
         """Which are no witnesses of the edge, but bound it from inside."""
         return np.isinf(self.inner)
+
+    @cached_property
+    def bounded(self) -> bool:
+        """Whether any is."""
+        return bool(self.bound.any())
+
+    @cached_property
+    def sigmas(self) -> Float64s:
+        """Standard deviations inside, then outside, (2 N,)."""
+        return np.concatenate([self.inner, self.outer])
+
+    @cached_property
+    def caps(self) -> Float64s:
+        """The most that points cost inside, then outside, (2 N,)."""
+        return np.concatenate([self.cap_inside, self.cap_outside])
 
 
 def prepare(evidence: RingEvidence, pitch_px: float, rectifier: Rectifier | None) -> Witnesses:
@@ -120,9 +136,8 @@ def cost(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(
     hangs on the block takes a witness there.
     """
     # In place, for this is most of what a fit does.
-    outside = signed > 0.0
-    sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
-    cap = np.where(outside, witnesses.cap_outside[index], witnesses.cap_inside[index])
+    place = _places(signed, index, len(witnesses))
+    sigma, cap = witnesses.sigmas.take(place), witnesses.caps.take(place)
     square = signed / sigma
     square *= square
     square *= 0.5
@@ -132,7 +147,7 @@ def cost(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(
     out = signed / witnesses.pitch_px
     beyond = np.abs(out)
     beyond -= _DEEPEST
-    if witnesses.bound.any():
+    if witnesses.bounded:
         beyond[np.isinf(sigma)] = 0.0
     if beyond.max(initial=0.0) > 0.0:
         np.minimum(np.maximum(beyond, 0.0, out=beyond), 3.0, out=beyond)
@@ -147,13 +162,19 @@ def cost(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(
     return bent
 
 
+def _places(signed: Float64s, index: Indices | slice, count: int) -> Indices:
+    """Where the figures of witnesses at an index, of so many, lie among those of all inside and then all outside."""
+    place = np.multiply(signed > 0.0, count, dtype=np.intp)
+    place += np.arange(count)[index] if isinstance(index, slice) else index
+    return place
+
+
 def weights(witnesses: Witnesses, signed: Float64s, index: Indices | slice = slice(None)) -> Float64s:
     """Weights of a robust fit, 1/pixel^2: inverse variance, falling smoothly as the cost bends towards its inner cap.
 
     The same cap on both sides, or clean noise alone would pull the outline outwards.
     """
-    outside = signed > 0.0
-    sigma = np.where(outside, witnesses.outer[index], witnesses.inner[index])
+    sigma = witnesses.sigmas.take(_places(signed, index, len(witnesses)))
     cap = witnesses.cap_inside[index]
     inverse = 1.0 / sigma**2
     return inverse / (1.0 + 0.5 * signed**2 * inverse / cap) ** 3

@@ -44,6 +44,8 @@ def check_against_evidence(
         (own & (inside > _FAR_OFF_PITCHES), evidence.points, 1, "half a cell"),
         (own & (inside < -_FAR_OUTSIDE_PITCHES), evidence.points, 1, "a third of a cell"),
     ):
+        if not off.any():
+            continue
         in_a_row = np.all([np.roll(off, shift) for shift in range(most)], axis=0)
         if in_a_row.any():
             x, y = points[np.argmax(in_a_row)]

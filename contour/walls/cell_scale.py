@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
+from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.opencv import pieces_and_areas
 from contour.image.side_by_side import side_by_side
 from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
-from contour.walls.wall_mask import FINE_PITCH, wall_mask
+from contour.walls.wall_mask import FINE_PITCH, Smooth, wall_mask
 
 _TILE_PX = 512
 _TILES = 4
@@ -188,15 +188,18 @@ def _part_cells(
 def _in_senses(part: Bytes, guess: float, senses: list[bool], least: int) -> Sequence[CellScale | None]:
     if len(senses) == 1:
         return [cells_of(part, guess, bright=senses[0], least=least)]
+    smooth = Smooth.of(part, guess)
     return side_by_side(
-        lambda: cells_of(part, guess, bright=True, least=least),
-        lambda: cells_of(part, guess, bright=False, least=least),
+        lambda: cells_of(part, guess, bright=True, least=least, smooth=smooth),
+        lambda: cells_of(part, guess, bright=False, least=least, smooth=smooth),
     )
 
 
-def cells_of(light: Bytes, pitch_px: float, *, bright: bool, least: int = _LEAST_CELL) -> CellScale | None:
+def cells_of(
+    light: Bytes, pitch_px: float, *, bright: bool, least: int = _LEAST_CELL, smooth: Smooth | None = None
+) -> CellScale | None:
     """Cells of `least` pixels enclosed by the wall mask of `light` made for `pitch_px`; None where fewer than six."""
-    seen = wall_mask(light, pitch_px, bright=bright)
+    seen = wall_mask(light, pitch_px, bright=bright, smooth=smooth)
     mask = seen.mask
     floor = cv2.bitwise_not(mask)
     _, labels, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
@@ -235,14 +238,19 @@ def cells_of(light: Bytes, pitch_px: float, *, bright: bool, least: int = _LEAST
         float(min(1.0, filled)),
         seen.contrast,
         connected,
-        median(light[walls > 0][::7]),
+        median(_some(light, walls > 0)),
         # The darker part of what is free, for a lighter table may lie in it too (of the lighter part for dark walls).
-        quantile(light[mask == 0][::7], 0.3 if bright else 0.7),
+        quantile(_some(light, mask == 0), 0.3 if bright else 0.7),
         lambda: (
             *lattice_order(places[regular], size),
             solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
         ),
     )
+
+
+def _some(light: Bytes, where: Bools) -> Bytes:
+    """Every seventh pixel of those."""
+    return light.ravel().take(np.flatnonzero(where)[::7])
 
 
 def _without_sheets(mask: Bytes, side: int) -> Bytes:
@@ -251,7 +259,7 @@ def _without_sheets(mask: Bytes, side: int) -> Bytes:
     A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
     """
     sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
-    walls = np.where(cv2.dilate(sheet, np.ones((3, 3), np.uint8)) > 0, np.uint8(0), mask)
+    walls = np.asarray(cv2.subtract(mask, cv2.dilate(sheet, np.ones((3, 3), np.uint8))), np.uint8)
     return walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
 
 

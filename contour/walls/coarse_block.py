@@ -6,13 +6,19 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes, Int32s, median
-from contour.image.opencv import closed_by_disc, pieces_and_areas
-from contour.image.pixel_grid import averaged
+from contour.geometry.arrays import Bytes, Int32s
+from contour.image.opencv import (
+    closed_by_disc,
+    deep,
+    median_where,
+    pieces_and_areas,
+    pieces_and_boxes,
+    pieces_of,
+    within,
+)
+from contour.image.pixel_grid import averaged, coarse_step
 from contour.walls.coarse_rings import PAD, CoarseBlock, sides, walls_at_frame, with_rings
 
-# About six and a half samples a pitch hold a wall's place and make every later pass cheap.
-_SAMPLES_PER_PITCH = 6.5
 # A disc of 0.72 pitch bridges an open cell (1.15 pitches across its corners) and a wall broken out of it.
 _CLOSING_PITCHES = 0.72
 # A gap in a ring of single cells around an opening, up to a cell wide, is a missing wall and no way out.
@@ -39,25 +45,22 @@ Pieces = tuple[Int32s, Int32s]
 """The number of the piece of walls each sample lies in, (H, W), 0 in none, and OpenCV's statistics of each."""
 
 
-def coarse_block(mask: Bytes, light: Bytes, pitch_px: float) -> CoarseBlock:
+def coarse_block(mask: Bytes, light: Bytes, pitch_px: float, small: Bytes | None = None) -> CoarseBlock:
     """The largest comb in a wall mask (H, W), uint8, of the picture `light`, with cells `pitch_px` pixels wide.
 
-    Raises NoBlockFound.
+    `small`: the mask's `averaged` by samples of `coarse_step`, where it is known. Raises NoBlockFound.
     """
-    # A whole number of pixels a sample: averaging is several times faster so.
-    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
-    small = averaged(mask, step)
+    step = coarse_step(pitch_px)
+    small = averaged(mask, step) if small is None else small
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
     walls = _padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch_px / step
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
-    pieces = np.asarray(labels, np.int32), np.asarray(stats, np.int32)
+    pieces = pieces_and_boxes(walls, 8)
     kept = _main_piece(pieces, samples)
     filled, kept = _linked(pieces, kept, closed_by_disc(kept, _CLOSING_PITCHES * samples), samples)
     filled = without_threads(_largest(filled | kept), samples)
     kept &= filled
-    shade = _padded(averaged(light, step, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
-    filled = _fill_missing_cells(filled, kept, shade, _HOLE_RADIUS_PITCHES * samples)
+    filled = _fill_missing_cells(filled, kept, (light, step), _HOLE_RADIUS_PITCHES * samples)
     left = sides(filled, walls_at_frame(mask, kept, step), samples)
     if len(left) == 4:
         raise NoBlockFound(
@@ -85,13 +88,13 @@ def _main_piece(pieces: Pieces, samples: float) -> Bytes:
             "Check the light and that a block lies in view"
         )
     if area.max() <= 0.5 * area[large].sum():
-        return np.asarray(large.astype(np.uint8)[labels], np.uint8)
+        return large.astype(np.uint8).take(labels)
     main = labels == int(np.argmax(area))
     # Another large piece that all but hangs together with it at several walls is a part behind a faint row.
-    beside = labels[cv2.dilate(main.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0]
-    touching = np.bincount(beside, minlength=len(area)) >= _CONTACTS
+    near = cv2.dilate(main.view(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    touching = np.bincount(labels[near & (labels > 0) & ~main], minlength=len(area)) >= _CONTACTS
     kept = large & touching
-    return np.asarray((main | kept[labels]).astype(np.uint8), np.uint8)
+    return np.asarray(main | kept.take(labels) if kept.any() else main, np.uint8)
 
 
 def _linked(pieces: Pieces, kept: Bytes, filled: Bytes, samples: float) -> tuple[Bytes, Bytes]:
@@ -106,71 +109,72 @@ def _linked(pieces: Pieces, kept: Bytes, filled: Bytes, samples: float) -> tuple
     size = np.maximum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
     small = (size > _SPECK_PITCHES * samples) & (size < _FRAGMENT_PITCHES * samples)
     small[0] = False
-    strand = kept | small[labels].astype(np.uint8)
-    away = cv2.distanceTransform(1 - strand, cv2.DIST_L2, 5)
-    count, parts = cv2.connectedComponents((away > reach).astype(np.uint8), connectivity=4)
+    strand = kept | small.take(labels).astype(np.uint8)
+    count, parts = pieces_of(deep(1 - strand, reach, 5), 4)
     # Cells are such parts too; only wide ones can be holes.
     wide = np.zeros(count, np.bool_)
-    wide[parts[away > _HOLE_RADIUS_PITCHES * samples]] = True
+    wide[parts[deep(1 - strand, _HOLE_RADIUS_PITCHES * samples, 5) > 0]] = True
     wide[0] = False
     if np.count_nonzero(wide) < 2:
         return filled, kept
-    seeds = np.where(wide, np.arange(count), 0)[parts]
-    _, nearest = cv2.distanceTransformWithLabels(
-        (seeds == 0).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP
-    )
-    low = cv2.erode(nearest.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
-    line = (low < nearest) & (away <= reach + 1) & (filled == 0)
+    narrow = (~wide).astype(np.uint8).take(parts)
+    _, nearest = cv2.distanceTransformWithLabels(narrow, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
+    nearest = nearest.astype(np.uint16)
+    low = cv2.erode(nearest, np.ones((3, 3), np.uint8))
+    line = (low < nearest) & (within(strand, reach + 1, 5) > 0) & (filled == 0)
+    if not line.any():
+        return filled, kept
     # Dust on a table encloses openings too, but its strands are gaps for the most part.
     gaps = line & (cv2.dilate(strand, np.ones((3, 3), np.uint8)) == 0)
     both = np.concatenate([nearest[gaps], low[gaps]])
     length = np.bincount(both, minlength=int(nearest.max()) + 1)
     closed = length <= _GAPS_PITCHES * samples
     closed[nearest[0, 0]] = False
-    line &= closed[low] | closed[nearest]
+    line[line] = closed[low[line]] | closed[nearest[line]]
     across = labels[line & (cv2.dilate(filled, np.ones((3, 3), np.uint8)) == 0)]
     joined = (np.bincount(across, minlength=len(small)) > 0) & small
-    return filled | line.astype(np.uint8), kept | joined[labels].astype(np.uint8)
+    return filled | line.view(np.uint8), kept | joined.take(labels).view(np.uint8)
 
 
 def _largest(filled: Bytes) -> Bytes:
     labels, area = pieces_and_areas(filled, 8)
-    return np.asarray(labels == int(np.argmax(area)), np.uint8)
+    return np.asarray(labels == int(np.argmax(area)), np.uint8) if len(area) > 2 else filled
 
 
 def _padded(grid: Bytes, border: int) -> Bytes:
     return np.asarray(cv2.copyMakeBorder(grid, PAD, PAD, PAD, PAD, border, value=0), np.uint8)
 
 
-def _fill_missing_cells(filled: Bytes, walls: Bytes, shade: Bytes, radius: float) -> Bytes:
+def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], radius: float) -> Bytes:
     """The block with every inner opening filled in which no disc of `radius` fits, or that is as dark as dark walls.
 
     Looked into at a slant, black cells show nothing but wall: no mask of walls against cells, and no hole either.
+    `seen`: the picture, and its pixels a sample.
     """
-    count, labels = cv2.connectedComponents(1 - filled, connectivity=4)
-    room = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
+    count, labels = pieces_of(1 - filled, 4)
     opening = np.zeros(count, np.bool_)
-    opening[labels[room > radius]] = True
+    opening[labels[deep(1 - filled, radius, 5) > 0]] = True
     outside = labels[0, 0]
     opening[[0, outside]] = False
     if opening.any():
-        table = median(shade[labels == outside])
-        wall = median(shade[walls > 0])
+        shade = _padded(averaged(*seen, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
+        table = median_where(shade, labels == outside)
+        wall = median_where(shade, walls)
         for number in np.flatnonzero(opening):
-            inside = median(shade[labels == number])
+            inside = median_where(shade, labels == number)
             # What is lighter than a light block's walls and cells together is a lamp's spot on the table in a hole.
             like_table = abs(inside - table) < abs(inside - wall)
             opening[number] = table < wall or like_table or table - wall < _LEAST_SHADE
     opening[outside] = True
-    return np.asarray(1 - opening.astype(np.uint8)[labels], np.uint8)
+    return (~opening).astype(np.uint8).take(labels)
 
 
 def _strands(walls: Bytes, samples: float) -> Bytes:
     """Those of the walls that are as long as a cell's wall and more, no specks."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
+    labels, stats = pieces_and_boxes(walls, 8)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) > _STRAND_PITCHES * samples
     long[0] = False
-    return np.asarray(long[labels], np.uint8)
+    return long.take(labels).view(np.uint8)
 
 
 def without_threads(filled: Bytes, samples: float) -> Bytes:
@@ -182,7 +186,7 @@ def without_threads(filled: Bytes, samples: float) -> Bytes:
     size = 2 * round(0.5 * _THIN_PITCHES * samples) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     wide = np.asarray(cv2.morphologyEx(filled, cv2.MORPH_OPEN, disc), np.uint8)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(filled & ~wide, connectivity=8)
+    labels, stats = pieces_and_boxes(filled & ~wide, 8)
     length = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT])
     long = length > _OUT_PITCHES * samples
     long[0] = False

@@ -70,7 +70,8 @@ class CoarseBlock:
 
     def strands_near(self, reach: float) -> Float64s:
         """Places of strands within `reach` mask pixels outside of the coarse edge, shape (K, 2), mask pixels."""
-        rows, columns = np.nonzero(self.strands & (self.depth > -reach))
+        near = np.flatnonzero(self.strands.view(np.bool_) & (self.depth > -reach))
+        rows, columns = np.divmod(near, self.strands.shape[1])
         return pixels_of(np.stack([columns, rows], axis=1) - PAD, self.step)
 
     def feet(self, points: Float64s) -> tuple[Int64s, Float64s, Float64s]:
@@ -148,9 +149,11 @@ def with_rings(filled: Bytes, walls: Bytes, strands: Bytes, step: int, samples: 
     index_of_label[labels[joined[:, 1], joined[:, 0]]] = np.arange(len(joined))
     inside = cv2.distanceTransform(filled, cv2.DIST_L2, 5)
     outside = cv2.distanceTransform(1 - filled, cv2.DIST_L2, 5)
-    depth = np.where(filled > 0, inside - 0.5, 0.5 - outside).astype(np.float32) * step
-    nearest = index_of_label[labels]
-    return CoarseBlock(tuple(rings), filled, walls, strands, depth.astype(np.float32), nearest, step, leaves)
+    depth = np.asarray(inside, np.float32) - np.asarray(outside, np.float32)
+    depth += np.float32(0.5) - filled
+    depth *= step
+    nearest = index_of_label.take(np.asarray(labels, np.int32))
+    return CoarseBlock(tuple(rings), filled, walls, strands, depth, nearest, step, leaves)
 
 
 def _ring(chain: Int32s, is_hole: bool, step: int, samples: float) -> CoarseRing:

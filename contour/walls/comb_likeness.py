@@ -117,8 +117,8 @@ def lattice_order(places: Float64s, pitch_px: float) -> tuple[float, float]:
     """Share of cells with neighbours all around, 0 to 1; centroids of cells (N, 2), pixels: four or more about a pitch
     away, or three nearer ones and then six, as triangles have. And the share of those alone that are like triangles.
     """
-    near = np.abs(places[_spread(len(places))][:, None, :] - places[None, :, :])
-    distances = near[:, :, 0] ** 2 + near[:, :, 1] ** 2
+    some = places[_spread(len(places))]
+    distances = (some[:, :1] - places[:, 0]) ** 2 + (some[:, 1:] - places[:, 1]) ** 2
     square = distances / pitch_px**2
 
     def between(low: float, high: float) -> Indices:

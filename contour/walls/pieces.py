@@ -10,10 +10,9 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Int32s, Int64s
 from contour.geometry.rings import Ring
-from contour.image.opencv import closed_by_disc
-from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
+from contour.image.opencv import closed_by_disc, pieces_and_boxes, pieces_and_lesser
+from contour.image.pixel_grid import coarse_step, pixels_of, samples_of, whole_averaged
 
-_SAMPLES_PER_PITCH = 6.5
 _WALL_COVERAGE = 0.12
 # What lies within this of the traced outline is the block itself: its side seen at a slant, its broken walls.
 _MARGIN_PITCHES = 0.6
@@ -64,23 +63,29 @@ class Piece:
         return replace(self, box_px=box, outline_px=self.outline_px + np.array([x, y]))
 
 
-def pieces_beside(mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1) -> tuple[Piece, ...]:
+def pieces_beside(
+    mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1, small: Bytes | None = None
+) -> tuple[Piece, ...]:
     """Pieces of comb outside `exterior`, largest first, in a wall mask (H, W), uint8, 255 on walls.
 
     `exterior` and `pitch_px` are in the mask's pixels, the result in those of a picture `scale` times as large. A piece
-    hangs together, is wider than three pitches, and encloses seven cells or more.
+    hangs together, is wider than three pitches, and encloses seven cells or more. `small`: the mask's `averaged` by
+    samples of `coarse_step`, where it is known.
     """
-    step = max(1, round(pitch_px / _SAMPLES_PER_PITCH))
+    step = coarse_step(pitch_px)
     samples = pitch_px / step
-    walls = (whole_averaged(mask, step) > 255 * _WALL_COVERAGE).astype(np.uint8)
+    if small is None or min(mask.shape) < step:
+        small = whole_averaged(mask, step)
+    high, wide = max(1, mask.shape[0] // step), max(1, mask.shape[1] // step)
+    walls = (small[:high, :wide] > 255 * _WALL_COVERAGE).astype(np.uint8)
     outline = np.rint(samples_of(exterior, step)).astype(np.int32)
     cv2.fillPoly(walls, [outline], 0)
     cv2.polylines(walls, [outline], True, 0, max(1, round(2 * _MARGIN_PITCHES * samples)))
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(walls, connectivity=8)
-    wide = np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _LEAST_SIZE_PITCHES * samples
-    wide[0] = False
+    labels, stats = pieces_and_boxes(walls, 8)
+    large = np.minimum(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) >= _LEAST_SIZE_PITCHES * samples
+    large[0] = False
     found = []
-    for number in np.flatnonzero(wide):
+    for number in np.flatnonzero(large):
         x, y, w, h = (int(value) for value in stats[number, :4])
         filled = _filled(labels[y : y + h, x : x + w] == number, samples)
         if filled is not None:
@@ -112,10 +117,8 @@ def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes
     `faint` makes the mask by a lower threshold: shavings without cells, too, are loose where no faint wall leads from
     the block to them, as one does to every wall of its own.
     """
-    count, labels = cv2.connectedComponents(mask, connectivity=8)
-    places = np.flatnonzero(mask > 0)
-    piece = np.asarray(labels, np.int32).ravel()[places]
-    area = np.bincount(piece, minlength=count)
+    labels, area, places = pieces_and_lesser(mask, 8)
+    count, piece = len(area), labels.ravel().take(places)
     if area.max() <= _MOST_WALLS * area.sum():
         return mask
     small = (area > _LEAST_WALL * pitch_px) & (area < _LOOSE_SHARE * area.max())
@@ -130,8 +133,8 @@ def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes
         loose[number] = sum(cv2.contourArea(hole) > _LEAST_CELL * pitch_px**2 for hole in holes) >= _LOOSE_CELLS
     long = small & ~loose & (np.hypot(*(boxes[2:] - boxes[:2])) > _SHAVING_PITCHES * pitch_px)
     if faint is not None and long.any():
-        loose |= long & ~_hang_together(np.asarray(labels, np.int32), int(area.argmax()), mask | faint())
-    return np.where(loose[labels], np.uint8(0), mask) if loose.any() else mask
+        loose |= long & ~_hang_together(labels, int(area.argmax()), mask | faint())
+    return (~loose).astype(np.uint8).take(labels) * mask if loose.any() else mask
 
 
 def _hang_together(labels: Int32s, main: int, walls: Bytes) -> Bools:

@@ -10,7 +10,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes
-from contour.image.pixel_grid import averaged, pixels_of
+from contour.image.pixel_grid import averaged, coarse_step, pixels_of
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.coarse_block import coarse_block
 from contour.walls.coarse_rings import CoarseBlock, walls_at_frame
@@ -97,20 +97,22 @@ def see_block(
     the block, on a grid of any size over the picture: no walls are seen there. Raises NoBlockFound.
     """
     small, scale, cells = walls.small, walls.scale, walls.cells
-    seen = without_specks(_visible(walls.mask, hidden), cells.pitch_px / scale, cells.wall_px / scale)
+    pitch_px = cells.pitch_px / scale
+    seen = without_specks(_visible(walls.mask, hidden), pitch_px, cells.wall_px / scale)
     midway = None if cells.bright else midway_to_table(small, cells.level, seen.contrast)
     if midway is not None:
         # Such a block is told from the table by its darkness: fainter walls would be more of its cells' own shades.
         seen = _darker_than_table(seen, small, midway)
-    else:
-        seen = replace(seen, mask=with_faint_links(seen.mask, seen.faint, cells.pitch_px / scale))
+    every, few, faint = seen.mask, averaged(seen.mask, coarse_step(pitch_px)), None
+    if midway is None:
+        faint = seen.faint
+        every = with_faint_links(every, faint, pitch_px, few)
+        few = few if every is seen.mask else averaged(every, coarse_step(pitch_px))
     on_mask()
-    every = seen.mask
-    faint = seen.faint if midway is None else None
-    seen = replace(seen, mask=without_loose_pieces(every, cells.pitch_px / scale, faint))
+    seen = replace(seen, mask=without_loose_pieces(every, pitch_px, faint))
     loose = None if seen.mask is every else np.asarray(cv2.subtract(every, seen.mask), np.uint8)
-    coarse = coarse_block(seen.mask, small, cells.pitch_px / scale)
-    others = pieces_beside(every, coarse.rings[0].vertices, cells.pitch_px / scale, scale)
+    coarse = coarse_block(seen.mask, small, pitch_px, few if loose is None else None)
+    others = pieces_beside(every, coarse.rings[0].vertices, pitch_px, scale, few)
     evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))

@@ -42,8 +42,12 @@ class Chains:
     def free_side(self, at: Int64s, arm: int) -> Float64s:
         """Vector towards the side without wall, as long as the points `arm` steps ahead and back of `at` are apart."""
         # findContours runs with the free side at (−dy, dx) of its direction, for outer boundaries and inner ones alike.
-        ahead, back = self.points[self.shifted(arm, at)], self.points[self.shifted(-arm, at)]
-        return np.stack([(back - ahead)[:, 1], (ahead - back)[:, 0]], axis=1)
+        across = self.across(at, arm)
+        return np.stack([across[:, 1], -across[:, 0]], axis=1)
+
+    def across(self, at: Int64s, arm: int) -> Float64s:
+        """From the point `arm` steps ahead of each point `at` to that as far back, (K, 2)."""
+        return self.points.take(self.shifted(-arm, at), axis=0) - self.points.take(self.shifted(arm, at), axis=0)
 
 
 def edge_chains(mask: Bytes, coarse: CoarseBlock, pitch_px: float) -> Chains:
@@ -93,20 +97,25 @@ def _tips(chains: Chains, pitch_px: float, wall: float) -> tuple[int, Int64s]:
     """How long arms along the chains are, and the points that stick out of two arms a wall's width apart."""
     arm = int(np.clip(round(1.1 * wall + 2), 3, max(3, 0.45 * pitch_px)))
     everywhere = np.arange(len(chains.points))
-    gap, stick, out = _arms(chains, everywhere, arm)
+    across = chains.across(everywhere, arm)
+    near = np.flatnonzero((np.hypot(across[:, 0], across[:, 1]) < 1.35 * wall + 2.0) & (chains.length > 3 * arm))
+    gap, stick, out = _arms(chains, near, arm)
     # A sharp corner of a small cell has close arms too, but sticks out into the wall. A wall one pixel wide has none
     # of both.
-    free = (chains.free_side(everywhere, arm) * out).sum(axis=1)
-    candidate = (gap < 1.35 * wall + 2.0) & (stick > 0.5 * arm) & (chains.length > 3 * arm) & (free > -0.5)
-    return arm, _peaks(chains, np.where(candidate, stick - 0.5 * gap, -np.inf), arm)
+    free = across[near, 1] * out[:, 0] - across[near, 0] * out[:, 1]
+    candidate = (stick > 0.5 * arm) & (free > -0.5)
+    score = np.full(len(everywhere), -np.inf)
+    score[near[candidate]] = (stick - 0.5 * gap)[candidate]
+    return arm, _peaks(chains, score, arm)
 
 
 def _arms(chains: Chains, at: Int64s, arm: int) -> tuple[Float64s, Float64s, Float64s]:
     """Distance of the points `arm` steps back and ahead of `at`, how far each sticks out of their middle, and where
     to.
     """
-    back, ahead = chains.points[chains.shifted(-arm, at)], chains.points[chains.shifted(arm, at)]
-    out = chains.points[at] - 0.5 * (back + ahead)
+    points = chains.points
+    back, ahead = points.take(chains.shifted(-arm, at), axis=0), points.take(chains.shifted(arm, at), axis=0)
+    out = points.take(at, axis=0) - 0.5 * (back + ahead)
     stick = np.hypot(out[:, 0], out[:, 1])
     gap = np.hypot(*(back - ahead).T)
     return gap, stick, out / np.maximum(stick, 1e-9)[:, None]
@@ -127,8 +136,9 @@ def outermost(chains: Chains, coarse: CoarseBlock, pitch_px: float) -> Int64s:
     The wall must lie behind them, seen from outside, and no other such point within a pitch may reach a third of a
     pitch further out: that one would hide it from the cut.
     """
-    near = np.abs(coarse.depth_at(chains.points)) < 0.5 * pitch_px
-    height = np.where(near, coarse.height_at(chains.points), -np.inf)
+    near = np.flatnonzero(np.abs(coarse.depth_at(chains.points)) < 0.5 * pitch_px)
+    height = np.full(len(chains.points), -np.inf)
+    height[near] = coarse.height_at(chains.points.take(near, axis=0))
     peak = _peaks(chains, height, max(2, round(0.4 * pitch_px)))
     _, _, normal = coarse.feet(chains.points[peak])
     peak = peak[(chains.free_side(peak, 3) * normal).sum(axis=1) > 0]

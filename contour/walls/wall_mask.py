@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from contour.geometry.arrays import Bytes, Float32s, median, quantile
 from contour.image.opencv import pieces_and_areas
+from contour.image.pixel_grid import whole_averaged
 
 AnyFloat = NDArray[np.floating[Any] | np.integer[Any]]
 Levels = Bytes | NDArray[np.uint16]
@@ -66,6 +67,23 @@ class WallMask:
         return self.contrast < _LEAST_OVER_NOISE * self.noise
 
 
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """A lightly blurred picture, filled up to a whole number of samples both ways, its units a grey level, and its
+    noise in these: what masks of bright and of dark walls have in common.
+    """
+
+    levels: Levels
+    unit: int
+    noise: float
+
+    @classmethod
+    def of(cls, light: Bytes, pitch_px: float, contrast: float = 0.0) -> Smooth:
+        """As `wall_mask` takes it."""
+        levels, unit = _smoothed(light, _step(pitch_px), contrast)
+        return cls(levels, unit, _noise_level(levels, pitch_px, unit))
+
+
 def wall_mask(
     light: Bytes,
     pitch_px: float,
@@ -74,6 +92,7 @@ def wall_mask(
     contrast: float = 0.0,
     wall: float = 0.0,
     least: float = _REGION_RISE,
+    smooth: Smooth | None = None,
 ) -> WallMask:
     """Walls of `light` (H, W) where cells are about `pitch_px` apart and walls are brighter (or darker) than cells.
 
@@ -84,24 +103,28 @@ def wall_mask(
     of walls is known, `wall` in pixels, what is both wider and fainter than they is none: a table's light between its
     holes, or between a groove and the block. `least`: the share of the region's walls that a wall rises by at least.
     """
-    step = max(1, int(pitch_px / _MAP_SAMPLES))
-    smooth, unit = _smoothed(light, step, contrast)
+    step = _step(pitch_px)
+    smooth = smooth or Smooth.of(light, pitch_px, contrast)
+    levels, unit = smooth.levels, smooth.unit
     sign = 1 if bright else -1
-    beside = _beside(sign * _shrunk(smooth, step), pitch_px / step)
+    beside = _beside(_shrunk(levels, step), pitch_px / step, closed=not bright)
+    beside *= sign
     # Every step-th pixel, not their average: an average would take the walls' contrast away.
-    height = smooth[step // 2 :: step, step // 2 :: step].astype(np.float32)
+    height = levels[step // 2 :: step, step // 2 :: step].astype(np.float32)
     height *= sign
     height -= beside
     np.maximum(height, 0.0, out=height)
-    noise = _noise_level(smooth, pitch_px, unit)
     walls, region, typical = _heights(height, beside, pitch_px / step)
     share = _RISE + _FINE_RISE[contrast > 0] * float(np.clip((16 - pitch_px) / 8, 0, 1))
-    rise = np.maximum(np.maximum(share * walls, least * region), _PICTURE_RISE * contrast * unit)
-    floor = NOISE_FLOOR * noise
+    rise = np.maximum(share * walls, least * region)
+    np.maximum(rise, _PICTURE_RISE * contrast * unit, out=rise)
+    floor = NOISE_FLOOR * smooth.noise
     size = _odd(_WIDE_WALLS * wall + _HALO_PX)
     wide: Float32s | float = 0.0
     if wall and size < _BESIDE_PITCHES * pitch_px:
-        wide = np.minimum(sign * _shrunk(_opened(smooth, size, closed=not bright), step) - beside, _TALL * region)
+        wide = sign * _shrunk(_opened(levels, size, closed=not bright), step).astype(np.float32)
+        wide -= beside
+        np.minimum(wide, _TALL * region, out=wide)
 
     def standing_out(part: float) -> Bytes:
         level = np.maximum(_OVER * part * rise, floor)
@@ -109,9 +132,13 @@ def wall_mask(
         np.maximum(level, part * rise, out=level)
         level += beside
         level *= sign
-        return _beyond(smooth, level, unit, light.shape, bright=bright)
+        return _beyond(levels, level, unit, light.shape, bright=bright)
 
-    return WallMask(standing_out(1.0), noise / unit, _typical(typical) / unit, lambda: standing_out(_FAINT))
+    return WallMask(standing_out(1.0), smooth.noise / unit, _typical(typical) / unit, lambda: standing_out(_FAINT))
+
+
+def _step(pitch_px: float) -> int:
+    return max(1, int(pitch_px / _MAP_SAMPLES))
 
 
 def _beyond(smooth: Levels, level: Float32s, unit: int, shape: tuple[int, ...], *, bright: bool) -> Bytes:
@@ -131,7 +158,7 @@ def without_specks(seen: WallMask, pitch_px: float, wall: float) -> WallMask:
     labels, area = pieces_and_areas(seen.mask, 8)
     kept = (area > max(4.0, _SPECK_LENGTH * pitch_px * wall)).astype(np.uint8) * np.uint8(255)
     kept[0] = 0
-    return replace(seen, mask=kept[labels])
+    return replace(seen, mask=kept.take(labels))
 
 
 def _smoothed(light: Bytes, step: int, contrast: float) -> tuple[Levels, int]:
@@ -139,24 +166,28 @@ def _smoothed(light: Bytes, step: int, contrast: float) -> tuple[Levels, int]:
 
     Grey levels are kept in 1/32 where steps of one would show in the threshold; bytes are faster for the rest.
     """
-    even = cv2.copyMakeBorder(light, 0, -light.shape[0] % step, 0, -light.shape[1] % step, cv2.BORDER_REPLICATE)
+    down, right = -light.shape[0] % step, -light.shape[1] % step
+    even = cv2.copyMakeBorder(light, 0, down, 0, right, cv2.BORDER_REPLICATE) if down or right else light
     if contrast > _BYTE_CONTRAST:
         return np.asarray(cv2.GaussianBlur(even, (3, 3), 0), np.uint8), 1
     return np.asarray(cv2.GaussianBlur(even.astype(np.uint16) * np.uint16(32), (3, 3), 0), np.uint16), 32
 
 
-def _shrunk(smooth: Levels, step: int) -> Float32s:
+def _shrunk(smooth: L, step: int) -> L:
+    if smooth.dtype == np.uint8:
+        return cast(L, whole_averaged(cast(Bytes, smooth), step))
     size = (smooth.shape[1] // step, smooth.shape[0] // step)
-    return (cv2.resize(smooth, size, interpolation=cv2.INTER_AREA) if step > 1 else smooth).astype(np.float32)
+    return cast(L, cv2.resize(smooth, size, interpolation=cv2.INTER_AREA)) if step > 1 else smooth
 
 
-def _beside(small: Float32s, samples: float) -> Float32s:
-    """The level on which walls stand: what stays of `small` when all is taken away that is narrower than a cell.
+def _beside(small: Levels, samples: float, *, closed: bool) -> Float32s:
+    """The level on which walls stand: what stays of `small` when all is taken away that is narrower than a cell, and
+    brighter (with `closed`, darker).
 
     A morphological opening (Matheron): the highest of the lowest levels of all squares that hold a sample. A table's
     edge of light or shadow stays, for it stands out on one side only.
     """
-    return _opened(small, _odd(_BESIDE_PITCHES * samples - 1))
+    return _opened(small, _odd(_BESIDE_PITCHES * samples - 1), closed=closed).astype(np.float32)
 
 
 def _opened(light: L, size: int, *, closed: bool = False) -> L:
@@ -205,7 +236,7 @@ def _heights(height: Float32s, beside: Float32s, samples: float) -> tuple[Float3
     block's walls, so that the table's own texture stays below the threshold.
     """
     # Glints and dust would raise the threshold around them and wipe out faint walls nearby.
-    height = np.minimum(height, _typical_peak(height, samples))
+    np.minimum(height, _typical_peak(height, samples), out=height)
     square = height * height
     coarse = max(1, round(samples / 2))
     grid = (max(1, height.shape[1] // coarse), max(1, height.shape[0] // coarse))
@@ -214,9 +245,11 @@ def _heights(height: Float32s, beside: Float32s, samples: float) -> tuple[Float3
     region = cv2.resize(values / np.maximum(weight, 1e-3), height.shape[::-1], interpolation=cv2.INTER_LINEAR)
     near = _odd(1.3 * samples)
     # Means over a window of values weighted by the walls' height; 0 where there is none.
-    weight = np.maximum(_mean(height, near), 1e-3)
-    own = _mean(square, near) / weight
-    walls = _mean(beside * height, near)
+    weight = _mean(height, near)
+    np.maximum(weight, 1e-3, out=weight)
+    own = _mean(square, near)
+    own /= weight
+    walls = _mean(np.multiply(beside, height, out=square), near)
     walls /= weight
     walls += own
     walls -= beside

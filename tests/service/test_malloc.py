@@ -67,3 +67,27 @@ def test_what_one_block_kept_from_the_kernel_is_given_back() -> None:
     assert subprocess.run(
         [sys.executable, "-c", without], capture_output=True, text=True, check=True
     ).stdout.split() == ["False", "False"]
+
+
+KEPT_ARRAYS = """
+import resource, sys
+from service.malloc import keep_freed
+assert sys.argv[1] == "freely" or keep_freed()
+def faults():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for turn in range(12):
+    if turn == 2:
+        before = faults()
+    arrays = [bytearray(3_000_000 + 400_000 * turn) for _ in range(4)]
+    del arrays
+print(faults() - before)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="thresholds are glibc's")
+def test_freed_arrays_are_kept_for_the_next_ones() -> None:
+    kept, freely = (
+        int(subprocess.run([sys.executable, "-c", KEPT_ARRAYS, way], capture_output=True, text=True, check=True).stdout)
+        for way in ("kept", "freely")
+    )
+    assert kept < 0.5 * freely

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from contour.edge.border_beyond import border_beyond
+from contour.edge.border_beyond import _rays, border_beyond
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rings import Contour
 
@@ -115,3 +115,12 @@ def test_soft_borders_and_round_outlines_are_none() -> None:
     circle = np.column_stack([320 + 90 * np.cos(angle), 240 + 90 * np.sin(angle)])
     assert border_beyond(light, Contour(circle, ()), PITCH_PX) is None
     assert border_beyond(light, Contour(CORNERS[:3] * 0.05, ()), PITCH_PX) is None
+
+
+@pytest.mark.parametrize("degrees", [0.0, 7.0, 20.0, 33.0])
+def test_each_corner_is_one_whatever_the_last_bits(degrees: float) -> None:
+    rng, ring = np.random.default_rng(2), turned(CORNERS, degrees)
+    found = [_rays(ring + 1e-10 * rng.normal(size=ring.shape), 1.0, PITCH_PX).corner for _ in range(5)]
+    for corners in found:
+        assert len(corners) == 2 * len(ring)
+        assert np.abs(corners - found[0]).max() < 1e-6

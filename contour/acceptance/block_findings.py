@@ -196,7 +196,7 @@ def vague(traced: Trace | None) -> Finding | None:
         x, y = traced.untold_px
         return Finding(
             Refusal.UNCERTAINTY_TOO_LARGE,
-            f"Near ({x:.0f}, {y:.0f}) px the contour is round, yet the wall ends hardly tell it from a corner half a "
+            f"Near ({x:.0f}, {y:.0f}) px the wall ends hardly tell a round contour from one with a corner half a "
             "cell off. Look at the overlay; take away what lies against the block, and check light and focus.",
             (around(x, y, SHOWN_PITCHES * traced.pitch_px),),
         )

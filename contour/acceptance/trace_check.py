@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from contour.acceptance.bare_edge import comb_at_edge
@@ -93,15 +94,24 @@ def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:
 def _checked_edge(
     picture: Bytes, traced: Trace, pitch_px: float
 ) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None, EdgePart | None, EdgePart | None]:
-    """What is narrow, alike, bare, overrun and runs on of an edge, only where it was cut: closed cells are serrated."""
+    """What is narrow, alike, bare, overrun and runs on of an edge; the last alone where closed cells are serrated."""
+    runs_on = border_beyond(_planes(picture, traced.light), traced.contour, pitch_px)
     if traced.evidence is None:
-        return None, None, None, None, None
+        return None, None, None, None, runs_on
     return (
         narrow_feature(traced.contour, pitch_px),
         alike_edge(picture, traced.contour, pitch_px, dark=traced.polarity == "dark"),
         *comb_at_edge(traced, pitch_px),
-        border_beyond(traced.light, traced.contour, pitch_px),
+        runs_on,
     )
+
+
+def _planes(picture: Bytes, light: Bytes) -> list[Bytes]:
+    """Light, and how blue a picture in colour is rather than red: a sheet may be as light as the table, and warmer."""
+    if picture.ndim == 2:
+        return [light]
+    blue, red = (np.asarray(cv2.extractChannel(picture, channel)) for channel in (0, 2))
+    return [light, np.asarray(cv2.addWeighted(blue, 1.0, red, -1.0, 128.0), np.uint8)]
 
 
 def _bent(traced: Trace, pitch_px: float, rectifier: Rectifier | None) -> Contour:

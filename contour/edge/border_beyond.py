@@ -4,11 +4,12 @@ Walls end at the border of a tape or a sheet that lies over a block as they do a
 table, or takes a whole edge away, is told from it by nothing else: but its border mostly is longer than the block is
 wide there, and runs on past the corner that the outline makes. A table has no reason to change just there, along just
 that line. A block's own shadow has where light comes along an edge: then it is what lies on the other side that is
-darker than beside most of the block.
+darker than beside most of the block, and at one end of that edge alone.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,9 @@ _TURNS = np.tan(np.radians(np.arange(-8.0, 9.0, 2.0)))
 # The block is no nearer than that, pitches, looked at every so many places.
 _CLEAR, _EVERY = 0.35, 4
 # A step of light in the weakest part of a border: times the largest of others, times the noise, and grey levels.
-_OVER_OTHERS, _OVER_NOISE, _LEAST = 2.0, 2.5, 1.5
+_OVER_OTHERS, _OVER_NOISE, _LEAST = 2.0, 2.5, 1.0
+# Both ends of one edge run on along the same line: the cosine between them, and pitches across it; by so much more.
+_STRAIGHT, _ASIDE, _MORE = 0.99, 0.5, 1.4
 # Light on beside the border is that along the edge, within a share of the step; where it is looked at, pitches.
 _SAME, _BESIDE, _ALONG = 0.3, np.array([0.4, 0.5, 0.6]), np.arange(-3.0, -0.4, 0.1)
 
@@ -57,20 +60,22 @@ class _Rays:
         return np.asarray(self.origin.reshape(shape) + parts)
 
 
-def border_beyond(light: Bytes, contour: Contour, pitch_px: float) -> EdgePart | None:
-    """The clearest border in `light`, (H, W), that goes on from an edge of the contour past its corner: the length
-    looked at, and the corner. None where there is none.
+def border_beyond(planes: Sequence[Bytes], contour: Contour, pitch_px: float) -> EdgePart | None:
+    """The clearest border in planes of light, (H, W) each, that goes on from an edge of the contour past its corner:
+    the length looked at, and the corner. None where there is none.
 
     The contour's holes run the other way around than its exterior.
     """
     side = float(np.sign(signed_area(contour.exterior)))
-    found = [one for ring in contour.rings for one in _borders(light, ring, side, pitch_px)]
+    found = [one for ring in contour.rings for one in _borders(planes, ring, side, pitch_px)]
     if not found:
         return None
     return EdgePart(_SPACING * _PARTS * _OF_PART, max(found)[1])
 
 
-def _borders(light: Bytes, ring: Ring, side: float, pitch_px: float) -> list[tuple[float, tuple[float, float]]]:
+def _borders(
+    planes: Sequence[Bytes], ring: Ring, side: float, pitch_px: float
+) -> list[tuple[float, tuple[float, float]]]:
     """How far borders past corners of a ring stand out of the noise, and the corners."""
     rays = _rays(ring, side, pitch_px)
     if not len(rays.begin):
@@ -79,22 +84,44 @@ def _borders(light: Bytes, ring: Ring, side: float, pitch_px: float) -> list[tup
     ahead, out = rays.begin[:, None] + part, _ACROSS * pitch_px
     shape = (len(rays.begin), len(out), len(part))
     places = rays.at(np.broadcast_to(ahead[:, None], shape), np.broadcast_to(out[:, None], shape))
-    parts = sample_at(light, places[..., 0], places[..., 1]).reshape(*shape[:2], _PARTS, _OF_PART).mean(axis=3)
     middle = ahead.reshape(len(ahead), _PARTS, _OF_PART).mean(axis=2)
     hole = float(np.sign(signed_area(ring))) != side
     clear = _clear(rays, ring, middle, pitch_px, inside=hole)
-    step, at, turn, other = _clearest(parts, clear, middle / pitch_px)
-    noise = np.abs(np.diff(parts, axis=1)).mean(axis=(1, 2))
-    over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
-    line = at[:, None] * pitch_px + turn[:, None] * ahead
+    found = []
+    for light in planes:
+        parts = sample_at(light, places[..., 0], places[..., 1]).reshape(*shape[:2], _PARTS, _OF_PART).mean(axis=3)
+        step, at, turn, other = _clearest(parts, clear, middle / pitch_px)
+        noise = np.abs(np.diff(parts, axis=1)).mean(axis=(1, 2))
+        over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
+        if (over > 1.0).any():
+            line = at[:, None] * pitch_px + turn[:, None] * ahead
+            chosen = _of_things(light, rays, over, (ahead, line), _usual_light(light, ring, side * pitch_px), pitch_px)
+            found += [(float(over[k]), rays.corner[k]) for k in np.flatnonzero(chosen).tolist()]
+    return [(over, (float(x), float(y))) for over, (x, y) in found]
+
+
+def _of_things(
+    light: Bytes, rays: _Rays, over: Float64s, lines: tuple[Float64s, Float64s], usual: float, pitch_px: float
+) -> Bools:
+    """Which rays' borders, `over` the noise so many times, (R,), are those of things. lines: places ahead and out."""
+    ahead, line = lines
     outer, inner = (_mean_light(light, rays, ahead, line, sign * pitch_px) for sign in (1.0, -1.0))
     edge = np.broadcast_to(_ALONG * pitch_px, (len(rays.begin), len(_ALONG)))
     own = _mean_light(light, rays, edge, np.zeros_like(edge), pitch_px)
-    usual = _usual_light(light, ring, side * pitch_px)
     shadow = (inner < outer) & (np.abs(inner - usual) > np.abs(outer - usual))
-    chosen = (over > 1.0) & (np.abs(outer - own) < _SAME * np.abs(outer - inner)) & ~shadow
-    corners = rays.corner.tolist()
-    return [(float(over[k]), (corners[k][0], corners[k][1])) for k in np.flatnonzero(chosen).tolist()]
+    alone = (np.abs(outer - own) < _SAME * np.abs(outer - inner)) & ~shadow
+    twice = _at_both_ends(rays, np.where(over > _MORE, np.sign(outer - inner), 0.0), pitch_px)
+    return np.asarray(((over > 1.0) & alone) | twice)
+
+
+def _at_both_ends(rays: _Rays, sign: Float64s, pitch_px: float) -> Bools:
+    """Which rays have a border of the same sign, (R,), at the other end of their edge, on one line with it."""
+    one = np.arange(len(sign) // 2)
+    other = len(one) + np.roll(one, 1)  # from the corner before, backwards
+    straight = -(rays.along[one] * rays.along[other]).sum(axis=1) > _STRAIGHT
+    aside = np.abs(((rays.origin[one] - rays.origin[other]) * rays.across[other]).sum(axis=1))
+    both = straight & (aside < _ASIDE * pitch_px) & (sign[one] * sign[other] > 0.0)
+    return np.concatenate([both, np.roll(both, -1)])
 
 
 def _usual_light(light: Bytes, ring: Ring, out_px: float) -> float:

@@ -19,7 +19,7 @@ from contour.outline.labelling import label
 from contour.outline.lines_and_arcs import distance
 from contour.outline.missed_walls import overlooked, with_bounds
 from contour.outline.proposals import FEW, gather, propose, renewed
-from contour.outline.roundings import rounded
+from contour.outline.roundings import maybe_round, rounded
 from contour.outline.runs import Segments, around, fitted, runs
 from contour.outline.spread import Vertices, unseen_share, vertex_sigma
 from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
@@ -44,7 +44,7 @@ class FittedRing:
     outside. spread_px: robust standard deviation of the inliers. unseen_share: share of the outline farther than a
     pitch from every inlier, 0 to 1. vertex_sigma_px: standard deviation of each vertex (across a segment, or of a
     corner's place), shape (M,); it knows random errors only, so add a floor. segments: number of lines, arcs and
-    curves. untold: where it is round though hardly anything seen tells that it is no corner, shape (K, 2), raw pixels.
+    curves. untold: where hardly anything seen tells whether it is round or a corner, shape (K, 2), raw pixels.
     """
 
     ring: Ring
@@ -105,7 +105,9 @@ def _fitted(
     for chain in chains:
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
-    doubtful = untold(witnesses, segments, found, inlier, residual, chains)
+    doubtful = np.append(
+        untold(witnesses, segments, found, inlier, residual, chains), maybe_round(witnesses, segments, found, arcs)
+    )
     found = bevelled(witnesses, segments, found, inlier, material[:, 0] + 1j * material[:, 1])
     vertices = _vertices(witnesses, segments, found, chains)
     if len(vertices.ring) < 3:

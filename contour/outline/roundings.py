@@ -31,6 +31,9 @@ _UNLIKE = 2.0
 _TIGHTEST = 0.95
 # Witnesses of either edge that are looked at to tell whether it is worth the trouble.
 _NEXT = 6
+# A corner may as well be round where an arc that passes it by so many pitches costs no more than so many nats above it;
+# radii that are tried, times the least of these.
+_APART, _AS_WELL, _LARGER = 0.5, 2.5, np.geomspace(1.0, 4.0, 40)
 # A smaller turn is no corner, and about a larger one goes no arc, radians.
 LEAST_TURN, MOST_TURN = 0.3, 2.6
 
@@ -122,6 +125,18 @@ def rounded(witnesses: Witnesses, segments: Segments, found: Joints) -> tuple[Se
     return ring.segments, ring.found, ring.made
 
 
+def maybe_round(witnesses: Witnesses, segments: Segments, found: Joints, made: Bools) -> Complexes:
+    """Corners between straight edges that may as well be round, shape (K,), in the fitting plane."""
+    places = []
+    for corner in _corners(witnesses, _Ring(segments, found, made), (0,)):
+        if segments.bend[[corner.k, corner.after]].any() or corner.unexplained + corner.fixed < -_AS_WELL:
+            continue
+        least = _APART * witnesses.pitch_px / (1.0 / np.cos(0.5 * corner.turn) - 1.0)
+        if _arcs(witnesses, corner, np.copysign(least * _LARGER, corner.turn)).gain.max() > -_AS_WELL:
+            places.append(corner.near)
+    return np.array(places, np.complex128)
+
+
 def _common_radius(witnesses: Witnesses, ring: _Ring, sign: float) -> float | None:
     """Radius that the remaining corners of one sense share with each other or with those that were rounded, negative
     for reflex ones; None where they are better left as they are.
@@ -185,7 +200,8 @@ def _best_arc(witnesses: Witnesses, corner: _Corner) -> _Arcs | None:
     for finer in (*_FINER, None):
         arcs = _arcs(witnesses, corner, radii)
         best = int(arcs.gain.argmax())
-        if arcs.gain[best] <= 0.0:
+        # Between straight edges radii that are tried first may well lie on both sides of one that is told.
+        if arcs.gain[best] <= 0.0 and (finer is None or corner.edges.curvature.any()):
             return None
         if finer is not None:
             radii = radii[best] * finer

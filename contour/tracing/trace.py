@@ -45,7 +45,7 @@ class Trace:
     `reaches_frame`: its walls go on to the last pixels of what was looked at.
     `evidence`: what the contour rests on, stretches without gaps along each ring, and `look` what lies about it; None
     where the method does not say.
-    `untold_px`: where (x, y) it is round though hardly anything seen tells that it is no corner; None where nowhere.
+    `untold_px`: where (x, y) hardly anything seen tells whether it is round or a corner; None where nowhere.
     """
 
     method: Method

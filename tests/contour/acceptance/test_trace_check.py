@@ -149,5 +149,16 @@ def test_no_border_of_a_mirrored_block_goes_on_past_its_corner() -> None:
     rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
     traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
     assert traced.pitch_px is not None
-    assert border_beyond(traced.light, traced.contour, traced.pitch_px) is not None
+    assert border_beyond([traced.light], traced.contour, traced.pitch_px) is not None
     assert check_trace(rendered.picture, traced, rectifier).runs_on is None
+
+
+def test_a_sheet_whose_border_runs_on_is_told_beside_closed_cells_too_and_where_its_colour_alone_differs() -> None:
+    picture = np.full((300, 400, 3), 60, np.uint8)
+    picture[:150, :, 0] += 6  # a sheet that is hardly bluer, over all that lies above
+    picture[151:251, 120:281] = 150
+    outline = Contour(np.array([[119.5, 150.5], [119.5, 250.5], [280.5, 250.5], [280.5, 150.5]]))
+    light = np.asarray(picture[:, :, 2].copy())
+    for edge, evidence in (("cells", None), ("cut", ())):
+        traced = Trace("wall-tips", "bright", 16.0, outline, light, evidence=evidence, edge=edge)
+        assert check_trace(picture, traced, None).runs_on is not None

@@ -66,26 +66,26 @@ def test_a_thing_whose_border_runs_on_past_a_corner_is_told_there(
     thing: Float64s, levels: float, degrees: float
 ) -> None:
     light, contour = block_on_table((thing, levels), degrees=degrees)
-    found = border_beyond(light, contour, PITCH_PX)
+    found = border_beyond([light], contour, PITCH_PX)
     assert found is not None
     corners = turned(CORNERS[:2], degrees)
     assert np.hypot(*(corners - found.place_px).T).min() < 0.5 * PITCH_PX
     reversed_way = Contour(contour.exterior[::-1].copy(), ())
-    assert border_beyond(light, reversed_way, PITCH_PX) is not None
+    assert border_beyond([light], reversed_way, PITCH_PX) is not None
 
 
 def test_it_is_told_in_a_hole_too() -> None:
     across = box(LEFT, TOP + 70, RIGHT, TOP + 180)  # over one end of the hole, and the walls behind it
     light, contour = block_on_table(hole=True)
-    assert border_beyond(light, contour, PITCH_PX) is None
+    assert border_beyond([light], contour, PITCH_PX) is None
     cut = Contour(contour.exterior, (turned(box(LEFT, TOP, RIGHT, TOP + 70)[::-1], 20.0),))
-    assert border_beyond(light, cut, PITCH_PX) is None
+    assert border_beyond([light], cut, PITCH_PX) is None
     dent = np.array(
         [[LEFT, TOP], [RIGHT, TOP], [RIGHT, TOP + 70], [LEFT + 90, TOP + 70], [LEFT + 90, BOTTOM], [LEFT, BOTTOM]]
     )
     light, contour = block_on_table((across, 6.0), hole=True)
     beside = Contour(contour.exterior, (turned(dent[::-1], 20.0),))
-    found = border_beyond(light, beside, PITCH_PX)
+    found = border_beyond([light], beside, PITCH_PX)
     assert found is not None
     assert np.hypot(*(turned(np.array([[LEFT + 90, TOP + 70]]), 20.0)[0] - found.place_px)) < 0.5 * PITCH_PX
 
@@ -103,18 +103,34 @@ def test_it_is_told_in_a_hole_too() -> None:
 )
 def test_what_is_no_edge_going_on_is_not_told(thing: tuple[Float64s, float]) -> None:
     light, contour = block_on_table(thing)
-    assert border_beyond(light, contour, PITCH_PX) is None
+    assert border_beyond([light], contour, PITCH_PX) is None
+
+
+def test_a_border_beyond_both_ends_of_an_edge_is_told_where_light_falls_off_along_it() -> None:
+    """A sheet over all of one side, dimmer towards the right; over one corner alone it may be the table's own light."""
+    falls = np.linspace(1.0, 0.4, 640) + 0.0 * np.arange(480)[:, None]
+    for thing, told in ((ALONG_TOP, True), (BESIDE_TOP_RIGHT, False)):
+        light, contour = block_on_table((thing, 6.0), degrees=0.0)
+        dimmed = [np.rint(np.where(light > 100, light, falls * light)).astype(np.uint8)]
+        assert (border_beyond(dimmed, contour, PITCH_PX) is not None) == told
+
+
+def test_a_thing_of_another_colour_is_told_in_the_plane_that_shows_it() -> None:
+    plain, contour = block_on_table()
+    blue, _ = block_on_table((ALONG_TOP, 8.0))
+    assert border_beyond([plain], contour, PITCH_PX) is None
+    assert border_beyond([plain, blue, plain], contour, PITCH_PX) is not None
 
 
 def test_soft_borders_and_round_outlines_are_none() -> None:
     light, contour = block_on_table((ALONG_TOP, -4.0))
     soft = cv2.GaussianBlur(light, (0, 0), 1.2 * PITCH_PX)
     ramp = np.where(light > 0.5 * (TABLE + WALLS), light, soft).astype(np.uint8)
-    assert border_beyond(ramp, contour, PITCH_PX) is None
+    assert border_beyond([ramp], contour, PITCH_PX) is None
     angle = np.linspace(0.0, 2.0 * np.pi, 90, endpoint=False)
     circle = np.column_stack([320 + 90 * np.cos(angle), 240 + 90 * np.sin(angle)])
-    assert border_beyond(light, Contour(circle, ()), PITCH_PX) is None
-    assert border_beyond(light, Contour(CORNERS[:3] * 0.05, ()), PITCH_PX) is None
+    assert border_beyond([light], Contour(circle, ()), PITCH_PX) is None
+    assert border_beyond([light], Contour(CORNERS[:3] * 0.05, ()), PITCH_PX) is None
 
 
 @pytest.mark.parametrize("degrees", [0.0, 7.0, 20.0, 33.0])

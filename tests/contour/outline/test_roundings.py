@@ -71,6 +71,27 @@ def test_an_arc_that_several_ends_tell_is_no_corner(pitches: float, seed: int) -
     assert not len(fitted(witnesses(one_round_corner(pitches), seed=seed, sigma=0.25)).untold)
 
 
+@pytest.mark.parametrize(("pitches", "seed"), [(2.2, 0), (2.4, 1)])
+def test_a_radius_between_those_that_are_tried_first_is_found(pitches: float, seed: int) -> None:
+    """Of which the corner had been drawn 0.8 of a cell outside of the block."""
+    truth = one_round_corner(pitches)
+    assert errors(fitted(witnesses(truth, seed=seed, sigma=0.25)).ring, truth).max() < 0.1 * PITCH
+
+
+@pytest.mark.parametrize("seed", [0, 2])  # of which the fit makes a corner
+def test_a_corner_that_may_as_well_be_round_half_a_cell_within_is_untold(seed: int) -> None:
+    found = fitted(witnesses(one_round_corner(1.4), seed=seed, sigma=0.25))
+    assert np.hypot(*(found.ring - 300.0).T).min() < 0.1 * PITCH
+    (place,) = found.untold
+    assert np.hypot(*(place - 300.0)) < 0.1 * PITCH
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_corner_up_to_which_walls_end_is_told(seed: int) -> None:
+    truth = rectangle(12.0 * PITCH, 9.0 * PITCH)
+    assert not len(fitted(witnesses(truth, seed=seed, sigma=0.25)).untold)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_small_arcs_that_are_alike_tell_each_other(seed: int) -> None:
     truth = with_round_corners(rectangle(12.0 * PITCH, 9.0 * PITCH), 1.5 * PITCH)

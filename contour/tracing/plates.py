@@ -72,14 +72,15 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
         lines = touched_cuts(material, pitch_px, alike=True)
         if not lines:
             return material, "cells"
-    if not lines and holes.circled <= _ROUND:
-        # Teeth of a print's closed cells, which are not told from holes: a sheet is drilled within straight edges.
-        return None
-    if len(lines) != 1:
+    if len(lines) > 1:
         return None, "cut"
+    # Fine cells that may as well be a print's have teeth, which look open as well.
+    elsewhere: tuple[None, Edge] | None = (None, "cut") if holes.circled > _ROUND else None
+    if not lines:
+        return elsewhere
     cuts = np.array([_along_webs(material.contour.rings, cut) for cut in lines[0]])
     closed = closed_along(material, cuts, pitch_px)
-    return (None, "cut") if len(_bays(closed.apart.region, _LARGE_BAY, pitch_px)[0]) else (closed, "mixed")
+    return elsewhere if len(_bays(closed.apart.region, _LARGE_BAY, pitch_px)[0]) else (closed, "mixed")
 
 
 @dataclass(frozen=True)

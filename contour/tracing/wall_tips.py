@@ -73,10 +73,11 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
         return plate
     if plate is not None:
         seen = plate
-    if may_be_closed(seen):
+    # Webs end all around a sheet that was cut along more than one line, or show no ends.
+    if plate is None and may_be_closed(seen):
         closed, kind = _if_closed(solid, seen)
-        # A sheet whose holes are open is not closed. And where something hides the border no walls end either.
-        if not (plate is not None and kind == "cells") and (kind != "mixed" or not doubtful(seen.rings[0], look).any()):
+        # Where something hides the border no walls end either.
+        if kind != "mixed" or not doubtful(seen.rings[0], look).any():
             check_promise(promise, kind, traced=closed is not None)
             if closed is not None:
                 return closed

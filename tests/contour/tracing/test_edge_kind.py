@@ -133,11 +133,6 @@ def test_such_a_cut_runs_to_the_last_thing_that_touches_its_line() -> None:
     assert agreement(back, one.outline).hausdorff_px < 0.3 * one.pitch_px
 
 
-def test_one_end_among_fine_triangles_is_a_cut() -> None:
-    with pytest.raises(EdgeContradicted, match="was cut there"):
-        traced(lattice(1051004, "triangular", "mixed"))
-
-
 def test_a_border_of_both_kinds_does_not_hold_the_promise_that_it_was_cut() -> None:
     with pytest.raises(EdgeContradicted, match="was cut there"):
         traced(drawn("hexagonal", "mixed"), "cut")
@@ -164,6 +159,8 @@ def test_closed_cells_that_were_cut_along_a_curve_are_refused() -> None:
         (1081009, "triangular", "cut", "cut"),
         (1081001, "square", "mixed", "mixed"),
         (1084011, "triangular", "mixed", "mixed"),
+        (1051004, "triangular", "mixed", "mixed"),
+        (1085039, "round", "cut", "cut"),
     ],
     ids=[
         "a row that waves",
@@ -174,6 +171,8 @@ def test_closed_cells_that_were_cut_along_a_curve_are_refused() -> None:
         "rows of shallow teeth on several sides",
         "a wall that ends short of the cut",
         "fine triangles",
+        "one end among fine triangles",
+        "a sheet cut along four lines",
     ],
 )
 def test_borders_that_were_once_mistaken_are_told_and_traced(

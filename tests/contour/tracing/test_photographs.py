@@ -21,7 +21,7 @@ LEAST_IOU = {
     "protoboard_10x5": 0.98,
 }
 # A strip three cells wide, and a core between bars and others of its kind: no outline of theirs is found.
-REFUSED = {"nomex_coupon": Reason.NO_BLOCK_FOUND, "nomexfin_dense": Reason.IMAGE_QUALITY}
+REFUSED = {"nomex_coupon": Reason.NO_BLOCK_FOUND, "nomexfin_dense": Reason.TOUCHES_BORDER}
 
 
 def photograph_of(name: str) -> Photograph:

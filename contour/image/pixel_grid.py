@@ -10,9 +10,9 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes, Float64s, Int64s
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int64s
 
-Values = TypeVar("Values", Bytes, Bools)
+Values = TypeVar("Values", Bytes, Bools, Float32s)
 
 
 def pixels_of(samples: Float64s | Int64s, step: int) -> Float64s:

@@ -33,6 +33,8 @@ _ALONG, _ALONG_SHORT = 0.38, 0.6
 # directions, those on it lie; the best lines of all that are looked at; how long one is at the least, and how far one
 # is followed beyond the last place.
 _MERGED, _PLACES, _ON_LINE, _DIRECTIONS, _BEST, _LEAST_LINE, _BEYOND = 1.5, 3.0, 0.6, 60, 6, 4.0, 6.0
+# Half a step of such a line is left over at each end.
+_END = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +88,13 @@ def parted_by_row(free: Openings) -> Parted | None:
         one, first = divmod(number, wide)
         on = (strip[:, one] == first) | (strip[:, one] == first + 1)
         lines.append(_line(free, place[on], normal[:, one]))
-    share, start, stop, across = max(lines, key=lambda line: line[0])
-    return _beside(free, share, start, stop, across) if share > _ALONG_SHORT else None
+    share, start, stop = max(lines, key=lambda line: line[0])
+    return _beside(free, share, start, stop) if share > _ALONG_SHORT else None
 
 
-def _line(free: Openings, place: Float64s, normal: Float64s) -> tuple[float, Float64s, Float64s, Float64s]:
+def _line(free: Openings, place: Float64s, normal: Float64s) -> tuple[float, Float64s, Float64s]:
     """Of a line through places (K, 2), pitches, by its unit `normal`: the stretch from outline to outline along which
-    most of it has such a place beside it, how much that is, its ends, and the normal.
+    most of it has such a place beside it, how much that is, and its ends.
     """
     along = np.array([-normal[1], normal[0]])
     at = place @ along
@@ -106,20 +108,23 @@ def _line(free: Openings, place: Float64s, normal: Float64s) -> tuple[float, Flo
     stretches = [
         (float(np.mean(covered[a:b])), line[a], line[b - 1]) for a, b in ends.tolist() if b - a > 2.0 * _LEAST_LINE
     ]
-    return (*max(stretches, key=lambda one: one[0], default=(0.0, line[0], line[0])), normal)
+    return max(stretches, key=lambda one: one[0], default=(0.0, line[0], line[0]))
 
 
-def _beside(free: Openings, share: float, start: Float64s, stop: Float64s, normal: Float64s) -> Parted:
-    """What lies on the normal's side of a line from start to stop, pitches."""
+def _beside(free: Openings, share: float, start: Float64s, stop: Float64s) -> Parted | None:
+    """What a line from start to stop, pitches, parts from the rest of the block; None where that is nothing, as between
+    a hole and the edge.
+    """
     every = max(1, int(free.pitch / _SAMPLES))
-    high, wide = free.depth[::every, ::every].shape
-    x, y = np.meshgrid(np.arange(wide), np.arange(high))
-    place = np.stack([x, y], axis=2) * (every / free.pitch) - start
-    out = place @ normal
-    on = np.clip(place @ (stop - start) / ((stop - start) @ (stop - start)), 0.0, 1.0)
-    away = np.hypot(*np.moveaxis(place - on[:, :, None] * (stop - start), 2, 0)).astype(np.float32)
-    shape = free.numbers.shape
-    return Parted(share, enlarged(out > 0.0, every, shape), enlarged(away, every, shape))
+    depth, pitch = free.depth[::every, ::every], free.pitch / every
+    along = (stop - start) / np.hypot(*(stop - start))
+    first, last = (np.rint(end * pitch).astype(int).tolist() for end in (start - _END * along, stop + _END * along))
+    off_line = cv2.line(np.ones(depth.shape, np.uint8), first, last, 0, 1, cv2.LINE_4) > 0
+    part = next(_pieces((depth > OPENED) & off_line, _LEAST_PART * np.count_nonzero(depth)), None)
+    if part is None:
+        return None
+    away, shape = _away(off_line) / np.float32(pitch), free.numbers.shape
+    return Parted(share, enlarged(part, every, shape), enlarged(away, every, shape))
 
 
 def _parts(free: Openings) -> Iterator[Parted]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes
 from contour.image.pixel_grid import averaged, pixels_of
-from contour.seams.both_sides import comb_along, likewise
+from contour.seams.both_sides import cell_order, comb_along
 from contour.seams.openings import Openings, openings
 from contour.seams.parting import LONG, Parted, parted, parted_by_row, runs_along
 from contour.walls.pieces import Piece
@@ -24,10 +24,9 @@ from contour.walls.wall_evidence import BlockEvidence
 # Pixels a sample, if walls are two samples wide and more. Where an opening is long and yet parts nothing, pixels are
 # looked at: in these walls that end beside each other touch less often.
 _STEP = 2
-# How often the step from cell to cell leads to cells across a seam at the most, of how often it does in comb: of 60
-# seams 0.51 and less, but for three whose blocks lie alike by chance (0.68 to 0.79); across lines through accepted
-# single blocks, drawn anywhere, 0.62 and more in 599 of 600, 0.54 once.
-_OTHER_ORDER = 0.5
+# How much of a line runs along openings that part two blocks whose cells lie in one order: of those that lie alike by
+# chance, and of halves that were left where they were cut, all of it; of single blocks with such openings 0.88.
+_ALL_ALONG = 0.95
 
 
 def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
@@ -43,25 +42,20 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
             return _smaller(free, found.part, walls.scale) if sure else None
         if step == coarse:
             row = parted_by_row(free)
-            if row is not None and _other_order(free, row) and comb_along(_light(walls, seen, free), free, row):
+            if row is not None and cell_order(free, row).other and comb_along(_light(walls, seen, free), free, row):
                 return _smaller(free, row.part, walls.scale)
         if free.long.max(initial=0.0) < LONG:
             return None
     return None
 
 
-def _other_order(free: Openings, found: Parted) -> bool:
-    """Whether cells lie in good order on both sides of a line, and not in the same."""
-    share = likewise(free, found)
-    return share is not None and share < _OTHER_ORDER
-
-
 def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:
     """Whether cells lie in another order on both sides of a line along long openings, or else no faint walls lead
-    across.
+    across. One block that was cut in two lies in one order: there openings must run all along.
     """
-    if _other_order(free, found):
-        return True
+    order = cell_order(free, found)
+    if order.other or (order.same and found.along < _ALL_ALONG):
+        return order.other
     assert seen.mask is not None
     faint = np.asarray(cv2.bitwise_or(seen.mask, walls.mask.faint()), np.uint8)
     return runs_along(openings(walls, seen, faint, free.step), found)

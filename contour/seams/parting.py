@@ -32,7 +32,7 @@ _ALONG, _ALONG_SHORT = 0.38, 0.6
 # Longer than single cells by this; places in them that are looked at, a pitch; how far from a line, in so many
 # directions, those on it lie; the best lines of all that are looked at; how long one is at the least, and how far one
 # is followed beyond the last place.
-_MERGED, _PLACES, _ON_LINE, _DIRECTIONS, _BEST, _LEAST_LINE, _BEYOND = 1.5, 3.0, 0.6, 60, 6, 4.0, 6.0
+_MERGED, _PLACES, _ON_LINE, _DIRECTIONS, _BEST, _LEAST_LINE, _BEYOND = 1.5, 3.0, 0.6, 60, 4, 4.0, 6.0
 # Half a step of such a line is left over at each end.
 _END = 0.5
 

@@ -126,6 +126,22 @@ def several_blocks(traced: Trace | None, limits: Limits) -> Finding | None:
     )
 
 
+def parted(traced: CheckedTrace | None) -> Finding | None:
+    """A seam through the traced block."""
+    part = None if traced is None else traced.trace.parted
+    if traced is None or part is None:
+        return None
+    left, top, right, bottom = part.box_px
+    rest = area(traced.trace.contour) - part.area_px2
+    return Finding(
+        Refusal.SEVERAL_BLOCKS,
+        f"Hardly any walls lead from {part.area_px2:.0f} px² of the traced block (x {left} to {right}, y {top} to "
+        f"{bottom} px) to the other {rest:.0f} px²: two blocks seem to lie against each other. Leave one on the table, "
+        "or more than a cell between them, or set max_disagreement_pitches: 0 for blocks with such a seam.",
+        (closed(part.outline_px),),
+    )
+
+
 def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | None:
     """Contour and busy picture farther apart than `limit` pitches, or an edge that is none of a block."""
     if traced is None or traced.disagreement is None or limit is None:

@@ -10,14 +10,14 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes, Float64s, Int64s
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int64s
 
 _SAMPLES_PER_PITCH = 6.5
 """They hold a wall's place and make every later pass cheap."""
 _BLURRED = (3, 5)
 """Means over so many pixels are had from those about all of them in half the time, and of odd numbers round alike."""
 
-Values = TypeVar("Values", Bytes, Bools)
+Values = TypeVar("Values", Bytes, Bools, Float32s)
 
 
 def coarse_step(pitch_px: float) -> int:

@@ -46,6 +46,7 @@ class Trace:
     `evidence`: what the contour rests on, stretches without gaps along each ring, and `look` what lies about it; None
     where the method does not say.
     `untold_px`: where (x, y) hardly anything seen tells whether it is round or a corner; None where nowhere.
+    `parted`: the smaller of two parts of it between which no walls lead; None where it is one.
     """
 
     method: Method
@@ -61,10 +62,12 @@ class Trace:
     evidence: tuple[Stretch, ...] | None = None
     look: TableLook | None = field(default=None, compare=False, repr=False)
     untold_px: tuple[float, float] | None = None
+    parted: Piece | None = None
 
     def moved(self, first: Float64s) -> Trace:
         """The trace in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
         others = tuple(piece.moved(x, y) for piece in self.others)
         untold = None if self.untold_px is None else (self.untold_px[0] + x, self.untold_px[1] + y)
-        return replace(self, contour=shifted(self.contour, first), others=others, untold_px=untold)
+        parted = None if self.parted is None else self.parted.moved(x, y)
+        return replace(self, contour=shifted(self.contour, first), others=others, untold_px=untold, parted=parted)

@@ -16,6 +16,7 @@ from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.outline.uncertainty import uncertainty
+from contour.seams.seam import parted_by_seam
 from contour.tracing.closed_cells import MaterialEdge, material_edge
 from contour.tracing.cut_lines import touched_cuts, with_cuts
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed, tooth_px
@@ -84,7 +85,8 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
     try:
-        return _cut_or_mirrored(picture, light, walls, (seen, look), rectifier, on_stage)
+        found = _cut_or_mirrored(picture, light, walls, (seen, look), rectifier, on_stage)
+        return replace(found, parted=parted_by_seam(walls, seen))
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
         closed = None if promise == "cut" or plate is not None else _if_closed(solid, seen)[0]

@@ -116,7 +116,7 @@ def see_block(
     evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))
-    return replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose)
+    return replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose, mask=seen.mask)
 
 
 def _scale(light: Bytes, cells: CellScale) -> int:

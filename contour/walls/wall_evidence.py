@@ -101,6 +101,7 @@ class BlockEvidence:
     others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
     pixels. comb: what its cells look like. clipped: share of its witnesses beside which light is at full scale. loose:
     walls of small pieces that were told from it, however near they lie, uint8, 255 there, on a grid over the picture.
+    mask: all other walls, on the same grid.
     """
 
     rings: tuple[RingEvidence, ...]
@@ -116,3 +117,4 @@ class BlockEvidence:
     reaches_frame: bool = False
     comb: Comb | None = None
     loose: Bytes | None = None
+    mask: Bytes | None = None

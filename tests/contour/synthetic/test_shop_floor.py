@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from contour.geometry.rings import densified
 from contour.synthetic import (
     CellGeometry,
     Clutter,
@@ -83,7 +84,10 @@ def undisturbed():
     return render(small("undisturbed", 5))
 
 
-@pytest.mark.parametrize("kind", [kind for kind in (*KINDS, *LATER) if kind != "undisturbed"])
+OTHER_BLOCKS = {"undisturbed", "pushed_together"}
+
+
+@pytest.mark.parametrize("kind", [kind for kind in (*KINDS, *LATER) if kind not in OTHER_BLOCKS])
 def test_every_kind_changes_the_picture_and_hides_the_edge_or_not(undisturbed, kind):
     plain, done = undisturbed, render(small(kind, 5))
     before, after = (p if p.ndim == 2 else p.mean(axis=2) for p in (plain.picture, done.picture))
@@ -92,6 +96,14 @@ def test_every_kind_changes_the_picture_and_hides_the_edge_or_not(undisturbed, k
     assert [len(seen) for seen in done.visible] == [len(ring) for ring in done.truth_px.rings]
     assert (not all(seen.all() for seen in done.visible)) == (kind in HIDING)
     assert sum(seen.sum() for seen in done.visible) > 0.4 * sum(map(len, done.visible))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_blocks_that_are_pushed_together_lie_within_a_cell_of_each_other_and_never_over_each_other(seed):
+    scene = shop_floor_scene("pushed_together", seed, alone=True).scene
+    (other,) = scene.things
+    nearest = signed_distance(scene.outline, densified(other.outline.exterior, 0.1)).max() / scene.cells.pitch_mm
+    assert -0.9 < nearest < 0.01
 
 
 def test_the_same_kind_and_seed_give_the_same_bytes_and_another_seed_does_not():

@@ -76,7 +76,7 @@ def shop_floor_block(seed: int) -> Scene:
         seed=seed,
         name=f"floor-{seed}",
     )
-    return quiet(_placed(rng, scene), LEAST_CONTRAST)
+    return quiet(placed(rng, scene), LEAST_CONTRAST)
 
 
 def _outline(rng: np.random.Generator, across: float, seed: int, radius: float) -> Contour:
@@ -223,7 +223,7 @@ def _sensor(rng: np.random.Generator, pitch_px: float, coloured: bool) -> Sensor
     )
 
 
-def _placed(rng: np.random.Generator, scene: Scene) -> Scene:
+def placed(rng: np.random.Generator, scene: Scene) -> Scene:
     """The scene with its block somewhere in the picture, shrunk until it keeps the border."""
     camera, outline = scene.camera, scene.outline
     corner = np.array([camera.width - 1, camera.height - 1])

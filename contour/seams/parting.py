@@ -1,0 +1,165 @@
+"""Lines that part a block: along long openings, whatever their form, and straight ones along many short openings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median
+from contour.image.pixel_grid import averaged, enlarged
+from contour.seams.openings import OPENED, Openings
+
+# Pitches. Of 150 single blocks without compound, ink or splice the longest opening is 2 to 4 cells long, where walls
+# are broken or dim; moved and faded ones have up to 5.8.
+LONG, _SHORT = 4.2, 2.5
+# So many samples a pitch tell what is parted.
+_SAMPLES = 6.0
+# Openings of one seam are no farther apart than twice this; and no nearer to the outline one ends, where cells of both
+# blocks happen to close it.
+_LINK, NEAR_OUTLINE = 1.25, 1.6
+# What is less of the block than this is no part.
+_LEAST_PART = 0.02
+# How near to long openings a line lies where it runs along them; and what counts for the line itself.
+_BY, _ON_IT = 0.5, 0.2
+# How much of the line runs along openings: of 103 seams 0.62 and more along long ones, in 120 single blocks without a
+# splice 0.18 at most, but for one whose walls are lost. Along short ones, which cells that run into each other make by
+# chance as well, seams whose blocks touch have 0.7 and more.
+_ALONG, _ALONG_SHORT = 0.38, 0.6
+# Longer than single cells by this; places in them that are looked at, a pitch; how far from a line, in so many
+# directions, those on it lie; the best lines of all that are looked at; how long one is at the least, and how far one
+# is followed beyond the last place.
+_MERGED, _PLACES, _ON_LINE, _DIRECTIONS, _BEST, _LEAST_LINE, _BEYOND = 1.5, 3.0, 0.6, 60, 4, 4.0, 6.0
+# Half a step of such a line is left over at each end.
+_END = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Parted:
+    """A part of the block, (h, w): how much of the line that parts it from the rest runs along openings, and the
+    distance from that line, (h, w), pitches.
+    """
+
+    along: float
+    part: Bools
+    away: Float32s
+
+
+def parted(free: Openings) -> Parted | None:
+    """The part of a block that long openings part most surely from the rest; None where they part none."""
+    if free.long.max(initial=0.0) < LONG:
+        return None
+    found = max(_parts(free), key=lambda one: one.along, default=None)
+    return found if found is not None and found.along > _ALONG else None
+
+
+def runs_along(free: Openings, found: Parted) -> bool:
+    """Whether a line that was found among others runs along long openings."""
+    if free.long.max(initial=0.0) < LONG:
+        return False
+    near = _away(free.long[free.numbers] < LONG) < _BY * free.pitch
+    return float(np.mean(near[(found.away < _ON_IT) & (free.depth > NEAR_OUTLINE)])) > _ALONG
+
+
+def parted_by_row(free: Openings) -> Parted | None:
+    """The part of a block on one side of a straight line along merged cells; None where none runs along many."""
+    usual = median(free.long[free.cells]) if free.cells.any() else np.inf
+    every = max(1, int(free.pitch / _PLACES))
+    numbers = free.numbers[every // 2 :: every, every // 2 :: every]
+    row, column = np.nonzero((free.long > _MERGED * usual)[numbers])
+    if not len(row):
+        return None
+    place = np.column_stack([column, row]) * (every / free.pitch)
+    turn = np.arange(_DIRECTIONS) * (math.pi / _DIRECTIONS)
+    normal = np.stack([np.cos(turn), np.sin(turn)])
+    strip = np.floor((place @ normal) / _ON_LINE).astype(np.intp)
+    strip -= strip.min()
+    wide = int(strip.max()) + 2
+    # Long openings count for more: of two cells each there are as many in a row through a large block as along a seam.
+    weight = np.repeat(free.long[numbers[row, column]] - usual, _DIRECTIONS)
+    cell = (np.arange(_DIRECTIONS) * wide + strip).ravel()
+    total = np.bincount(cell, weight, _DIRECTIONS * wide)
+    total[:-1] += total[1:]
+    lines = []
+    for number in np.argsort(total)[: -_BEST - 1 : -1].tolist():
+        one, first = divmod(number, wide)
+        on = (strip[:, one] == first) | (strip[:, one] == first + 1)
+        lines.append(_line(free, place[on], normal[:, one]))
+    share, start, stop = max(lines, key=lambda line: line[0])
+    return _beside(free, share, start, stop) if share > _ALONG_SHORT else None
+
+
+def _line(free: Openings, place: Float64s, normal: Float64s) -> tuple[float, Float64s, Float64s]:
+    """Of a line through places (K, 2), pitches, by its unit `normal`: the stretch from outline to outline along which
+    most of it has such a place beside it, how much that is, and its ends.
+    """
+    along = np.array([-normal[1], normal[0]])
+    at = place @ along
+    first, count = float(at.min()) - _BEYOND, int(np.ptp(at) + 2.0 * _BEYOND) * 2
+    line = float(np.mean(place @ normal)) * normal + (first + 0.5 * np.arange(count))[:, None] * along
+    column, row = np.rint(line * free.pitch).astype(np.intp).T
+    inside = (column >= 0) & (row >= 0) & (column < free.depth.shape[1]) & (row < free.depth.shape[0])
+    inside[inside] = free.depth[row[inside], column[inside]] > OPENED
+    covered = np.bincount(np.rint(2.0 * (at - first)).astype(np.intp), minlength=count)[:count] > 0
+    ends = np.flatnonzero(np.diff(np.r_[False, inside, False].astype(np.int8))).reshape(-1, 2)
+    stretches = [
+        (float(np.mean(covered[a:b])), line[a], line[b - 1]) for a, b in ends.tolist() if b - a > 2.0 * _LEAST_LINE
+    ]
+    return max(stretches, key=lambda one: one[0], default=(0.0, line[0], line[0]))
+
+
+def _beside(free: Openings, share: float, start: Float64s, stop: Float64s) -> Parted | None:
+    """What a line from start to stop, pitches, parts from the rest of the block; None where that is nothing, as between
+    a hole and the edge.
+    """
+    every = max(1, int(free.pitch / _SAMPLES))
+    depth, pitch = free.depth[::every, ::every], free.pitch / every
+    along = (stop - start) / np.hypot(*(stop - start))
+    first, last = (np.rint(end * pitch).astype(int).tolist() for end in (start - _END * along, stop + _END * along))
+    off_line = cv2.line(np.ones(depth.shape, np.uint8), first, last, 0, 1, cv2.LINE_4) > 0
+    part = next(_pieces((depth > OPENED) & off_line, _LEAST_PART * np.count_nonzero(depth)), None)
+    if part is None:
+        return None
+    away, shape = _away(off_line) / np.float32(pitch), free.numbers.shape
+    return Parted(share, enlarged(part, every, shape), enlarged(away, every, shape))
+
+
+def _parts(free: Openings) -> Iterator[Parted]:
+    """Parts of the block that openings part from the rest of it: long ones alone, and with shorter ones."""
+    every = max(1, int(free.pitch / _SAMPLES))
+    depth, pitch = free.depth[::every, ::every], free.pitch / every
+    inside, shape = depth > NEAR_OUTLINE, free.numbers.shape
+    longest, longer = (
+        _away(averaged(np.where(free.long >= least, np.uint8(255), np.uint8(0))[free.numbers], every) == 0) / pitch
+        for least in (LONG, _SHORT)
+    )
+    for away in (longest, longer):
+        for part in _pieces(inside & (away > _LINK), _LEAST_PART * np.count_nonzero(depth)):
+            border = cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((2, 2), np.uint8))
+            line = inside & (border > 0)
+            if line.any():
+                along = float(np.mean(longest[line] < _BY))
+                apart = _away(~line) / np.float32(pitch)
+                yield Parted(along, enlarged(part, every, shape), enlarged(apart, every, shape))
+
+
+def _pieces(rest: Bools, least: float) -> Iterator[Bools]:
+    """Each piece of the rest, (h, w), of more than `least` samples, with all that is nearer to it than to others; none
+    where there is only one.
+    """
+    _, pieces, stats, _ = cv2.connectedComponentsWithStats(rest.astype(np.uint8), connectivity=4)
+    large = stats[:, cv2.CC_STAT_AREA] > least
+    large[0] = False
+    if np.count_nonzero(large) < 2:
+        return
+    none: Bytes = (~large[pieces]).astype(np.uint8)
+    _, nearest = cv2.distanceTransformWithLabels(none, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
+    yield from (nearest == number for number in range(1, int(nearest.max()) + 1))
+
+
+def _away(free: Bools) -> Float32s:
+    """Distance of each sample from the nearest that is not free, samples, (h, w)."""
+    return np.asarray(cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, 3), np.float32)

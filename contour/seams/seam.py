@@ -1,0 +1,82 @@
+"""A seam through a block: a line along which its walls end. There two blocks lie against each other.
+
+Each has cells of its own, and both were cut, so few walls lead from one to the other: along their common edge cells run
+into each other. Where the blocks do not touch, what is free of walls makes one opening from outline to outline; where
+they do, many short ones in a row. Walls that are lost in one block leave openings, too, but faint ones lead across, and
+its cells go on in the same order beyond. Adhesive in a splice, compound or ink leave some in which light is not as in
+comb.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from contour.geometry.arrays import Bools, Bytes
+from contour.image.pixel_grid import averaged, pixels_of
+from contour.seams.both_sides import cell_order, comb_along
+from contour.seams.openings import Openings, openings
+from contour.seams.parting import LONG, Parted, parted, parted_by_row, runs_along
+from contour.walls.pieces import Piece
+from contour.walls.see_block import SeenWalls
+from contour.walls.wall_evidence import BlockEvidence
+
+# Pixels a sample, if walls are two samples wide and more. Where an opening is long and yet parts nothing, pixels are
+# looked at: in these walls that end beside each other touch less often.
+_STEP = 2
+# How much of a line runs along openings that part two blocks whose cells lie in one order: of those that lie alike by
+# chance, and of halves that were left where they were cut, all of it; of single blocks with such openings 0.88.
+_ALL_ALONG = 0.95
+
+
+def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
+    """The smaller of two parts of a block that a seam parts, pixels; None without a seam."""
+    if seen.mask is None:
+        return None
+    coarse = _STEP if seen.wall_px >= 2 * _STEP * walls.scale else 1
+    for step in sorted({coarse, 1}, reverse=True):
+        free = openings(walls, seen, seen.mask, step)
+        found = parted(free)
+        if found is not None:
+            sure = comb_along(_light(walls, seen, free), free, found) and _two(walls, seen, free, found)
+            return _smaller(free, found.part, walls.scale) if sure else None
+        if step == coarse:
+            row = parted_by_row(free)
+            if row is not None and cell_order(free, row).other and comb_along(_light(walls, seen, free), free, row):
+                return _smaller(free, row.part, walls.scale)
+        if free.long.max(initial=0.0) < LONG:
+            return None
+    return None
+
+
+def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:
+    """Whether cells lie in another order on both sides of a line along long openings, or else no faint walls lead
+    across. One block that was cut in two lies in one order: there openings must run all along.
+    """
+    order = cell_order(free, found)
+    if order.other or (order.same and found.along < _ALL_ALONG):
+        return order.other
+    assert seen.mask is not None
+    faint = np.asarray(cv2.bitwise_or(seen.mask, walls.mask.faint()), np.uint8)
+    return runs_along(openings(walls, seen, faint, free.step), found)
+
+
+def _light(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Bytes:
+    """The light that walls were seen in on the openings' grid, (h, w), bright where walls are."""
+    (left, top), (high, wide) = free.first, free.numbers.shape
+    part = walls.small[top : top + high * free.step, left : left + wide * free.step]
+    light = averaged(part, free.step, cv2.BORDER_REPLICATE)
+    return light if seen.polarity == "bright" else np.asarray(cv2.bitwise_not(light), np.uint8)
+
+
+def _smaller(free: Openings, part: Bools, scale: int) -> Piece:
+    """The part, or the rest of the block where that is smaller, pixels."""
+    block = free.depth > 0.0
+    one = min(block & part, block & ~part, key=np.count_nonzero).astype(np.uint8)
+    rings, _ = cv2.findContours(one, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    ring = np.asarray(max(rings, key=cv2.contourArea), np.float64).reshape(-1, 2)
+    outline = pixels_of(pixels_of(ring, free.step) + free.first, scale)
+    (left, top), (right, bottom) = (np.rint(corner).astype(int).tolist() for corner in (outline.min(0), outline.max(0)))
+    whole = free.step * scale
+    width = 2.0 * float(cv2.distanceTransform(one, cv2.DIST_L2, 5).max()) * whole
+    return Piece(float(np.count_nonzero(one)) * whole**2, (left, top, right, bottom), outline, width)

@@ -1,0 +1,102 @@
+"""Two blocks that lie against each other are told from one, whatever happened to that."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contour.acceptance.acceptance import View, judge
+from contour.acceptance.findings import Limits, Refusal
+from contour.acceptance.trace_check import check_trace
+from contour.geometry.rings import Contour, area
+from contour.polygon.polygon import Polygon
+from contour.seams.seam import parted_by_seam
+from contour.synthetic import CellGeometry, Fade, Filling, Ink, Scene, Slip, Strip, render, thick_line
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
+from contour.tracing.wall_tips import looked_at
+from contour.walls.lightness import wall_light
+from contour.walls.pieces import Piece
+from contour.walls.see_block import see_walls
+from tests.support.scenes.edge_scenes import BLOCK, CELLS, LONG, PLAIN, WIDE, at, patch
+
+OTHER = replace(CELLS, ribbon_deg=40.0, offset_mm=(3.0, 4.0))
+
+
+def seam_in(scene: Scene) -> Piece | None:
+    picture = render(scene).picture
+    light = wall_light(picture)
+    walls = see_walls(picture, light, "auto")
+    return parted_by_seam(walls, looked_at(picture, walls, lambda _: None)[0])
+
+
+def two(first: Contour, second: Contour, cells: CellGeometry = OTHER) -> Scene:
+    return replace(PLAIN, outline=first, things=(Strip(second, cells),))
+
+
+def halves(gap: float, cells: CellGeometry = OTHER) -> Scene:
+    """Two blocks side by side, so many pitches apart."""
+    long = 0.5 * (LONG - gap * CELLS.pitch_mm)
+    out, along = -0.5 * WIDE, 0.5 * (LONG - long)
+    return two(patch(-along, out, long, WIDE), patch(along, out, long, WIDE), cells)
+
+
+@pytest.mark.parametrize(("gap", "pitch_mm"), [(0.0, 10.0), (0.15, 13.0), (0.3, 10.0)])
+def test_two_blocks_edge_to_edge_are_parted_where_they_meet(gap: float, pitch_mm: float) -> None:
+    part = seam_in(halves(gap, replace(OTHER, pitch_mm=pitch_mm)))
+    assert part is not None
+    assert 2.0 * part.area_px2 == pytest.approx(abs(area(BLOCK)) / 0.25, rel=0.15)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.3])
+def test_a_small_block_against_the_edge_of_a_large_one_is_the_part(gap: float) -> None:
+    large, small = patch(0.0, -90.0, LONG, 80.0), patch(20.0, -10.0 + gap * CELLS.pitch_mm, 80.0, 80.0)
+    part = seam_in(two(large, small))
+    assert part is not None
+    assert part.area_px2 == pytest.approx(abs(area(small)) / 0.25, rel=0.2)
+
+
+def test_two_halves_that_lie_as_they_were_cut_are_two() -> None:
+    assert seam_in(halves(0.3, CELLS)) is not None
+
+
+def _line(width_mm: float) -> Contour:
+    return thick_line([at(-20.0, 20.0), at(20.0, -WIDE - 20.0)], width_mm)
+
+
+SINGLE: dict[str, Scene] = {
+    "plain": PLAIN,
+    "broken walls": replace(PLAIN, cells=replace(CELLS, broken=0.06, warp=0.15, wobble=0.04)),
+    "fading": replace(PLAIN, things=(Fade(at(0.0, -0.5 * WIDE), 0.95, 35.0),)),
+    "marked across": replace(PLAIN, things=(Ink((_line(5.0),), 0.1, strength=0.8),)),
+    **{
+        f"splice, {level}": replace(
+            PLAIN, things=(Filling(_line(14.0), level, walls=0.0), Slip(at(0.0, -0.5 * WIDE), at_unit, 4.0))
+        )
+        for level, at_unit in ((0.25, (0.2, -0.98)), (0.9, (0.2, -0.98)))
+    },
+}
+
+
+@pytest.mark.parametrize("name", SINGLE)
+def test_one_block_is_one(name: str) -> None:
+    assert seam_in(SINGLE[name]) is None
+
+
+def test_blocks_that_lie_against_each_other_are_refused_and_shown_unless_the_recipe_judges_no_outline() -> None:
+    picture = render(halves(0.2)).picture
+    checked = check_trace(picture, trace(picture, TraceSettings()), None)
+    contour = checked.trace.contour
+    polygon = Polygon(contour, None, area(contour), None, None)
+    view = View((picture.shape[1], picture.shape[0]), picture=picture)
+    (finding,) = judge(polygon, view, Limits(max_disagreement_pitches=2.0), traced=checked)
+    assert finding.refusal == Refusal.SEVERAL_BLOCKS
+    assert "two blocks seem to lie against each other" in finding.text
+    assert len(finding.shown_px[0]) > 4
+    assert judge(polygon, view, Limits(), traced=checked) == ()
+    moved = checked.trace.moved(np.array([7.0, 9.0])).parted
+    assert moved is not None
+    assert checked.trace.parted is not None
+    assert moved.box_px[:2] == (checked.trace.parted.box_px[0] + 7, checked.trace.parted.box_px[1] + 9)

@@ -73,12 +73,13 @@ class TableLimits:
 class TableLook:
     """A picture compared with the taught table.
 
-    `picture` is the picture without the table's pattern; `gain` the light of the table now over what it was;
-    `shift_px` how far the pattern has moved, None where no pattern shows; `rim_share` of the picture's rim that looks
-    as taught; `changed_share` of the picture that does not.
+    `picture` is the picture without the table's pattern; `known` the taught table where it lies now; `gain` the light
+    of the table now over what it was; `shift_px` how far the pattern has moved, None where no pattern shows;
+    `rim_share` of the picture's rim that looks as taught; `changed_share` of the picture that does not.
     """
 
     picture: Bytes
+    known: Bytes
     gain: float
     shift_px: float | None
     rim_share: float
@@ -135,6 +136,7 @@ def look_at(picture: Bytes, table: TaughtTable) -> TableLook:
     cv2.copyTo(picture, cv2.resize(things, size, interpolation=cv2.INTER_NEAREST), plain)
     return TableLook(
         picture=plain,
+        known=known,
         gain=gain,
         shift_px=None if shift is None else float(np.hypot(*shift)),
         rim_share=float(1 - changed[rim].mean()),

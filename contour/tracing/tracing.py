@@ -16,6 +16,7 @@ from contour.geometry.rings import Contour, oriented_contour
 from contour.image.line_noise import without_line_noise
 from contour.image.opencv import grey
 from contour.image.picture_check import check_picture
+from contour.relief.relief import Relief
 from contour.tracing import binarize, direct_scan, find_contours, sliding_matrix
 from contour.tracing.paper_cells import FEWEST_CELLS, EnclosedCells
 from contour.tracing.trace import OnStage, Trace, TraceSettings
@@ -28,20 +29,21 @@ def trace(
     settings: TraceSettings,
     *,
     rectifier: Rectifier | None = None,
+    relief: Relief | None = None,
     on_stage: OnStage = lambda _name: None,
 ) -> Trace:
     """The block's contour in `picture` (shape (H, W) grey or (H, W, 3) BGR, uint8), in pixels.
 
     `on_stage` is called with "mask" and "trace" when each of these stages has ended. `rectifier`, where the lens is
-    known, lets a method fit straight edges in undistorted coordinates; methods on pixel centres ignore it. Raises
-    PictureError, ParameterError, NoBlockFound.
+    known, lets a method fit straight edges in undistorted coordinates; `relief` says that the picture is the difference
+    from a known table; methods on pixel centres ignore both. Raises PictureError, ParameterError, NoBlockFound.
     """
     check_picture(picture)
     picture = without_line_noise(picture)
     method = _METHODS.get(settings.method)
     if method is None:
         raise ParameterError(f"method is {settings.method!r}: expected one of {', '.join(_METHODS)}.")
-    found = method(picture, settings, rectifier=rectifier, on_stage=on_stage)
+    found = method(picture, settings, rectifier=rectifier, relief=relief, on_stage=on_stage)
     sure_px = bound_with_bridges(found.uncertainty_px, found.evidence or ())
     # As seen is y up: counter-clockwise then is clockwise by the formula, whose y runs down in pixels.
     contour = oriented_contour(found.contour, counter_clockwise=False)
@@ -55,6 +57,7 @@ class _MethodCall(Protocol):
         settings: TraceSettings,
         *,
         rectifier: Rectifier | None,
+        relief: Relief | None,
         on_stage: OnStage,
     ) -> Trace: ...
 
@@ -65,7 +68,14 @@ _FromMask = Callable[[binarize.BinarizedPicture, TraceSettings], Contour]
 def _on_mask(contour_of: _FromMask) -> _MethodCall:
     """A method that works on the wall mask's pixel centres alone."""
 
-    def call(picture: Bytes, settings: TraceSettings, *, rectifier: Rectifier | None, on_stage: OnStage) -> Trace:
+    def call(
+        picture: Bytes,
+        settings: TraceSettings,
+        *,
+        rectifier: Rectifier | None,
+        relief: Relief | None,
+        on_stage: OnStage,
+    ) -> Trace:
         light = grey(picture)
         walls = binarize.binarize(light, settings.binarize, settings.polarity)
         on_stage("mask")

@@ -11,6 +11,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes
 from contour.image.pixel_grid import averaged, coarse_step, pixels_of
+from contour.relief.relief import Relief
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.coarse_block import coarse_block
 from contour.walls.coarse_rings import CoarseBlock, walls_at_frame
@@ -38,7 +39,7 @@ _STRANDS_PITCHES = 5.0
 @dataclass(frozen=True, eq=False)
 class SeenWalls:
     """Walls of a picture, whatever hides them: the light they were seen in, (H, W), and the same `scale` times smaller,
-    their cells, and their mask in the smaller one.
+    their cells, and their mask in the smaller one. `relief`: how they stand out of a table that is known.
     """
 
     light: Bytes
@@ -46,6 +47,7 @@ class SeenWalls:
     scale: int
     cells: CellScale
     mask: WallMask
+    relief: Relief | None = None
 
 
 def see_walls(picture: Bytes, light: Bytes, polarity: str) -> SeenWalls:
@@ -113,7 +115,7 @@ def see_block(
     loose = None if seen.mask is every else np.asarray(cv2.subtract(every, seen.mask), np.uint8)
     coarse = coarse_block(seen.mask, small, pitch_px, few if loose is None else None)
     others = pieces_beside(every, coarse.rings[0].vertices, pitch_px, scale, few)
-    evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway)
+    evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway, walls.relief)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))
     return replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose, mask=seen.mask)

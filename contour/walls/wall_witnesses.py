@@ -11,6 +11,8 @@ from contour.geometry.arrays import Bytes, Float64s, median
 from contour.geometry.signed_distance import nearest
 from contour.image.pixel_grid import pixels_of, samples_of
 from contour.image.pixel_sampling import FULL_SCALE, sample_at
+from contour.relief.relief import Relief
+from contour.relief.relief_ends import relief_ends
 from contour.walls.cell_scale import CellScale
 from contour.walls.coarse_rings import CoarseBlock
 from contour.walls.dark_material import dark_beyond
@@ -32,6 +34,8 @@ _LEAST_HEIGHT = 0.4
 _MODEL_SIGMA_PX = (0.2, 0.3)
 _SIDE_SIGMA_PX = (0.5, 1.0)
 _NEAR_PX = 1.5
+# On a known table: how unsure an end may be, and how much of what differs around it its top and side explain.
+_MOST_RELIEF_SIGMA_PX, _LEAST_TOLD = 1.5, 0.4
 _FAINT_HEIGHT = 0.45
 _FAINT_SIGMA_PX = 3.0
 # How far the edge of dark material is looked for from the last wall seen in it, and how near is the wall's own edge.
@@ -65,11 +69,18 @@ class _Witnesses:
 
 
 def block_evidence(
-    light: Bytes, seen: WallMask, coarse: CoarseBlock, cells: CellScale, scale: int, midway: float | None
+    light: Bytes,
+    seen: WallMask,
+    coarse: CoarseBlock,
+    cells: CellScale,
+    scale: int,
+    midway: float | None,
+    relief: Relief | None = None,
 ) -> BlockEvidence:
     """What the walls of a block say of its outline, in picture pixels.
 
     `light` is the picture's, `seen` and `coarse` are of one `scale` times smaller. `midway`: as `midway_to_table` says.
+    `relief`, where the table is known: their ends are told by it.
     """
     pitch_px, wall = cells.pitch_px / scale, max(1.0, cells.wall_px / scale)
     chains = edge_chains(seen.mask, coarse, pitch_px)
@@ -80,14 +91,14 @@ def block_evidence(
     tip, axis = centred_axes(
         light, pixels_of(found.tip, scale), found.axis, wall=cells.wall_px, straight=straight, sign=sign
     )
-    depth = parallax(light, tip, axis, straight=straight, wall=cells.wall_px, sign=sign)
-    if depth.width is not None:
-        # The top is the half of the band that lies away from the picture's middle.
-        across = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
-        tip = tip + 0.5 * depth.across(tip, across)[:, None] * across
+    if relief is None:
+        depth = parallax(light, tip, axis, straight=straight, wall=cells.wall_px, sign=sign)
+        tip = _to_tops(tip, axis, depth)
+    else:
+        depth = Parallax(relief.displacement.share, relief.displacement.middle, relief.wall_px + _MASK_BLUR_PX)
     ends = _Ends(tip, axis, coarse.feet(found.tip)[2], straight)
     model = _learnt(light, ends, cells, depth.width or cells.wall_px, seen)
-    tips = _tips(light, ends, cells, model)
+    tips = _tips(light, ends, cells, model) if relief is None else _relief_tips(relief, ends, cells, model)
     dark = None if midway is None else _Dark(light, midway, cells.pitch_px)
     if dark is not None:
         normal = coarse.feet(samples_of(tips.points, scale))[2]
@@ -95,7 +106,8 @@ def block_evidence(
         faded = (depth.across(tips.points, normal) >= 0.0) & (tips.kind != WitnessKind.CLEAN)
         least = np.where(faded, _ENDS_INSIDE_PITCHES * cells.pitch_px, np.inf)
         tips = _to_the_table(dark, tips, tips.points, normal, least)
-    tips = replace(tips, points=_raised(tips.points, coarse.feet(samples_of(tips.points, scale))[2], depth))
+    if relief is None:
+        tips = replace(tips, points=_raised(tips.points, coarse.feet(samples_of(tips.points, scale))[2], depth))
     outer = outer[nearest(outer, samples_of(tips.points, scale)) > _LONELY_PITCHES * pitch_px]
     normal, place = coarse.feet(outer)[2], pixels_of(outer, scale)
     sides = _sides(light, place, normal, depth.width or cells.wall_px, model)
@@ -113,7 +125,8 @@ def block_evidence(
         model.blur,
         seen.noise,
         seen.contrast,
-        _clipped(light, np.concatenate([tips.points, sides.points])),
+        # What is told by top and side together is as unsure as light at full scale: half of a height lies elsewhere.
+        _clipped(light, np.concatenate([tips.points, sides.points])) if relief is None else 1.0,
         coarse.leaves,
     )
 
@@ -157,6 +170,16 @@ def _tips(light: Bytes, ends: _Ends, cells: CellScale, model: EndModel) -> _Witn
     return _Witnesses(fitted.point[good], kind[good], sigma[good])
 
 
+def _relief_tips(relief: Relief, ends: _Ends, cells: CellScale, model: EndModel) -> _Witnesses:
+    """Ends of walls' tops on a known table; those that top and side tell too little of are left out."""
+    fitted = relief_ends(relief, ends.tip, ends.axis, ends.normal, pitch_px=cells.pitch_px, blur_px=model.blur)
+    good = (fitted.sigma < _MOST_RELIEF_SIGMA_PX) & (fitted.told > _LEAST_TOLD)
+    clean = ends.straight > 2 * cells.wall_px + 2
+    sigma = np.hypot(np.where(clean, *_MODEL_SIGMA_PX), fitted.sigma)
+    kind = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
+    return _Witnesses(fitted.point[good], kind[good], sigma[good])
+
+
 def _sides(light: Bytes, place: Float64s, normal: Float64s, wall: float, model: EndModel) -> _Witnesses:
     """Outermost wall points, moved along the outline's normal to half height where that is near; `wall` is the width
     of walls at half height.
@@ -193,6 +216,14 @@ def _to_the_table(dark: _Dark, seen: _Witnesses, place: Float64s, normal: Float6
     points = np.where(moved[:, None], edge, seen.points)
     sigma = np.where(moved, max(_DARK_SIGMA_PX, _DARK_SIGMA_PITCHES * dark.pitch_px), seen.sigma)
     return _Witnesses(points, np.where(moved, np.int8(WitnessKind.OUTERMOST), seen.kind), sigma)
+
+
+def _to_tops(tip: Float64s, axis: Float64s, depth: Parallax) -> Float64s:
+    """Tips moved across their walls: the top is the half of the band that lies away from the picture's middle."""
+    if depth.width is None:
+        return tip
+    across = np.stack([-axis[:, 1], axis[:, 0]], axis=1)
+    return np.asarray(tip + 0.5 * depth.across(tip, across)[:, None] * across)
 
 
 def _raised(points: Float64s, normal: Float64s, depth: Parallax) -> Float64s:

@@ -19,6 +19,7 @@ from contour.acceptance.picture_findings import judge_table
 from contour.acceptance.sent_evidence import ToMillimetres, sent_evidence
 from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
+from contour.edge.known_table import over_known_table
 from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, ParameterError
 from contour.geometry.arrays import Float64s
 from contour.geometry.rectifier import CroppedRectifier, Rectifier
@@ -28,6 +29,7 @@ from contour.image.picture_check import check_picture
 from contour.image.region import Region
 from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
+from contour.relief.relief import Displacement, Relief
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
@@ -160,17 +162,18 @@ class Measurer:
         calibration = self._calibration
         if calibration is not None:
             calibration.check_fits(width, height)
-        picture = without_line_noise(picture)
+        picture, relief = without_line_noise(picture), None
         if self._table is not None:
             look = self._look_at_table(self._table, picture, camera)
             watch.lap("table")
             changes = judge_table(look, TableLimits())
             if changes:
                 return replace(result, findings=rejections(changes))
-            picture = look.picture
+            relief = self._relief(picture, look, recipe, thickness_mm)
+            picture = look.picture if relief is None else relief.apart
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
-        checked = _checked_trace(picture, recipe, region, rectifier, watch)
+        checked = _checked_trace(picture, recipe, region, rectifier, watch, relief)
         traced = checked.trace
         result = replace(
             result,
@@ -220,6 +223,25 @@ class Measurer:
                 "camera, or teach the table again."
             )
         return look_at(picture, record.table)
+
+    def _relief(
+        self, picture: NDArray[np.uint8], look: TableLook, recipe: AnyRecipe, thickness_mm: float
+    ) -> Relief | None:
+        """How the picture stands out of a taught table as light as the walls; None of a darker one, and where nobody
+        knows how far lower edges of walls seem displaced.
+        """
+        calibration = self._calibration
+        if calibration is None or recipe.method != "wall-tips":
+            return None
+        if not (calibration.height_known(0.0) and calibration.height_known(thickness_mm)):
+            return None
+        height, width = picture.shape[:2]
+        columns, rows = np.meshgrid((0.0, 0.5 * width, width - 1.0), (0.0, 0.5 * height, height - 1.0))
+        points = np.column_stack((columns.ravel(), rows.ravel()))
+        with contextlib.suppress(NoBlockFound, CalibrationError):
+            below = calibration.to_pixels(calibration.to_machine(calibration.to_work(points, thickness_mm)), 0.0)
+            return over_known_table(picture, look, recipe.polarity, Displacement.of(points, below))
+        return None
 
     def _polygon(self, contour: Contour, recipe: AnyRecipe, thickness_mm: float, watch: _Stopwatch) -> Polygon:
         return cutting_polygon(
@@ -280,17 +302,23 @@ class Measurer:
 
 
 def _checked_trace(
-    picture: NDArray[np.uint8], recipe: AnyRecipe, region: Region | None, rectifier: Rectifier | None, watch: _Stopwatch
+    picture: NDArray[np.uint8],
+    recipe: AnyRecipe,
+    region: Region | None,
+    rectifier: Rectifier | None,
+    watch: _Stopwatch,
+    relief: Relief | None = None,
 ) -> CheckedTrace:
     """The block traced in the region alone, and checked there, in pixels of the whole picture."""
     if region is None:
-        traced = trace(picture, trace_settings(recipe), rectifier=rectifier, on_stage=watch.lap)
+        traced = trace(picture, trace_settings(recipe), rectifier=rectifier, relief=relief, on_stage=watch.lap)
         checked = check_trace(picture, traced, rectifier)
         watch.lap("quality")
         return checked
     part, first = region.cut(picture)
     within = None if rectifier is None else CroppedRectifier(rectifier, first)
-    return _checked_trace(part, recipe, None, within, watch).moved(first)
+    there = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
+    return _checked_trace(part, recipe, None, within, watch, there).moved(first)
 
 
 def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:

@@ -1,0 +1,54 @@
+"""Blocks on a table as light as their walls are traced where the table is known, and what lies over them is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from contour.edge.known_table import over_known_table
+from contour.geometry.agreement import distances_to
+from contour.image.taught_table import look_at, teach
+from contour.relief.relief import Displacement
+from contour.synthetic import Cover, Scene, Structure, Table, render, render_empty_table
+from service.config.recipes import Recipe
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
+from service.measuring.table_file import TableRecord
+from service.reasons import Reason
+from tests.support.scenes.edge_scenes import PLAIN, THICKNESS_MM, THINGS
+from tests.support.scenes.trials import calibration_for
+
+RECIPE = Recipe(number=1, name="any", min_area_mm2=0.0, roi_px=(60.0, 40.0, 600.0, 440.0))
+WOODEN = replace(PLAIN, table=Table(level=0.55), things=(Structure("wood", 80.0, 0.2, 30.0),))
+NONE = Displacement(0.0, np.zeros(2))
+
+
+def measured(scene: Scene) -> tuple[Measurement, float]:
+    """What is measured in part of the picture, and how far 95 % of the true outline lie off at most, pixels."""
+    rendered = render(scene)
+    table = TableRecord(teach(render_empty_table(scene, 2)), "", 2, "")
+    seen = Measurer(calibration_for(rendered.camera), table=table).measure(rendered.picture, RECIPE, THICKNESS_MM)
+    off = (
+        0.0 if seen.pixels is None else float(np.percentile(distances_to(rendered.truth_px.exterior, seen.pixels), 95))
+    )
+    return seen, off
+
+
+def test_a_block_on_a_taught_table_as_light_as_its_walls_is_traced_within_its_bound() -> None:
+    seen, off = measured(WOODEN)
+    assert seen.findings == ()
+    assert off < min(1.5, seen.uncertainty_px or 0.0)
+
+
+def test_what_darkens_the_table_over_its_edge_as_a_shadow_does_is_told() -> None:
+    tape = THINGS["tape along an edge"][0]
+    assert isinstance(tape, Cover)
+    seen, _ = measured(replace(WOODEN, things=(*WOODEN.things, replace(tape, level=0.2))))
+    assert Reason.EDGE_COVERED in seen.reasons
+
+
+def test_on_a_darker_table_walls_are_seen_as_ever() -> None:
+    rendered, table = render(PLAIN), teach(render_empty_table(PLAIN, 2))
+    look = look_at(rendered.picture, table)
+    assert over_known_table(rendered.picture, look, "auto", NONE) is None

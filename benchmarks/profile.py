@@ -62,7 +62,7 @@ STEPS = {
     "polygon, verdict": ("service.measuring.measure:cutting_polygon", "service.measuring.measure:judge"),
 }
 
-BESIDE = ("contour.acceptance.trace_check", "contour.tracing.closed_cells", "contour.walls.cell_scale")
+BESIDE = ("contour.acceptance.trace_check", "contour.material.closed_cells", "contour.walls.cell_scale")
 
 
 @dataclass

@@ -13,7 +13,7 @@ from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.rings import densified
 from contour.geometry.segments import BoxTree, distances_to_tree
 from contour.image.opencv import fewer_vertices
-from contour.tracing.closed_cells import MaterialEdge, closed_along
+from contour.material.closed_cells import MaterialEdge, closed_along
 from contour.tracing.edge_kind import side_px, sure_ends
 from contour.walls.wall_evidence import BlockEvidence
 

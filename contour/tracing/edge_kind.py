@@ -14,7 +14,7 @@ from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.segments import BoxTree, distances_to_tree
 from contour.geometry.signed_distance import nearest
-from contour.tracing.closed_cells import MaterialEdge
+from contour.material.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
 from contour.walls.wall_ends import ring_tips
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WitnessKind

@@ -10,7 +10,7 @@ import numpy as np
 from contour.geometry.arrays import Bytes, Float64s, median, medians
 from contour.geometry.rings import Ring
 from contour.image.opencv import closed_by_disc
-from contour.tracing.closed_cells import MaterialEdge, closed_along
+from contour.material.closed_cells import MaterialEdge, closed_along
 from contour.tracing.cut_lines import straight_cuts, touched_cuts
 from contour.tracing.trace import Edge
 from contour.walls.comb_likeness import Comb

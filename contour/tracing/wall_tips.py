@@ -15,14 +15,14 @@ from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
+from contour.material.closed_cells import MaterialEdge, material_edge
+from contour.material.foam import foam_edge
 from contour.outline.uncertainty import uncertainty
 from contour.relief.relief import Relief
 from contour.seams.seam import parted_by_seam
-from contour.tracing.closed_cells import MaterialEdge, material_edge
 from contour.tracing.cut_lines import touched_cuts, with_cuts
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed, tooth_px
 from contour.tracing.evidence_check import check_against_evidence
-from contour.tracing.foam import foam_edge
 from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
@@ -55,7 +55,8 @@ def wall_tips(
     pixels.
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `relief`: of a
-    picture that is the difference from a known table. `on_stage` hears "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound, EdgeContradicted.
+    picture that is the difference from a known table. `on_stage` hears "mask" and "trace". Raises PictureError,
+    ParameterError, NoBlockFound, EdgeContradicted.
     """
     if settings.binarize != "flat":
         raise ParameterError(

@@ -7,7 +7,7 @@ import numpy as np
 
 from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour
-from contour.tracing.closed_cells import Apart, MaterialEdge
+from contour.material.closed_cells import Apart, MaterialEdge
 from contour.tracing.cut_lines import touched_cuts
 
 PITCH = 60.0

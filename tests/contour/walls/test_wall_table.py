@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contour.geometry.rings import signed_area
-from contour.tracing.closed_cells import material_edge
+from contour.material.closed_cells import material_edge
 from contour.walls.coarse_block import coarse_block
 from contour.walls.wall_mask import wall_mask
 

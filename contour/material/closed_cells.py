@@ -18,8 +18,8 @@ from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.opencv import fewer_vertices, pieces_and_areas
 from contour.image.pixel_sampling import sample_at
 from contour.image.side_by_side import side_by_side
-from contour.tracing.leaking_cells import leaking_cells
-from contour.tracing.table_surface import OUTLIER, difference_from_table
+from contour.material.leaking_cells import leaking_cells
+from contour.material.table_surface import OUTLIER, difference_from_table
 from contour.walls.cell_scale import wall_width
 
 # Chips and dust are small against a block; a block smaller than this share of the picture is a chip to this method.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from contour.geometry.arrays import Bytes
-from contour.tracing.leaking_cells import leaking_cells
+from contour.material.leaking_cells import leaking_cells
 
 PITCH, WALL = 40, 4
 

@@ -8,7 +8,7 @@ import pytest
 
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import area
-from contour.tracing.closed_cells import closed_along, material_edge
+from contour.material.closed_cells import closed_along, material_edge
 from contour.walls.wall_mask import wall_mask
 
 TABLE, FLOOR, WALL = 90, 76, 220

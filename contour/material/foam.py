@@ -12,7 +12,7 @@ from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.image.opencv import closed_by_disc, fewer_vertices, pieces_and_areas
 from contour.image.pixel_sampling import sample_at
-from contour.tracing.closed_cells import MaterialEdge, cyclic_mean, outlined
+from contour.material.closed_cells import MaterialEdge, cyclic_mean, outlined
 
 # Foam is nowhere flat: of 13 slabs it is so over 0.08 at most, of prints and codes over 0.67 and more.
 _LITTLE, _MOST_FLAT = 0.3, 0.2

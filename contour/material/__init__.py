@@ -1,0 +1,1 @@
+"""Picture and cell pitch → the outline around all that is no table, of closed cells and foam. Tracing asks for it."""

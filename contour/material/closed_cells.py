@@ -101,8 +101,9 @@ def closed_along(material: MaterialEdge, cuts: Float64s, pitch_px: float) -> Mat
     """The outline around material with the cells filled that straight cuts opened: it follows the cuts there, but not
     across bays that show the table.
 
-    `cuts`: where each begins and ends, (N, 2, 2), pixels.
+    `cuts`: where each begins and ends, (N, 2, 2), pixels; what touches a line in one place alone is none.
     """
+    cuts = cuts[np.hypot(*(cuts[:, 1] - cuts[:, 0]).T) >= 1.0]
     shut, parted = material.apart.region.copy(), material.apart.region.copy()
     for cut in cuts:
         start, end = (tuple(np.rint(place).astype(int).tolist()) for place in cut)

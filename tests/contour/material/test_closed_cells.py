@@ -41,3 +41,10 @@ def area_along_cut(bay: int) -> float:
 def test_a_bay_that_shows_the_table_is_no_cell_that_a_cut_opened() -> None:
     cell = (PITCH // 2 - 2.5) * (PITCH - 5)
     assert area_along_cut(FLOOR) - area_along_cut(TABLE) == pytest.approx(cell, rel=0.15)
+
+
+def test_what_touches_a_line_in_one_place_alone_is_no_cut() -> None:
+    picture = cut_squares(FLOOR)
+    material = material_edge(picture, PITCH, wall_mask(picture, PITCH, bright=True).mask)
+    touched = closed_along(material, np.full((1, 2, 2), [CUT_X, TOP + 3.0]), PITCH)
+    assert area(touched.contour) == area(material.contour)

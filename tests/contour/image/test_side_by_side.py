@@ -13,7 +13,7 @@ import pytest
 from contour.acceptance import trace_check
 from contour.errors import NoBlockFound
 from contour.image.side_by_side import side_by_side
-from contour.tracing import closed_cells
+from contour.material import closed_cells
 from contour.walls import cell_scale
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer

@@ -21,6 +21,7 @@ from contour.image.side_by_side import side_by_side
 from contour.material.leaking_cells import leaking_cells
 from contour.material.table_surface import OUTLIER, difference_from_table
 from contour.walls.cell_scale import wall_width
+from contour.walls.coarse_rings import cyclic_mean
 
 # Chips and dust are small against a block; a block smaller than this share of the picture is a chip to this method.
 _LEAST_SHARE = 0.004
@@ -259,10 +260,7 @@ def _sub_pixel(difference: Bytes, levels: Bytes, chain: Float64s, cuts: Float64s
     steepest fall.
     """
     smooth = cyclic_mean(chain, 2)
-    tangent = np.roll(smooth, -1, axis=0) - np.roll(smooth, 1, axis=0)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
-    # findContours has the free side at (−dy, dx) of its direction.
-    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    normal = outwards(smooth, 1)
     along = np.arange(-_REACH_PX, _OUT_PX + 0.1, 0.25)
     places = smooth[:, None, :] + along[None, :, None] * normal[:, None, :]
     values = sample_at(difference, places[:, :, 0], places[:, :, 1])
@@ -302,10 +300,11 @@ def _on_cuts(points: Float64s, cuts: Float64s) -> tuple[Float64s, Indices]:
     return points, cut
 
 
-def cyclic_mean(points: Float64s, half: int) -> Float64s:
-    """Each point of a ring, (N, 2), as the mean of itself and `half` of its neighbours on both sides."""
-    total = sum(np.roll(points, shift, axis=0) for shift in range(-half, half + 1))
-    return np.asarray(total / (2 * half + 1), np.float64)
+def outwards(ring: Ring, reach: int) -> Float64s:
+    """Unit vectors to the free side of a ring of findContours, by its neighbours `reach` points away, (N, 2)."""
+    along = np.roll(ring, -reach, axis=0) - np.roll(ring, reach, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    return np.stack([-along[:, 1], along[:, 0]], axis=1)
 
 
 def _turned(ring: Ring, sign: float) -> Ring:

@@ -10,9 +10,10 @@ import numpy as np
 from contour.geometry.arrays import Bytes, Float64s, median, quantile
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
-from contour.image.opencv import closed_by_disc, fewer_vertices, pieces_and_areas
+from contour.image.opencv import closed_by_disc, fewer_vertices, outer_contours, pieces_and_areas
 from contour.image.pixel_sampling import sample_at
-from contour.material.closed_cells import MaterialEdge, cyclic_mean, outlined
+from contour.material.closed_cells import MaterialEdge, outlined, outwards
+from contour.walls.coarse_rings import cyclic_mean
 
 # Foam is nowhere flat: of 13 slabs it is so over 0.08 at most, of prints and codes over 0.67 and more.
 _LITTLE, _MOST_FLAT = 0.3, 0.2
@@ -41,7 +42,7 @@ def foam_edge(light: Bytes, material: MaterialEdge, pitch_px: float) -> Material
     if _flat(light, region) > _MOST_FLAT:
         return None
     ring = cyclic_mean(_around(region), _TURN_PX)
-    inwards = _inwards(ring)
+    inwards = -outwards(ring, _TURN_PX)
     least, begins, most = _begins(light, ring, inwards, pitch_px)
     if np.count_nonzero(begins <= _ON_IT_PX) < _ROUGH_AT_ONCE * len(begins):
         return None
@@ -74,13 +75,6 @@ def _begins(light: Bytes, ring: Ring, inwards: Float64s, pitch_px: float) -> Flo
     return np.where(slab.any(axis=2), depth[np.argmax(slab, axis=2)], 0.0)
 
 
-def _inwards(ring: Ring) -> Float64s:
-    """Unit vectors into what a ring of findContours runs around, (N, 2)."""
-    along = np.roll(ring, -_TURN_PX, axis=0) - np.roll(ring, _TURN_PX, axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
-    return np.stack([along[:, 1], -along[:, 0]], axis=1)
-
-
 def _taken_off(region: Bytes, ring: Ring, begins: Float64s, inwards: Float64s) -> Bytes:
     """The region without what lies between a ring and where its slab begins."""
     shade = begins > 0
@@ -103,5 +97,4 @@ def _square(ring: Ring, pitch_px: float) -> float:
 
 def _around(region: Bytes) -> Ring:
     """The longest outline of a region, through pixels' centres, (N, 2)."""
-    chains, _ = cv2.findContours(region, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return np.asarray(max(chains, key=len)[:, 0], np.float64)
+    return max(outer_contours(region), key=len).astype(np.float64)

@@ -114,6 +114,7 @@ def test_the_controllers_register_chooses_the_recipe_and_one_that_is_gone_is_ref
         config.write_text(config.read_text().replace(f", {two}", ""))
         cell.service.reload()
         until(lambda: any(job["reason"] == 122 for job in cell.settled()), what="122")
-        assert "recipe 2 is not configured; there are 1" in cell.service.text
+        said = "recipe 2 is not configured; there are 1"
+        until(lambda: said in cell.service.text, what=said)
     finally:
         cell.stop()

@@ -237,7 +237,8 @@ def text_after(folder: Path, ends: list[tuple[int, int, str]], **options: Any) -
             assert job == started.number(nth)
             assert terminal.line(60).startswith(f"FAIL {job} {code} {name}" if code else f"DONE {job} ")
             until(lambda code=code, job=job: registers(started) == (code, job), what=f"reject_reason {code}")
-            assert code == 0 or f"job {job} refused: {code} {name}: " in started.service.text
+            said = f"job {job} refused: {code} {name}: " if code else f"job {job} "
+            until(lambda said=said: said in started.service.text, what=said)
         return started.service.text
     finally:
         started.stop()

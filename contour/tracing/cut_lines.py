@@ -34,10 +34,13 @@ _LEFT_PX = 3.0
 # differ by 0.09 at most in 78 closed borders, by 0.11 or more in cut ones. In pitches: a lens bends rows by as much as
 # still counts as near. And by more than pixels make of what is alike: closed cells of 6 to 12 px passed for cut. Rows
 # of flexed cells wave, but leave shallow openings: 0.31 where they differed by more; the second deepest of 27 cuts is
-# 0.51 or more.
+# 0.51 or more. Along a cut that runs nearly along a row openings grow by as much, steadily, from one end to the other;
+# those of 56 closed borders by 0.07 at most where they are so deep.
 _LEAST_LONG, _TOUCHED, _OPENING, _DIFFER, _DEEP = 4.0, 1.25, 0.15, 0.1, 0.4
 _DIFFER_PX, _OPENING_PX, _ALONG_PX = 3.0, 1.0, 0.5
-_FEWEST_OPENINGS = 4
+_FEWEST_OPENINGS, _FEWEST_GROWING, _STEADY = 4, 5, 0.25
+# A closed sheet has no openings along its edges (none of 80), so that two tell of a cut, also of a short one.
+_LEAST_LONG_ALIKE, _FEWEST_ALIKE = 2.0, 2
 # Teeth of closed triangles are as deep as these are high, 0.73 of that where blur rounds tips and roots (of four); what
 # is shallower was cut (0.47 and 0.51 of two).
 _SHALLOW, _FEWEST_SHALLOW = 0.6, 3
@@ -82,41 +85,62 @@ def touched_cuts(
         along = (end - start) / length
         out = np.array([along[1], -along[0]])
         line = _Line(start, along, out * np.sign(out @ (start - corners.mean(axis=0))), np.zeros(0, np.bool_))
-        long = length > _LEAST_LONG * pitch_px
-        depths = _openings(material.apart.region, line, length, near, pitch_px) if long else np.empty(0)
-        depths = depths[depths > least]
-        if _opened(depths, pitch_px, tooth_px, alike=alike):
+        long = length > (_LEAST_LONG_ALIKE if alike else _LEAST_LONG) * pitch_px
+        openings = _openings(material.apart.region, line, length, near, pitch_px) if long else np.empty((0, 3))
+        if _opened(openings[openings[:, 1] > least], pitch_px, tooth_px, alike=alike):
             cuts.append(_from_corner_to_corner(border, np.empty((0, 2)), line, near, _OPEN_PITCHES * pitch_px))
     return [cut for cut in cuts if len(cut)]
 
 
-def _opened(depths: Float64s, pitch_px: float, tooth_px: float, *, alike: bool) -> bool:
-    """Whether openings so deep, ascending, pixels, were cut into cells: they differ and two are deep, or may be
+def _opened(openings: Float64s, pitch_px: float, tooth_px: float, *, alike: bool) -> bool:
+    """Whether `openings` so deep, (N, 3), pixels, were cut into cells: they differ or grow, and two are deep, or may be
     `alike`, or none is as deep as those between teeth.
     """
+    depths = np.sort(openings[:, 1])
     if len(depths) >= _FEWEST_SHALLOW and depths[-1] < _SHALLOW * tooth_px:
         return True
-    if len(depths) < _FEWEST_OPENINGS:
-        return False
-    differ = depths[-2] - depths[1]
-    return alike or bool(differ >= max(_DIFFER * pitch_px, _DIFFER_PX) and depths[-2] > _DEEP * pitch_px)
+    if alike or len(depths) < _FEWEST_OPENINGS:
+        return alike and len(depths) >= _FEWEST_ALIKE
+    differ = max(_DIFFER * pitch_px, _DIFFER_PX)
+    return bool(
+        depths[-2] > _DEEP * pitch_px and (depths[-2] - depths[1] >= differ or _growth(openings[:, [0, 2]]) >= differ)
+    )
+
+
+def _growth(openings: Float64s) -> float:
+    """By how much openings grow from one end of a line to the other, by place and depth, (N, 2), pixels; 0 where they
+    do not steadily.
+    """
+    if len(openings) < _FEWEST_GROWING:
+        return 0.0
+    place, depth = openings.T
+    slope, first = np.polyfit(place, depth, 1)
+    growth = abs(float(slope)) * float(np.ptp(place))
+    return growth if np.std(depth - first - slope * place) < _STEADY * growth else 0.0
 
 
 def _openings(region: Bytes, line: _Line, length: float, near: float, pitch_px: float) -> Float64s:
-    """How deep openings are, ascending, where the region touches a line within `near` at every cell over its `length`
-    from its point on, all in pixels; none where it does not.
+    """Where openings are along a line, how deep they are behind it, and behind what touches it on both sides, (N, 3),
+    in its direction, where the region touches the line within `near` at every cell over its `length` from its point on,
+    all in pixels; none where it does not.
     """
     # How far behind the line the region begins.
     depth = np.arange(-near, 1.5 * pitch_px, _ALONG_PX)
-    place = np.arange(0.0, length, _ALONG_PX)[:, None]
-    x, y = (line.middle[k] + place * line.along[k] - depth * line.out[k] for k in (0, 1))
+    place = np.arange(0.0, length, _ALONG_PX)
+    x, y = (line.middle[k] + place[:, None] * line.along[k] - depth * line.out[k] for k in (0, 1))
     there = cv2.remap(region, x.astype(np.float32), y.astype(np.float32), cv2.INTER_NEAREST) > 0
     begins = np.where(there.any(axis=1), depth[there.argmax(axis=1)], depth[-1])
-    runs = np.split(begins, np.flatnonzero(np.diff(begins > near)) + 1)
-    openings = [run for run in runs if run[0] > near]
-    if max(map(len, openings), default=0) * _ALONG_PX > _TOUCHED * pitch_px:
-        return np.empty(0)
-    return np.sort([run.max() for run in openings])
+    runs = np.split(np.arange(len(begins)), np.flatnonzero(np.diff(begins > near)) + 1)
+    openings = [run for run in runs if begins[run[0]] > near]
+    touching = [run for run in runs if begins[run[0]] <= near]
+    if not openings or not touching or max(map(len, openings)) * _ALONG_PX > _TOUCHED * pitch_px:
+        return np.empty((0, 3))
+    middle, deepest = (np.array([at(run) for run in openings]) for at in (np.mean, lambda run: begins[run].max()))
+    nearest_there = [begins[run].min() for run in touching]
+    return np.stack(
+        [middle * _ALONG_PX, deepest, deepest - np.interp(middle, [run.mean() for run in touching], nearest_there)],
+        axis=1,
+    )
 
 
 def straight_cuts(

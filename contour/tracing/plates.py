@@ -34,8 +34,9 @@ _ROUND_PITCHES = 0.2
 _WEB_PX, _ALONG = 3.0, 0.98
 # An opened hole is less than a pitch wide.
 _OPEN_PITCHES = 1.0
-# Holes smaller than this share of the usual are specks, and fewer make no sheet.
-_SPECK, _FEWEST_HOLES = 1.0 / 3.0, 6
+# Holes smaller than this share of the usual are specks, and fewer make no sheet. Of noise in the floor of cells, where
+# little of it differs from the table as little, all are: a pixel fills any circle.
+_SPECK, _FEWEST_HOLES, _LEAST_HOLE_PX = 1.0 / 3.0, 6, 4.0
 
 
 def like_plate(comb: Comb | None) -> bool:
@@ -109,7 +110,8 @@ def _holes(material: MaterialEdge) -> _Holes | None:
     ascending = np.sort(area)
     typical = ascending[np.searchsorted(np.cumsum(ascending), 0.5 * ascending.sum())] if len(area) else 0.0
     large = 1 + np.flatnonzero(area > _SPECK * typical)
-    if len(large) < _FEWEST_HOLES:
+    diameter_px = float(np.sqrt(4.0 / np.pi * typical))
+    if len(large) < _FEWEST_HOLES or diameter_px < _LEAST_HOLE_PX:
         return None
     sampled = large[np.linspace(0, len(large) - 1, min(len(large), 64)).astype(int)]
     figures = []
@@ -125,7 +127,7 @@ def _holes(material: MaterialEdge) -> _Holes | None:
     away = np.hypot(*(middles[sampled, None] - middles[large]).T)
     pitch_px = median(np.sort(away, axis=0)[1])
     circled, shade = medians(np.array(figures), axis=0).tolist()
-    return _Holes(pitch_px, float(np.sqrt(4.0 / np.pi * typical)), circled, shade / max(sheet, 1.0))
+    return _Holes(pitch_px, diameter_px, circled, shade / max(sheet, 1.0))
 
 
 def _outermost(material: MaterialEdge, corners: Float64s, normals: Float64s, radius: float) -> Float64s:

@@ -36,5 +36,17 @@ def test_openings_that_differ_were_cut_open_and_alike_ones_were_not() -> None:
     assert len(touched_cuts(material(np.full(8, 20.0)), PITCH, alike=True)) == 1
 
 
+def test_openings_that_grow_steadily_were_cut_open_and_those_that_only_vary_were_not() -> None:
+    growing = np.array([25.0, 26.0, 27.0, 28.0, 29.0, 30.0, 31.0, 32.0])
+    assert len(touched_cuts(material(growing), PITCH)) == 1
+    assert touched_cuts(material(np.roll(growing, 3)[[0, 4, 1, 5, 2, 6, 3, 7]]), PITCH) == []
+
+
+def test_two_openings_tell_that_a_sheet_was_cut() -> None:
+    two = np.array([0.0, 20.0, 20.0, 0.0, 0.0])
+    assert len(touched_cuts(material(two), PITCH, alike=True)) == 1
+    assert touched_cuts(material(two), PITCH) == []
+
+
 def test_a_row_of_closed_cells_that_a_lens_bends_is_none() -> None:
     assert touched_cuts(material(np.full(12, 20.0), bow_px=3.5), PITCH) == []

@@ -36,8 +36,9 @@ _SOFT = 0.2
 # The least cell that a faint wall closes, in squares of the pitch.
 _LEAST_CELL = 0.5
 # And the largest that a cut opens, over what large cells of the block enclose: of 88 lattices cut once opened ones have
-# 0.99 of that at most. Where none encloses so much table, over a square of the pitch: a cell has 0.87 with walls.
-_LARGEST_CELL, _LARGE_CELLS, _LEAST_OPENING, _LEAST_BAY = 1.2, 0.9, 0.2, 0.1
+# 0.99 of that at most. Where none encloses so much table, or few do, as where noise makes some of a floor that differs
+# from it, over a square of the pitch: a cell has 0.87 with walls.
+_LARGEST_CELL, _LARGE_CELLS, _LEAST_OPENING, _LEAST_OPEN, _LEAST_BAY = 1.2, 0.9, 0.2, 0.1, 0.1
 # An opening as large as this is a hole, however narrow; broken walls join fewer cells.
 _HOLE = 5.0
 _SIMPLE_PX = 0.25
@@ -131,7 +132,8 @@ def _without_bays(closed: Bytes, shut: Bytes, parted: Bytes, apart: Apart, pitch
     floor = median(cells.astype(np.float64)) if len(cells) else 0.0
     _, openings = pieces_and_areas(((apart.region > 0) & (apart.difference <= apart.level)).astype(np.uint8), 4)
     whole = openings[1:][openings[1:] > _LEAST_OPENING * pitch_px * pitch_px]
-    cell = float(np.quantile(whole, _LARGE_CELLS)) if len(whole) else pitch_px * pitch_px
+    enough = whole.sum() > _LEAST_OPEN * np.count_nonzero(apart.region)
+    cell = float(np.quantile(whole, _LARGE_CELLS)) if enough else pitch_px * pitch_px
     labels, area = pieces_and_areas(closed & (1 - shut), 4)
     parts, part_area = pieces_and_areas(closed & (1 - parted), 4)
     owner = np.zeros(len(part_area), np.intp)

@@ -11,7 +11,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.rings import densified
-from contour.geometry.segments import BoxTree, distances_to_tree
+from contour.geometry.segments import BoxTree, distances_to_ring, distances_to_tree
 from contour.image.opencv import fewer_vertices
 from contour.material.closed_cells import MaterialEdge, closed_along
 from contour.tracing.edge_kind import side_px, sure_ends
@@ -27,8 +27,8 @@ _OPEN_PITCHES = 2.0
 _FEWEST_ENDS, _FEWEST_MORE = 2, 3
 _LEAST_APART_PITCHES = 0.5
 _FITS = 3
-# Ends that are left lie at the corners.
-_LEFT_PX = 3.0
+# Ends that are left lie at the corners, and the outline passes these.
+_LEFT_PX, _CORNER_PITCHES = 3.0, 0.4
 # A cut as long as the first is touched at every cell, so far apart at most (of 80 lattices cut once the most is 1.12).
 # So are rows of closed cells, whose openings are alike: of those so deep the second deepest and the second shallowest
 # differ by 0.09 at most in 78 closed borders, by 0.11 or more in cut ones. In pitches: a lens bends rows by as much as
@@ -48,7 +48,8 @@ _SHALLOW, _FEWEST_SHALLOW = 0.6, 3
 
 def with_cuts(material: MaterialEdge, seen: BlockEvidence, touched: list[Float64s]) -> MaterialEdge | None:
     """The outline around material along straight cuts where these opened its cells, those that are `touched` or else
-    those that ends of walls lie on; None where ends lie on no such cut, or beyond its last corner.
+    those that ends of walls lie on; None where ends lie on no such cut, or beyond its last corner, or where the outline
+    leaves out a corner: a sliver of a wall.
     """
     ring = seen.rings[0]
     sure = sure_ends(material, ring, seen)
@@ -61,7 +62,8 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence, touched: list[Float64
     closed = closed_along(material, cuts, seen.pitch_px)
     left = ring.points[sure_ends(closed, ring, seen)]
     off = distances_to_tree(left, BoxTree.of_segments(cuts[:, 0], cuts[:, 1])) if len(left) else np.empty(0)
-    return None if (off > _LEFT_PX).any() else closed
+    corners = distances_to_ring(cuts.reshape(-1, 2), closed.contour.exterior)
+    return None if (off > _LEFT_PX).any() or (corners > _CORNER_PITCHES * seen.pitch_px).any() else closed
 
 
 def touched_cuts(

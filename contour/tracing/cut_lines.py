@@ -42,8 +42,9 @@ _FEWEST_OPENINGS, _FEWEST_GROWING, _STEADY = 4, 5, 0.25
 # A closed sheet has no openings along its edges (none of 80), so that two tell of a cut, also of a short one.
 _LEAST_LONG_ALIKE, _FEWEST_ALIKE = 2.0, 2
 # Teeth of closed triangles are as deep as these are high, 0.73 of that where blur rounds tips and roots (of four); what
-# is shallower was cut (0.47 and 0.51 of two). Blur takes pixels, more of fine ones: 0.59 of 13 px was left of one.
-_SHALLOW, _FEWEST_SHALLOW, _BLUNT_PX = 0.6, 3, 2.0
+# is shallower was cut (0.47 and 0.51 of two). Blur takes pixels, more of fine ones: 0.59 of 13 px was left of one, 0.53
+# of 11 px was cut.
+_SHALLOW, _FEWEST_SHALLOW, _BLUNT_PX = 0.6, 3, 1.0
 
 
 def with_cuts(material: MaterialEdge, seen: BlockEvidence, touched: list[Float64s]) -> MaterialEdge | None:

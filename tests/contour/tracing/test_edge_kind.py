@@ -95,8 +95,14 @@ def test_teeth_of_closed_triangles_are_no_ends_of_walls(seed: int, border: Borde
 
 @pytest.mark.parametrize(
     ("seed", "cells"),
-    [(1051003, "over-expanded"), (1051006, "hexagonal"), (1051004, "square"), (1051443, "over-expanded")],
-    ids=["two arms", "an end in an arm", "a bay larger than a cell", "a bay of a cell and a half"],
+    [
+        (1051003, "over-expanded"),
+        (1051006, "hexagonal"),
+        (1051004, "square"),
+        (1051443, "over-expanded"),
+        (1204007, "over-expanded"),
+    ],
+    ids=["two arms", "an end in an arm", "a bay larger than a cell", "a bay of a cell and a half", "no bay, but noise"],
 )
 def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
     one = lattice(seed, cells, "mixed")
@@ -107,8 +113,8 @@ def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
 
 @pytest.mark.parametrize(
     ("seed", "cells"),
-    [(1051302, "hexagonal"), (1051404, "triangular"), (1051322, "over-expanded")],
-    ids=["no end", "no end of triangles", "an end beyond the second"],
+    [(1051302, "hexagonal"), (1051404, "triangular"), (1051322, "over-expanded"), (1092020, "square")],
+    ids=["no end", "no end of triangles", "an end beyond the second", "openings that grow"],
 )
 def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed: int, cells: Cells) -> None:
     one = lattice(seed, cells, "mixed")
@@ -124,6 +130,15 @@ def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed
 )
 def test_rows_of_closed_cells_are_no_cut(seed: int, cells: Cells, pitch_px: float) -> None:
     assert wall_tips(smaller(lattice(seed, cells, "closed"), pitch_px), TraceSettings()).edge == "cells"
+
+
+def test_fine_teeth_that_blur_rounds_are_no_cut() -> None:
+    assert traced(lattice(1205017, "triangular", "closed")).edge == "cells"
+
+
+def test_a_cut_that_ends_in_a_sliver_of_a_wall_is_refused() -> None:
+    with pytest.raises(EdgeContradicted):
+        traced(lattice(1204005, "triangular", "mixed"))
 
 
 def test_such_a_cut_runs_to_the_last_thing_that_touches_its_line() -> None:

@@ -189,6 +189,7 @@ def _cut(
         pitch_px=seen.pitch_px,
         blur_px=seen.blur_px,
         clipped=seen.clipped,
+        known_table=seen.known_table,
     )
     on_stage("trace")
     evidence = tuple(

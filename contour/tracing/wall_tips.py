@@ -9,6 +9,7 @@ import numpy as np
 
 from contour.edge.edge_evidence import ring_evidence
 from contour.edge.mirrored_block import is_mirrored, mirrored_block
+from contour.edge.open_cells import without_open_cells
 from contour.edge.table_look import TableLook, table_look
 from contour.edge.visible_edge import doubtful, visible_rings
 from contour.errors import NoBlockFound, ParameterError
@@ -213,7 +214,7 @@ def looked_at(picture: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[Bloc
         seen = replace(seen, others=earlier)
         look = table_look(picture, seen, plain=plain)
         if walls.relief is not None:
-            look = replace(look, shade=np.zeros_like(look.shade))
+            look = without_open_cells(replace(look, shade=np.zeros_like(look.shade)), walls.relief)
         if not (seen.leaves_picture or any(doubtful(ring, look).any() for ring in seen.rings)):
             break
         known = np.zeros_like(look.hiding) if hidden is None else hidden

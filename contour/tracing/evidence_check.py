@@ -17,7 +17,7 @@ _FAR_OFF_PITCHES = 0.5
 # A clean end outside is a chip, or a streak that a wall's side makes, only where the outline meets the ends beside it.
 _FAR_OUTSIDE_PITCHES, _CLEAN_OUTSIDE_PITCHES = 1.0 / 3.0, 1.0 / 6.0
 _IN_A_ROW, _IN_A_ROW_OUTSIDE = 4, 2
-# What stands out of a known table as walls do, and as far along, is one: of 335 outlines one leaves such outside, off
+# What stands out of a known table as walls do, and as far along, is one: of 288 outlines one leaves such outside, off
 # by 0.58 of a cell. Beside right ones lie streaks, 0.7 as high as walls at most, and specks, 0.4 pitches long.
 _OUTSIDE_PITCHES, _FAR_OUT_PITCHES, _LONG_PITCHES, _LIKE_WALLS = 0.2, 0.3, 0.5, 0.75
 # Neighbours on a wall's boundary are an eighth of a pitch apart, its two sides a wall's width.

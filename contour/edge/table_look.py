@@ -76,6 +76,11 @@ class TableLook:
     plain: bool = True
     """Whether what lies beside the block is judged: not where the table mirrors it, or has borders of its own."""
 
+    def without(self, parts: Bools) -> TableLook:
+        """The same without some of what is foreign, (h, w)."""
+        foreign = self.foreign & ~parts
+        return replace(self, foreign=foreign, things=self.things & ~parts, away=_away(foreign, self.step))
+
     def foreign_at(self, points: Float64s) -> Float64s:
         """Distance of points (N, 2), pixels, from the nearest foreign thing, shape (N,), pixels."""
         grid = samples_of(points, self.step)

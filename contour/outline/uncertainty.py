@@ -26,7 +26,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices, medians, rolled
+from contour.geometry.arrays import Complexes, Float64s, Indices, medians, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.outline.fit import FittedRing
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
@@ -125,12 +125,17 @@ def uncertainty(
     pitch_px: float,
     blur_px: float,
     clipped: float = 0.0,
+    known_table: bool = False,
 ) -> tuple[RingBounds, ...]:
     """How sure the outline is: each ring by place, and all of them as a whole.
 
-    clipped: share of the witnesses beside which walls are at full scale.
+    clipped: share of the witnesses beside which walls are at full scale. known_table: walls are what differs from a
+    table that was taught, so that nothing of it passes for one.
     """
-    stretches = [ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, clipped=clipped) for ring in rings]
+    stretches = [
+        ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, clipped=clipped, known_table=known_table)
+        for ring in rings
+    ]
     sigma = [one.sigma(Coefficients()) for one in stretches]
     whole = max(bound(np.concatenate(sigma), np.concatenate([one.length for one in stretches])), LEAST_PX)
     found = []
@@ -157,7 +162,13 @@ def bound(sigma: Float64s, length: Float64s) -> float:
 
 
 def ring_stretches(
-    evidence: RingEvidence, fitted: FittedRing, *, pitch_px: float, blur_px: float, clipped: float = 0.0
+    evidence: RingEvidence,
+    fitted: FittedRing,
+    *,
+    pitch_px: float,
+    blur_px: float,
+    clipped: float = 0.0,
+    known_table: bool = False,
 ) -> Stretches:
     """The stretches of one ring and the causes of error in each."""
     on_line = _on_line(evidence, fitted)
@@ -167,7 +178,7 @@ def ring_stretches(
     length = np.maximum(np.diff(position, append=position[0] + around), 0.0)
     leverage = _leverage(evidence, fitted, np.mod(position + 0.5 * length, around), around)
     residual = np.clip(fitted.residual, -_CAP_PITCHES * pitch_px, _CAP_PITCHES * pitch_px)
-    blunt = _blunt_corners(evidence, fitted, on_line, pitch_px)
+    blunt = _blunt_corners(evidence, fitted, on_line, pitch_px, blur_px if known_table else None)
     together = np.maximum(_largest_between(np.abs(_middle_of_five(residual)), on_line), blunt)
     left_out = ~fitted.inlier & (evidence.kind != WitnessKind.OUTERMOST)
     return Stretches(
@@ -224,12 +235,14 @@ def _leverage(evidence: RingEvidence, fitted: FittedRing, place: Float64s, aroun
     return np.asarray(np.interp(place, at[order], ratio[order], period=around), np.float64)
 
 
-def _blunt_corners(evidence: RingEvidence, fitted: FittedRing, on_line: Indices, pitch_px: float) -> Float64s:
+def _blunt_corners(
+    evidence: RingEvidence, fitted: FittedRing, on_line: Indices, pitch_px: float, walls_within_px: float | None
+) -> Float64s:
     """How far each stretch's corner lies from the arc that may run there instead, pixels, shape (S,); 0 without one.
 
     Between the witnesses on both sides of an obtuse corner others may lie inside of it and be left out as broken walls:
     they are those of a round corner. An arc that leaves both lines at a distance a from a corner that turns by t passes
-    it by a tan(t / 4).
+    it by a tan(t / 4). Where it is known within how many pixels walls are seen, none leaves any of them outside.
     """
     found = np.zeros(len(on_line))
     ring = fitted.ring
@@ -249,10 +262,33 @@ def _blunt_corners(evidence: RingEvidence, fitted: FittedRing, on_line: Indices,
         between = (ahead < reach[0]) | (lengths.length - ahead < reach[1])
         least = _INSIDE_PITCHES if abs(turn[corner]) < _OBTUSE[1] else _DEEP_PITCHES
         if np.any(between & (inside > least * pitch_px)):
-            passed = 0.5 * sum(reach) * math.tan(abs(turn[corner]) / 4.0)
+            leaves = 0.5 * sum(reach)
+            if walls_within_px is not None:
+                if turn[corner] < 0.0:
+                    continue
+                inwards = heading[corner] / abs(heading[corner]) - heading[corner - 1] / abs(heading[corner - 1])
+                inwards /= abs(inwards)
+                off = evidence.walls.points - ring[corner]
+                walls = (off[:, 0] + 1j * off[:, 1]) * inwards.conjugate() + walls_within_px
+                leaves = min(leaves, _farthest_around(walls, float(turn[corner])))
+            passed = leaves * math.tan(abs(turn[corner]) / 4.0)
             stretch = int(np.searchsorted(on_line, before))
             found[stretch] = max(found[stretch], min(passed, _CAP_PITCHES * pitch_px))
     return found
+
+
+def _farthest_around(points: Complexes, turn: float) -> float:
+    """How far from a corner of that turn an arc may leave both lines and have none of the points (N,) outside; they are
+    as seen from the corner, real: along the line that halves it, inwards. Inf without any within both lines.
+
+    The circle of radius r around r / cos(t / 2) on that line goes through a point twice: where it first takes it in,
+    and where it leaves it in the corner. It leaves the lines at r tan(t / 2).
+    """
+    cosine, tangent = math.cos(0.5 * turn), math.tan(0.5 * turn)
+    within = points[points.real * cosine > np.abs(points.imag) * math.sin(0.5 * turn)]
+    along = within.real / cosine
+    square = np.maximum(along**2 - (tangent * np.abs(within)) ** 2, 0.0)
+    return float(((along + np.sqrt(square)) / tangent).min(initial=np.inf))
 
 
 def _middle_of_five(residual: Float64s) -> Float64s:

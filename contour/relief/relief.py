@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bytes, Float32s, Float64s
-from contour.image.pixel_sampling import FULL_SCALE, planes_of
+from contour.image.pixel_sampling import FULL_SCALE, planes_of, sample_at
 
 # The table's shade is the median of its light now over what it was, over so many pitches: cells show more of the
 # table than walls cover. The median of so many samples is enough, in steps of a 64th that a blur takes out again.
@@ -64,6 +64,17 @@ class Relief:
     lit: Bytes
     displacement: Displacement
     wall_px: float
+
+    def height_at(self, points: Float64s) -> Float64s:
+        """By how much walls at points (N, 2) of their boundary differ from the table, at most, grey levels, shape (N,):
+        in the channel in which they do most, within half a wall of each.
+        """
+        half = max(1, round(0.5 * self.wall_px))
+        steps = np.arange(-half, half + 1)
+        across, down = (side.ravel() for side in np.meshgrid(steps, steps))
+        x, y = points[:, :1] + across, points[:, 1:] + down
+        heights = [np.abs(sample_at(plane, x, y)).max(axis=1) for plane in self.signed]
+        return np.asarray(np.max(heights, axis=0), np.float64)
 
     def cut(self, first: Float64s, size: tuple[int, int]) -> Relief:
         """The same of a part of the picture, whose first pixel is `first` (x, y), of `size` (width, height)."""

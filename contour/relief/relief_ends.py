@@ -36,12 +36,14 @@ _SHARED_NOISE = 1.5
 @dataclass(frozen=True, eq=False)
 class ReliefEnds:
     """Ends of walls' tops (N, 2), picture pixels, standard deviations across the outline (N,), inf where nothing tells,
-    and the share of all difference around each end that top and side explain (N,).
+    the share of all difference around each end that top and side explain (N,), and how much top and side differ from
+    the table there, root mean square, grey levels (N,).
     """
 
     point: Float64s
     sigma: Float64s
     told: Float64s
+    height: Float64s
 
 
 def relief_ends(
@@ -53,19 +55,19 @@ def relief_ends(
     ends = list(zip(tip, axis, normal, relief.displacement.at(tip), strict=True))
 
     def fitted(some: slice, width: float) -> Float64s:
-        return np.array([_fitted(relief, end, width, pitch_px, blur_px) for end in ends[some]]).reshape(-1, 4)
+        return np.array([_fitted(relief, end, width, pitch_px, blur_px) for end in ends[some]]).reshape(-1, 5)
 
     # Walls in which top and side are alike measure as wide as both: the width by which most is explained is the top's.
     few = slice(None, None, max(1, len(ends) // _FEW))
     width = max((part * relief.wall_px for part in _WIDTHS), key=lambda width: float(fitted(few, width)[:, 3].sum()))
     values = fitted(slice(None), width)
-    return ReliefEnds(values[:, :2], values[:, 2], values[:, 3])
+    return ReliefEnds(values[:, :2], values[:, 2], values[:, 3], values[:, 4])
 
 
 def _fitted(
     relief: Relief, seen_end: tuple[Float64s, ...], width: float, pitch_px: float, blur_px: float
-) -> tuple[float, float, float, float]:
-    """Point x and y, standard deviation, share explained, of an end's tip, axis, normal and what lies below."""
+) -> tuple[float, float, float, float, float]:
+    """Point x and y, standard deviation, share explained, height, of an end's tip, axis, normal and what lies below."""
     tip, axis, normal, below = seen_end
     across = np.array([-axis[1], axis[0]])
     inwards, aside = float(below @ axis), float(below @ across)
@@ -94,7 +96,10 @@ def _fitted(
     # Sliding counts from the last end and centre to the first.
     rows = lost.min(axis=1)
     row = int(np.argmin(rows))
-    end, centre = float(ends[-1 - row]), float(centres[-1 - int(np.argmin(lost[row]))])
+    column = int(np.argmin(lost[row]))
+    end, centre = float(ends[-1 - row]), float(centres[-1 - column])
+    covered = squares[0][row, column] + squares[2][row, column] + _LEAST_WEIGHT
+    height = float(np.sqrt((total - rows[row]) / covered))
     told, sigma = 1.0 - float(rows[row]) / max(total, 1e-9), np.inf
     if 0 < row < len(rows) - 1:
         before, here, after = rows[row - 1 : row + 2].tolist()
@@ -104,7 +109,7 @@ def _fitted(
             free = max(len(seen) * ones.size * step * step - 5.0, 1.0)
             sigma = _SHARED_NOISE * cosine * step * float(np.sqrt(2.0 * here / free / bend))
     x, y = (tip + step * end * axis + step * centre * across).tolist()
-    return x, y, sigma, told
+    return x, y, sigma, told, height
 
 
 def _explained(of_top: Float64s, of_side: Float64s, top: Float64s, both: Float64s, side: Float64s) -> Float64s:

@@ -15,7 +15,7 @@ from contour.outline.fit import fit_ring
 from contour.outline.uncertainty import LEAST_PX, Coefficients, bound, ring_stretches, uncertainty
 from contour.tracing.trace import TraceSettings
 from contour.tracing.wall_tips import wall_tips
-from contour.walls.wall_evidence import RingEvidence, WitnessKind
+from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, blob, circle, perimeter, rectangle, witnesses
 from tests.support.pictures.small_scenes import block
 
@@ -183,6 +183,41 @@ def test_a_corner_that_leaves_witnesses_inside_may_be_a_round_one(corners: int, 
     assert np.count_nonzero(seen.misfit > 1.0) == (1 if blunt else 0)
     if blunt:  # the two that are left lie some 1.3 pitches from the corner
         assert seen.misfit.max() == pytest.approx(1.3 * PITCH * np.tan(0.5 * np.pi / corners), rel=0.4)
+
+
+@pytest.mark.parametrize(("wall", "known", "passed"), [(0.1, False, 1.0), (0.1, True, 0.3), (1.0, True, 1.0)])
+def test_on_a_known_table_a_round_corner_leaves_no_walls_outside(wall: float, known: bool, passed: float) -> None:
+    """Of a wall `wall` pitches from the corner of a block, and of how far the roundest corner passes it."""
+    angle = 0.25 * np.pi * np.arange(8)
+    ring = 250.0 * np.column_stack([np.cos(angle), np.sin(angle)]) + np.array([700.0, 500.0])
+    evidence = witnesses(ring, seed=3, sigma=0.05)
+    fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
+    beside = np.argsort(np.hypot(*(evidence.points - ring[1]).T))[:2]
+    residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
+    residual[beside], inlier[beside] = -0.06 * PITCH, False
+    off = replace(fitted, residual=residual, inlier=inlier)
+    inwards = (np.array([700.0, 500.0]) - ring[1]) / 250.0
+    seen = replace(evidence, walls=EdgePoints(ring[1] + wall * PITCH * inwards[None]))
+    before = ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0).misfit.max()
+    after = ring_stretches(seen, off, pitch_px=PITCH, blur_px=1.0, known_table=known).misfit.max()
+    assert before > 0.2 * PITCH
+    assert after == pytest.approx(before) if passed == 1.0 else after < 0.15 * PITCH < before
+
+
+def test_on_a_known_table_ends_deep_in_the_comb_beside_a_notch_say_nothing_of_its_roundness() -> None:
+    """A round one would have material where the corner is, and ends out there."""
+    notch = np.array([[300, 200], [800, 200], [800, 450], [550, 450], [550, 600], [300, 600]], dtype=np.float64)
+    evidence = witnesses(notch, seed=3, sigma=0.05)
+    fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
+    beside = np.argsort(np.hypot(*(evidence.points - notch[3]).T))[:2]
+    residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
+    residual[beside], inlier[beside] = -0.25 * PITCH, False
+    off = replace(fitted, residual=residual, inlier=inlier)
+    unknown, known = (
+        ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0, known_table=one).misfit.max()
+        for one in (False, True)
+    )
+    assert known < 0.3 < unknown
 
 
 @given(st.floats(0.1, 3.0), st.integers(1, 40))

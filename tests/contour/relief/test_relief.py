@@ -83,3 +83,15 @@ def test_an_end_is_that_of_the_top_whether_it_or_the_side_is_seen(top: float, mi
     assert found.point[0, 0] == pytest.approx(80.3, abs=0.7)
     assert found.told[0] > 0.8
     assert found.sigma[0] < 1.0
+
+
+def test_what_differs_from_the_table_by_little_is_told_to_be_low() -> None:
+    """Grain that shows through a shade ends as a wall does, and may be as long."""
+    tip, out = np.array([[80.0, 80.0]]), np.array([[1.0, 0.0]])
+    heights = []
+    for part in (1.0, 0.1):
+        light = part * strip(80.3, 60.0, -40.0, (0.0, 0.0))
+        relief = Relief(np.zeros((SIZE, SIZE), np.uint8), (light,), np.zeros((SIZE, SIZE), np.uint8), NONE, WIDTH)
+        heights.append(relief_ends(relief, tip, out, out, pitch_px=PITCH, blur_px=0.6).height[0])
+    assert heights[0] == pytest.approx(60.0, rel=0.2)
+    assert heights[1] == pytest.approx(0.1 * heights[0], rel=0.01)

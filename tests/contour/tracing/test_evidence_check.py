@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
-from contour.tracing.evidence_check import check_against_evidence
-from contour.walls.wall_evidence import RingEvidence, WitnessKind
+from contour.relief.relief import Displacement, Relief
+from contour.tracing.evidence_check import check_against_evidence, check_against_relief
+from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, rectangle, witnesses
 
 BLOCK = rectangle(900.0, 600.0)
@@ -109,3 +110,31 @@ def test_an_outline_that_cuts_off_the_end_of_an_edge_that_it_was_laid_through_is
     check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
     with pytest.raises(NoBlockFound, match="more than half a cell" if pitches < 0.0 else "more than a third of a cell"):
         check_against_evidence(replace(evidence, points=moved), BLOCK, off | ~off, PITCH, None)
+
+
+@pytest.mark.parametrize(
+    ("long", "height", "refused"),
+    [(0.8, 1.0, True), (0.8, 0.5, False), (0.2, 1.5, False)],
+    ids=["wall", "streak", "dust"],
+)
+def test_a_wall_outside_that_stands_out_of_a_known_table_as_walls_do_is_refused(
+    long: float, height: float, refused: bool
+) -> None:
+    """Of walls just within an edge, and one along it half a cell out, of that length and so many times as high."""
+    evidence = witnesses(BLOCK, seed=2)
+    first, along = BLOCK[0], (BLOCK[1] - BLOCK[0]) / np.hypot(*(BLOCK[1] - BLOCK[0]))
+    out = np.array([along[1], -along[0]])
+    own = first + np.arange(50.0, 350.0, PITCH / 8)[:, None] * along - 2.0 * out
+    wall = first + np.arange(400.0, 400.1 + long * PITCH, PITCH / 8)[:, None] * along + 0.5 * PITCH * out
+    light = np.zeros((1200, 1500), np.float32)
+    for points, level in ((own, 40.0), (wall, 40.0 * height)):
+        for x, y in np.rint(points).astype(int).tolist():
+            light[y - 1 : y + 2, x - 1 : x + 2] = level
+    flat = np.zeros(light.shape, np.uint8)
+    relief = Relief(flat, (light,), flat, Displacement(0.0, np.zeros(2)), 4.0)
+    seen = replace(evidence, walls=EdgePoints(np.concatenate([own, wall])))
+    if refused:
+        with pytest.raises(NoBlockFound, match="leaves a wall outside near"):
+            check_against_relief(seen, BLOCK, relief, PITCH, None)
+    else:
+        check_against_relief(seen, BLOCK, relief, PITCH, None)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contour.geometry.arrays import Bools, Float64s, Indices, rolled
-from contour.outline.labelling import PRICE_ARC, PRICE_LINE, Labelling
+from contour.outline.labelling import PRICE_ARC, PRICE_LINE
 from contour.outline.lines_and_arcs import Models, distance, feet, join, refine, through_pairs, through_triples
 from contour.outline.proposals import Proposals, gather, gentle, window_fits
 from contour.outline.witnesses import Witnesses, cost, weights
@@ -37,9 +37,8 @@ class Segments:
         return rolled(owner, int(self.first[0]))[:count]
 
 
-def runs(labelling: Labelling, proposals: Proposals) -> Segments:
-    """The labelling's runs as segments."""
-    label = labelling.label
+def runs(label: Indices, proposals: Proposals) -> Segments:
+    """The runs of a labelling, (N,), as segments."""
     first = np.flatnonzero(label != rolled(label, 1))
     if not len(first):
         first = np.zeros(1, dtype=np.intp)

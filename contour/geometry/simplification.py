@@ -133,15 +133,14 @@ def _shortest(path: Float64s, candidates: Indices, tolerance: float) -> Indices:
     # Neighbours among the candidates are joined by Douglas-Peucker's own bound; rounding must not cut the path.
     allowed[np.arange(len(candidates) - 1), np.arange(1, len(candidates))] = True
     shifted = _area_shift(path, candidates)
-    price = shifted / (shifted[allowed].sum() + 1.0)
+    price = np.where(allowed, shifted / (shifted[allowed].sum() + 1.0), np.inf)
     cost = np.full(len(candidates), np.inf)
     before = np.zeros(len(candidates), np.intp)
     cost[0] = 0
     for k in range(len(candidates) - 1):
-        ahead = np.flatnonzero(allowed[k])
-        through = cost[k] + 1 + price[k, ahead]
-        better = through < cost[ahead]
-        cost[ahead[better]], before[ahead[better]] = through[better], k
+        through = cost[k] + 1 + price[k]
+        before[through < cost] = k
+        np.minimum(cost, through, out=cost)
     chosen = [len(candidates) - 1]
     while chosen[-1]:
         chosen.append(int(before[chosen[-1]]))

@@ -190,8 +190,7 @@ def pieces_and_boxes(mask: Bytes, connectivity: int) -> tuple[Int32s, Int32s]:
     """
     count, pieces, main, others = _pieces(mask, connectivity)
     if len(others) > _MOST_OTHERS:
-        _, _, counted, _ = cv2.connectedComponentsWithStats(mask, connectivity=connectivity)
-        return pieces, np.asarray(counted, np.int32)
+        return pieces, _boxes_and_middles(mask, count, pieces)[0]
     stats = np.zeros((count, 5), np.int32)
     number, (rows, columns) = pieces.ravel().take(others), np.divmod(others, mask.shape[1])
     first, last = np.full((2, count), np.iinfo(np.int32).max), np.full((2, count), -1)
@@ -204,6 +203,34 @@ def pieces_and_boxes(mask: Bytes, connectivity: int) -> tuple[Int32s, Int32s]:
         stats[main, :4] = cv2.boundingRect((pieces == main).view(np.uint8))
         stats[main, 4] = cv2.countNonZero(mask) - len(others)
     return pieces, stats
+
+
+def pieces_and_middles(mask: Bytes, connectivity: int) -> tuple[Int32s, Int32s, Float64s]:
+    """As `pieces_and_boxes`, and the mean place (x, y) of each, (N, 2), 0 for black: where many are alike in size what
+    connectedComponentsWithStats tells is had in two thirds of its time.
+    """
+    count, pieces = pieces_of(mask, connectivity)
+    return pieces, *_boxes_and_middles(mask, count, pieces)
+
+
+def _boxes_and_middles(mask: Bytes, count: int, pieces: Int32s) -> tuple[Int32s, Float64s]:
+    """Left, top, width, height and area of `count` numbered pieces, (N, 5), and their mean places, (N, 2), 0 for black,
+    by their runs along rows.
+    """
+    wide = mask.shape[1] + 2  # black on both sides, or a run would go on in the next row
+    along = np.asarray(cv2.copyMakeBorder(mask, 0, 0, 1, 1, cv2.BORDER_CONSTANT), np.uint8).ravel()
+    ends = np.flatnonzero(along[1:] != along[:-1])
+    (rows, left), size = np.divmod(ends[::2], wide), ends[1::2] - ends[::2]
+    number = pieces[rows, left]
+    area = np.bincount(number, size, count)
+    middles = [np.bincount(number, size * mean, count) for mean in (left + 0.5 * (size - 1), rows)]
+    first, behind = np.full((2, count), np.iinfo(np.int32).max), np.zeros((2, count), np.int64)
+    np.minimum.at(first[0], number, left)
+    np.maximum.at(behind[0], number, left + size)
+    first[1, number[::-1]], behind[1, number] = rows[::-1], rows + 1  # rows rise: the last that is put down stays
+    stats = np.zeros((count, 5), np.int32)
+    stats[1:, :2], stats[1:, 2:4], stats[:, 4] = first[:, 1:].T, (behind - first)[:, 1:].T, area
+    return stats, np.column_stack(middles) / np.maximum(area, 1.0)[:, None]
 
 
 def _pieces(mask: Bytes, connectivity: int) -> tuple[int, Int32s, int, Indices]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rings import Contour, Ring
+from contour.image.opencv import pieces_and_boxes
 from contour.narrow_features.feature import WIDTH, NarrowFeature
 
 # In cell pitches.
@@ -74,7 +75,7 @@ def _narrow_parts(drawn: Bytes, first: Float64s, pitch_px: float, kind: _Kind) -
     framed = cv2.copyMakeBorder(room, end, end, end, end, cv2.BORDER_CONSTANT)
     away = np.minimum(cv2.distanceTransform(1 - wide, cv2.DIST_L2, 5), width + height) / _PITCH_SAMPLES
     away -= 0.5 * kind.narrow
-    _, parts, stats, _ = cv2.connectedComponentsWithStats((drawn & (away > 0.5 * kind.long)).astype(np.uint8))
+    parts, stats = pieces_and_boxes((drawn & (away > 0.5 * kind.long)).astype(np.uint8), 8)
     found = []
     for part, (left, top, wide_px, high_px, _) in enumerate(stats[1:].tolist(), 1):
         box = slice(top, top + high_px), slice(left, left + wide_px)

@@ -20,7 +20,7 @@ from contour.outline.lines_and_arcs import distance
 from contour.outline.missed_walls import overlooked, with_bounds
 from contour.outline.proposals import FEW, gather, propose, renewed
 from contour.outline.roundings import maybe_round, rounded
-from contour.outline.runs import Segments, around, fitted, runs
+from contour.outline.runs import Segments, around, refitted, runs
 from contour.outline.spread import Vertices, unseen_share, vertex_sigma
 from contour.outline.witnesses import Witnesses, noise_from_neighbours, noise_from_residuals, prepare, scaled
 from contour.walls.wall_evidence import RingEvidence
@@ -160,7 +160,7 @@ def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
     segments, first = runs(label(witnesses, proposals), proposals), proposals
     least = _LEAST_NOISE
     for round_ in range(_ROUNDS):
-        segments = _refitted(witnesses, segments)
+        segments = refitted(witnesses, segments)
         if round_ < 2:
             noise = max(noise_from_residuals(witnesses, residuals(witnesses, segments)), least)
             witnesses, least = scaled(witnesses, noise), least / noise
@@ -175,12 +175,7 @@ def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
         segments = found
         if settled:
             break
-    return witnesses, _refitted(witnesses, segments)
-
-
-def _refitted(witnesses: Witnesses, segments: Segments) -> Segments:
-    models, _ = fitted(witnesses, segments.models, segments.bend, segments.first, segments.length)
-    return replace(segments, models=models)
+    return witnesses, refitted(witnesses, segments)
 
 
 def residuals(witnesses: Witnesses, segments: Segments) -> Float64s:

@@ -44,14 +44,6 @@ _FAR = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class Labelling:
-    """label: proposal of each witness, shape (N,). energy: nats of the whole ring."""
-
-    label: Indices
-    energy: float
-
-
-@dataclass(frozen=True, eq=False)
 class _Reach:
     """From each state's foot along its model to the nearest witness that lies on it, back and ahead: shape (N, A),
     pixels, 0 where none does."""
@@ -60,8 +52,8 @@ class _Reach:
     ahead: Float64s
 
 
-def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
-    """The cheapest labelling of the ring's witnesses by `proposals`, each within its own stretch."""
+def label(witnesses: Witnesses, proposals: Proposals) -> Indices:
+    """The proposal of each witness, shape (N,): the cheapest labelling of the ring, each within its own stretch."""
     here, last, following = _states(witnesses, proposals)
     count = len(witnesses)
     models = proposals.models.take(np.maximum(here, 0))
@@ -78,8 +70,7 @@ def label(witnesses: Witnesses, proposals: Proposals) -> Labelling:
     unary = np.where(facing > -0.2, unary, unary + 20.0)
     step = _steps(witnesses, proposals, here, foot, tangent, reached)
     step += rolled(unary, -1)[:, None, :]
-    path, energy = _cheapest_cycle(step, unary)
-    return Labelling(here[np.arange(count), path], energy)
+    return here[np.arange(count), _cheapest_cycle(step, unary)]
 
 
 def _states(witnesses: Witnesses, proposals: Proposals) -> tuple[Indices, Indices, Indices]:
@@ -229,15 +220,14 @@ def _excess(reach: Float64s, pitch_px: float, gap: Float64s) -> Float64s:
     return excess
 
 
-def _cheapest_cycle(step: Float64s, first: Float64s) -> tuple[Indices, float]:
-    """Cheapest closed path: step[i] holds prices from i to i + 1 (cyclic), with the price of being there; and its
-    price.
+def _cheapest_cycle(step: Float64s, first: Float64s) -> Indices:
+    """Cheapest closed path: step[i] holds prices from i to i + 1 (cyclic), with the price of being there.
 
     An open pass finds the path's longest run; a second pass starts and ends in the middle of it, in its state.
     """
     count = len(step)
     start = int((first < _FAR).sum(axis=1).argmin())
-    path, _ = _cheapest_path(rolled(step, -start), first[start], None)
+    path = _cheapest_path(rolled(step, -start), first[start], None)
     change = np.flatnonzero(np.diff(path, prepend=-1, append=-1))
     longest = int(np.diff(change).argmax())
     anchor = int(change[longest] + change[longest + 1]) // 2
@@ -245,26 +235,23 @@ def _cheapest_cycle(step: Float64s, first: Float64s) -> tuple[Indices, float]:
     anchor = (anchor + start) % count
     initial = np.full(step.shape[1], _FAR)
     initial[state] = 0.0
-    path, energy = _cheapest_path(rolled(step, -anchor), initial, state)
-    return rolled(path, anchor), energy
+    return rolled(_cheapest_path(rolled(step, -anchor), initial, state), anchor)
 
 
-def _cheapest_path(step: Float64s, initial: Float64s, closing: int | None) -> tuple[Indices, float]:
-    """Cheapest path from the initial prices, open or (where `closing` is a state) back to that state, and its price."""
-    count, width = step.shape[0], step.shape[1]
-    room = np.empty((width, width))
-    totals = np.empty((count, width))
+def _cheapest_path(step: Float64s, initial: Float64s, closing: int | None) -> Indices:
+    """Cheapest path from the initial prices, open or (where `closing` is a state) back to that state; of `step` it
+    makes the prices of coming that way.
+    """
+    totals = np.empty(step.shape[:2])
     totals[0] = initial
     add, least = np.add, np.minimum.reduce
     for before, price, after in zip(totals[:, :, None], step, totals[1:], strict=False):
-        least(add(before, price, out=room), axis=0, out=after)
-    last = totals[count - 1] if closing is None else totals[count - 1] + step[count - 1, :, closing]
-    at = int(last.argmin())
-    path = np.empty(count, dtype=np.intp)
-    path[count - 1] = at
-    for i in range(count - 2, -1, -1):
-        path[i] = at = int(add(totals[i], step[i, :, at]).argmin())
-    return path, float(last[path[count - 1]])
+        least(add(before, price, price), 0, None, after)
+    last = totals[-1] if closing is None else totals[-1] + step[-1, :, closing]
+    path = [int(last.argmin())]
+    for coming in step[-2::-1].argmin(axis=1).tolist():
+        path.append(coming[path[-1]])
+    return np.array(path[::-1], np.intp)
 
 
 def _reach(witnesses: Witnesses, models: Models, foot: Complexes, *, last: Indices, following: Indices) -> _Reach:

@@ -140,15 +140,14 @@ def _different(witnesses: Witnesses, fits: Proposals) -> Indices:
     saved, total, gain = saved[rising], total[rising], fits.gain[rising]
     begin = np.searchsorted(total, total / (1.0 + _SAME) - _ROUNDING).tolist()
     end = np.searchsorted(total, total / (1.0 - _SAME) + _ROUNDING, side="right").tolist()
-    left = np.ones(len(fits), np.bool_)
+    left, most = np.ones(len(fits), np.bool_), _SAME * total
     kept: list[int] = []
     for best in np.lexsort((rising, -gain)).tolist():
         if left[best]:
             kept.append(best)
-            near = np.flatnonzero(left[begin[best] : end[best]]) + begin[best]
-            apart = saved[near]
-            apart -= saved[best]
-            left[near] = np.abs(apart, out=apart).sum(axis=1) > _SAME * total[near]
+            near = slice(begin[best], end[best])
+            apart = saved[near] - saved[best]
+            left[near] &= np.abs(apart, out=apart).sum(axis=1) > most[near]
     return rising[kept]
 
 

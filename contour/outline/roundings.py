@@ -110,18 +110,20 @@ def rounded(witnesses: Witnesses, segments: Segments, found: Joints) -> tuple[Se
         if not better:
             break
         ring = _inserted(witnesses, ring, *max(better, key=lambda one: float(one[1].gain[0])))
+    corners = _corners(witnesses, ring, (0,))
     for sign in (1.0, -1.0):
-        radius = _common_radius(witnesses, ring, sign)
+        radius = _common_radius(witnesses, ring, corners, sign)
         while radius is not None:
             alike = [
                 (corner, arcs)
-                for corner in _corners(witnesses, ring, (0,))
+                for corner in corners
                 if corner.turn * sign > 0.0
                 and (arcs := _arcs(witnesses, corner, np.array([radius]))).gain[0] + PRICE_ROUNDING > -_UNLIKE
             ]
             if not alike:
                 break
             ring = _inserted(witnesses, ring, *alike[0])
+            corners = _corners(witnesses, ring, (0,))
     return ring.segments, ring.found, ring.made
 
 
@@ -137,11 +139,10 @@ def maybe_round(witnesses: Witnesses, segments: Segments, found: Joints, made: B
     return np.array(places, np.complex128)
 
 
-def _common_radius(witnesses: Witnesses, ring: _Ring, sign: float) -> float | None:
-    """Radius that the remaining corners of one sense share with each other or with those that were rounded, negative
-    for reflex ones; None where they are better left as they are.
+def _common_radius(witnesses: Witnesses, ring: _Ring, every: list[_Corner], sign: float) -> float | None:
+    """Radius that those of the remaining corners that are of one sense share with each other or with those that were
+    rounded, negative for reflex ones; None where they are better left as they are.
     """
-    every = _corners(witnesses, ring, (0,))
     corners = [corner for corner in every if corner.turn * sign > 0.0]
     if not corners or len(ring.segments) < 3:
         return None
@@ -160,9 +161,9 @@ def _common_radius(witnesses: Witnesses, ring: _Ring, sign: float) -> float | No
 def _corners(witnesses: Witnesses, ring: _Ring, between: tuple[int, ...]) -> list[_Corner]:
     """All that may be rounded, over so many segments each."""
     segments = ring.segments
-    signed = distance(segments.models.take(segments.owner(len(witnesses))), witnesses.points)
+    nats = cost(witnesses, distance(segments.models.take(segments.owner(len(witnesses))), witnesses.points))
     tried = [
-        _corner(witnesses, ring, signed, k, inner)
+        _corner(ring, nats, k, inner)
         for k in range(len(segments))
         for inner in between
         if len(segments) >= 3 + inner and not ring.made[(k + np.arange(inner + 2)) % len(segments)].any()
@@ -170,8 +171,8 @@ def _corners(witnesses: Witnesses, ring: _Ring, between: tuple[int, ...]) -> lis
     return [corner for corner in tried if corner is not None]
 
 
-def _corner(witnesses: Witnesses, ring: _Ring, signed: Float64s, k: int, between: int) -> _Corner | None:
-    """What may be rounded after segment `k`, None where there is no corner."""
+def _corner(ring: _Ring, nats: Float64s, k: int, between: int) -> _Corner | None:
+    """What may be rounded after segment `k`, None where there is no corner; `nats`: what each witness costs now."""
     segments, found, total = ring.segments, ring.found, len(ring.segments)
     members = (k + np.arange(between + 2)) % total
     after = int(members[-1])
@@ -184,12 +185,11 @@ def _corner(witnesses: Witnesses, ring: _Ring, signed: Float64s, k: int, between
     length = segments.length[members]
     if length.sum() < 3:
         return None
-    index = (segments.first[k] + np.arange(int(length.sum()))) % len(witnesses)
+    index = (segments.first[k] + np.arange(int(length.sum()))) % len(nats)
     part = np.repeat([0, *[1] * between, 2], length)
-    present = cost(witnesses, signed[index], index)
     fixed = sum(PRICE_ARC if segments.bend[m] else PRICE_LINE for m in members[1:-1]) - PRICE_ROUNDING
     ends = complex(found.begin[k - 1]), complex(found.end[after])
-    return _Corner(k, after, edges, near, far, turn, ends, index, part, present, fixed)
+    return _Corner(k, after, edges, near, far, turn, ends, index, part, nats[index], fixed)
 
 
 def _best_arc(witnesses: Witnesses, corner: _Corner) -> _Arcs | None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from contour.geometry.arrays import Bools, Float64s, Indices, rolled
-from contour.outline.labelling import PRICE_ARC, PRICE_LINE, Labelling
+from contour.outline.labelling import PRICE_ARC, PRICE_LINE
 from contour.outline.lines_and_arcs import Models, distance, feet, join, refine, through_pairs, through_triples
 from contour.outline.proposals import Proposals, gather, gentle, window_fits
-from contour.outline.witnesses import Witnesses, cost, weights
+from contour.outline.witnesses import Witnesses, weights, window_cost
 
 _MOST_PLACES = 160
 # Witnesses by which a stretch inside of the outline is shifted, to share the rest with what lies beside it.
@@ -37,9 +37,8 @@ class Segments:
         return rolled(owner, int(self.first[0]))[:count]
 
 
-def runs(labelling: Labelling, proposals: Proposals) -> Segments:
-    """The labelling's runs as segments."""
-    label = labelling.label
+def runs(label: Indices, proposals: Proposals) -> Segments:
+    """The runs of a labelling, (N,), as segments."""
     first = np.flatnonzero(label != rolled(label, 1))
     if not len(first):
         first = np.zeros(1, dtype=np.intp)
@@ -58,18 +57,19 @@ def stretch(count: int, first: Indices, length: Indices) -> tuple[Indices, Float
     return (first[:, None] + np.minimum(offset, length[:, None] - 1)) % count, multiplicity
 
 
-def fitted(
-    witnesses: Witnesses, models: Models, bend: Bools, first: Indices, length: Indices
-) -> tuple[Models, Float64s]:
-    """Models refitted robustly to their own stretches, and the nats each saves there over calling all outliers."""
-    index, multiplicity = stretch(len(witnesses), first, length)
+def refitted(witnesses: Witnesses, segments: Segments) -> Segments:
+    """The segments, their models fitted robustly to their own witnesses."""
+    index, multiplicity = stretch(len(witnesses), segments.first, segments.length)
+    return replace(segments, models=_fitted(witnesses, segments.models, segments.bend, index, multiplicity))
+
+
+def _fitted(witnesses: Witnesses, models: Models, bend: Bools, index: Indices, multiplicity: Float64s) -> Models:
+    """Models fitted robustly to the stretches of witnesses at `index`, as `stretch` tells them."""
     points = witnesses.points[index]
     for _ in range(_STEPS):
         signed = distance(models.take((slice(None), None)), points)
         models = refine(models, points, weights(witnesses, signed, index) * multiplicity, bend)
-    signed = distance(models.take((slice(None), None)), points)
-    saved = (witnesses.cap_inside[index] - cost(witnesses, signed, index)) * multiplicity
-    return models, saved.sum(axis=1)
+    return models
 
 
 def around(witnesses: Witnesses, segments: Segments) -> Proposals:
@@ -87,8 +87,11 @@ def around(witnesses: Witnesses, segments: Segments) -> Proposals:
         starts += [_starts(witnesses, segments, begin, last, bend) for bend in (False, True)]
     first = np.tile(segments.first, len(lengths))
     free = np.tile(np.repeat([False, True], total), len(spans))
-    models, saved = fitted(witnesses, join(starts), free, first, np.concatenate(lengths))
-    gain = np.where(gentle(witnesses, models), saved - np.where(free, PRICE_ARC, PRICE_LINE), -1.0)
+    index, multiplicity = stretch(count, first, np.concatenate(lengths))
+    models = _fitted(witnesses, join(starts), free, index, multiplicity)
+    # Over calling all of them outliers.
+    saved = (witnesses.cap_inside[index] - window_cost(witnesses, models, index)) * multiplicity
+    gain = np.where(gentle(witnesses, models), saved.sum(axis=1) - np.where(free, PRICE_ARC, PRICE_LINE), -1.0)
     present = (np.arange(len(free)) < 2 * total) & (free == np.tile(segments.bend, len(lengths)))
     gain = np.where(present, np.maximum(gain, 0.0) + 1e4, gain)
     parts = [Proposals(models, free, first, np.concatenate(lengths), gain)]

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median
+from contour.image.opencv import pieces_and_middles
 from contour.image.pixel_grid import averaged, samples_of
 from contour.walls.see_block import SeenWalls
 from contour.walls.wall_evidence import BlockEvidence
@@ -65,9 +66,6 @@ def openings(walls: SeenWalls, seen: BlockEvidence, mask: Bytes, step: int) -> O
     fine = cv2.resize(within, None, fx=every // step, fy=every // step, interpolation=cv2.INTER_LINEAR)
     depth = np.asarray(fine[: covered.shape[0], : covered.shape[1]], np.float32)
     free = ((covered < _COVERAGE) & (depth > OPENED)).astype(np.uint8)
-    _, numbers, stats, centre = cv2.connectedComponentsWithStats(free, connectivity=4)
+    numbers, stats, centre = pieces_and_middles(free, 4)
     long = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) / pitch
-    area = stats[:, cv2.CC_STAT_AREA].copy()
-    long[0] = area[0] = 0
-    found = np.asarray(numbers, np.int32), np.asarray(long, np.float64), np.asarray(area, np.int32)
-    return Openings(step, (left, top), pitch, depth, *found, np.asarray(centre, np.float64))
+    return Openings(step, (left, top), pitch, depth, numbers, long, stats[:, cv2.CC_STAT_AREA], centre)

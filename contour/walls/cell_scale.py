@@ -11,7 +11,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
-from contour.image.opencv import pieces_and_areas
+from contour.image.opencv import inverted, pieces_and_areas, pieces_and_middles
 from contour.image.side_by_side import side_by_side
 from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb
 from contour.walls.wall_mask import FINE_PITCH, Smooth, wall_mask
@@ -143,8 +143,8 @@ def _busiest_tiles(light: Bytes) -> list[Bytes]:
     hop = 4 if light.size < _LARGE_PX else 8
     sample = light[::hop, ::hop].astype(np.float32)
     shape = (max(1, light.shape[1] // block), max(1, light.shape[0] // block))
-    mean = cv2.resize(sample, shape, interpolation=cv2.INTER_AREA)
-    square = cv2.resize(sample * sample, shape, interpolation=cv2.INTER_AREA)
+    both = cv2.merge([sample, sample * sample])
+    mean, square = cv2.split(cv2.resize(both, shape, interpolation=cv2.INTER_AREA))
     # The root of the deviation, or one glaring object outweighs a whole dim block.
     activity = np.sqrt(np.sqrt(np.maximum(square - mean * mean, 0.0)))
     half = _TILE_PX // block // 2
@@ -201,11 +201,8 @@ def cells_of(
     """Cells of `least` pixels enclosed by the wall mask of `light` made for `pitch_px`; None where fewer than six."""
     seen = wall_mask(light, pitch_px, bright=bright, smooth=smooth)
     mask = seen.mask
-    floor = cv2.bitwise_not(mask)
-    _, labels, stats, centroids = cv2.connectedComponentsWithStats(floor, connectivity=4, ltype=cv2.CV_32S)
-    areas, places, numbers = _enclosed(
-        np.asarray(stats[1:], np.int32), np.asarray(centroids[1:], np.float64), mask.shape, least
-    )
+    labels, stats, centroids = pieces_and_middles(inverted(mask), 4)
+    areas, places, numbers = _enclosed(stats[1:], centroids[1:], mask.shape, least)
     if len(areas) < _LEAST_CELLS:
         return None
     # Half of the enclosed *area* lies in cells smaller than this, so that specks do not count; then merged cells are
@@ -243,7 +240,7 @@ def cells_of(
         quantile(_some(light, mask == 0), 0.3 if bright else 0.7),
         lambda: (
             *lattice_order(places[regular], size),
-            solidity(np.asarray(labels, np.int32), numbers[regular], np.asarray(stats, np.int32)),
+            solidity(labels, numbers[regular], stats),
         ),
     )
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from contour.geometry.arrays import median
-from contour.image.opencv import deep, median_where, pieces_and_areas, pieces_and_boxes, within
+from contour.image.opencv import deep, median_where, pieces_and_areas, pieces_and_boxes, pieces_and_middles, within
 from contour.image.pixel_grid import whole_averaged
 
 
@@ -40,10 +40,12 @@ def test_discs_reach_as_far_as_distances_do(neighbours: int) -> None:
 def test_pieces_are_those_of_opencv(monkeypatch: pytest.MonkeyPatch, connectivity: int, others: int) -> None:
     monkeypatch.setattr("contour.image.opencv._MOST_OTHERS", others)
     for mask in masks():
-        _, labels, stats, _ = cv2.connectedComponentsWithStats(mask * 255, connectivity=connectivity)
+        _, labels, stats, middles = cv2.connectedComponentsWithStats(mask * 255, connectivity=connectivity)
         pieces, boxes = pieces_and_boxes(mask * np.uint8(255), connectivity)
         assert (pieces == labels).all()
         assert (boxes[1:] == stats[1:]).all()
+        same = pieces_and_middles(mask * np.uint8(255), connectivity)
+        assert all((one[1:] == other[1:]).all() for one, other in zip(same[1:], (stats, middles), strict=True))
         assert (pieces_and_areas(mask, connectivity)[1][1:] == stats[1:, cv2.CC_STAT_AREA]).all()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Float64s, Indices, rolled
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE
-from contour.outline.lines_and_arcs import Models, distance, feet, join, refine, through_pairs, through_triples
+from contour.outline.lines_and_arcs import Models, distance, feet, refine, through_pairs, through_triples
 from contour.outline.proposals import Proposals, gather, gentle, window_fits
 from contour.outline.witnesses import Witnesses, weights, window_cost
 
@@ -76,25 +76,20 @@ def around(witnesses: Witnesses, segments: Segments) -> Proposals:
     """Proposals near the present segments: each alone, with its next, with its next two; each as a line and as an
     arc."""
     count, total = len(witnesses), len(segments)
-    starts: list[Models] = []
-    lengths: list[Indices] = []
-    begin = np.arange(total)
-    spans = range(1, min(3, total) + 1)
-    for span in spans:
-        last = (begin + span - 1) % total
-        length = (segments.first[last] - segments.first) % count + segments.length[last]
-        lengths += 2 * [np.minimum(np.where(span == 1, segments.length, length), count)]
-        starts += [_starts(witnesses, segments, begin, last, bend) for bend in (False, True)]
-    first = np.tile(segments.first, len(lengths))
-    free = np.tile(np.repeat([False, True], total), len(spans))
-    index, multiplicity = stretch(count, first, np.concatenate(lengths))
-    models = _fitted(witnesses, join(starts), free, index, multiplicity)
+    span = np.arange(1, min(3, total) + 1)[:, None]
+    last = (np.arange(total) + span - 1) % total
+    length = (segments.first[last] - segments.first) % count + segments.length[last]
+    length = np.minimum(np.where(span == 1, segments.length, length), count).repeat(2, axis=0).ravel()
+    first = np.tile(segments.first, 2 * len(span))
+    free = np.tile(np.repeat([False, True], total), len(span))
+    index, multiplicity = stretch(count, first, length)
+    models = _fitted(witnesses, _starts(witnesses, segments, last), free, index, multiplicity)
     # Over calling all of them outliers.
     saved = (witnesses.cap_inside[index] - window_cost(witnesses, models, index)) * multiplicity
     gain = np.where(gentle(witnesses, models), saved.sum(axis=1) - np.where(free, PRICE_ARC, PRICE_LINE), -1.0)
-    present = (np.arange(len(free)) < 2 * total) & (free == np.tile(segments.bend, len(lengths)))
+    present = (np.arange(len(free)) < 2 * total) & (free == np.tile(segments.bend, 2 * len(span)))
     gain = np.where(present, np.maximum(gain, 0.0) + 1e4, gain)
-    parts = [Proposals(models, free, first, np.concatenate(lengths), gain)]
+    parts = [Proposals(models, free, first, length, gain)]
     if total > 1 and count > 9:
         # What hides between two segments: a short edge or a rounding that no window of the first round fell upon.
         size = np.repeat([5, 9, 5, 9], total)
@@ -133,26 +128,23 @@ def _unexplained(witnesses: Witnesses, segments: Segments) -> tuple[Indices, Ind
     return np.concatenate(begins) % count, np.minimum(np.concatenate(sizes), count)
 
 
-def _starts(witnesses: Witnesses, segments: Segments, begin: Indices, last: Indices, bend: bool) -> Models:
-    """First guesses of a union's model through feet on its first and last segments."""
-    count = len(witnesses)
-    alone = begin == last
-
-    def foot(which: Indices, share: float) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
-        place = segments.first[which] + np.floor(share * segments.length[which]).astype(np.intp)
-        place = np.minimum(place, segments.first[which] + segments.length[which] - 1) % count
-        return feet(segments.models.take(which), witnesses.points[place])[0]
-
-    if not bend:
-        pair = through_pairs(foot(begin, 0.1), foot(last, 0.9))
-        return _choose(alone & ~segments.bend[begin], segments.models.take(begin), pair)
-    inner = np.where(
-        alone,
-        foot(begin, 0.5),
-        np.where((last - begin) % len(segments) == 1, foot(begin, 0.95), foot((begin + 1) % len(segments), 0.5)),
-    )
-    triple = through_triples(foot(begin, 0.08), inner, foot(last, 0.92))
-    return _choose(alone & segments.bend[begin], segments.models.take(begin), triple)
+def _starts(witnesses: Witnesses, segments: Segments, last: Indices) -> Models:
+    """First guesses of the models of unions that begin with each segment and end with the `last`, (P, S): of a line and
+    of an arc through feet on them, (P, 2, S), flat.
+    """
+    begin = np.broadcast_to(np.arange(len(segments)), last.shape)
+    following = (begin + 1) % len(segments)
+    which = np.stack([begin, last, begin, begin, following, begin, last])
+    share = np.array([0.1, 0.9, 0.08, 0.5, 0.5, 0.95, 0.92])[:, None, None]
+    place = segments.first[which] + np.floor(share * segments.length[which]).astype(np.intp)
+    place = np.minimum(place, segments.first[which] + segments.length[which] - 1) % len(witnesses)
+    foot, _ = feet(segments.models.take(which), witnesses.points[place])
+    alone, present = begin == last, segments.models.take(begin)
+    inner = np.where(alone, foot[3], np.where(last == following, foot[5], foot[4]))
+    line = _choose(alone & ~segments.bend, present, through_pairs(foot[0], foot[1]))
+    arc = _choose(alone & segments.bend, present, through_triples(foot[2], inner, foot[6]))
+    both = _choose(np.array([[True], [False]]), line.take((slice(None), None)), arc.take((slice(None), None)))
+    return Models(both.origin.ravel(), both.tangent.ravel(), both.curvature.ravel())
 
 
 def _choose(mask: Bools, yes: Models, no: Models) -> Models:

@@ -65,6 +65,11 @@ class Apart:
     region: Bytes
     wall_px: float
 
+    @property
+    def openings(self) -> Bytes:
+        """Where the region shows the table, (H, W), 1 or 0: holes, and cells whose floor is as light as it."""
+        return ((self.region > 0) & (self.difference <= self.level)).astype(np.uint8)
+
 
 @dataclass(frozen=True)
 class MaterialEdge:
@@ -130,7 +135,7 @@ def _without_bays(closed: Bytes, shut: Bytes, parted: Bytes, apart: Apart, pitch
     free = cv2.erode((apart.difference <= apart.level).astype(np.uint8), away) > 0
     cells = apart.difference[(apart.region > 0) & free]
     floor = median(cells.astype(np.float64)) if len(cells) else 0.0
-    _, openings = pieces_and_areas(((apart.region > 0) & (apart.difference <= apart.level)).astype(np.uint8), 4)
+    _, openings = pieces_and_areas(apart.openings, 4)
     whole = openings[1:][openings[1:] > _LEAST_OPENING * pitch_px * pitch_px]
     enough = whole.sum() > _LEAST_OPEN * np.count_nonzero(apart.region)
     cell = float(np.quantile(whole, _LARGE_CELLS)) if enough else pitch_px * pitch_px

@@ -102,21 +102,20 @@ def _opened(openings: Float64s, pitch_px: float, tooth_px: float, *, alike: bool
     depths = np.sort(openings[:, 1])
     if len(depths) >= _FEWEST_SHALLOW and depths[-1] < _SHALLOW * (tooth_px - _BLUNT_PX):
         return True
-    if alike or len(depths) < _FEWEST_OPENINGS:
-        return alike and len(depths) >= _FEWEST_ALIKE
+    if alike:
+        return len(depths) >= _FEWEST_ALIKE
+    if len(depths) < _FEWEST_OPENINGS or depths[-2] <= _DEEP * pitch_px:
+        return False
     differ = max(_DIFFER * pitch_px, _DIFFER_PX)
-    return bool(
-        depths[-2] > _DEEP * pitch_px and (depths[-2] - depths[1] >= differ or _growth(openings[:, [0, 2]]) >= differ)
-    )
+    return bool(depths[-2] - depths[1] >= differ or _growth(openings[:, 0], openings[:, 2]) >= differ)
 
 
-def _growth(openings: Float64s) -> float:
-    """By how much openings grow from one end of a line to the other, by place and depth, (N, 2), pixels; 0 where they
-    do not steadily.
+def _growth(place: Float64s, depth: Float64s) -> float:
+    """By how much openings grow from one end of a line to the other, by place and depth, (N,), pixels; 0 where they do
+    not steadily.
     """
-    if len(openings) < _FEWEST_GROWING:
+    if len(place) < _FEWEST_GROWING:
         return 0.0
-    place, depth = openings.T
     slope, first = np.polyfit(place, depth, 1)
     growth = abs(float(slope)) * float(np.ptp(place))
     return growth if np.std(depth - first - slope * place) < _STEADY * growth else 0.0
@@ -138,12 +137,9 @@ def _openings(region: Bytes, line: _Line, length: float, near: float, pitch_px: 
     touching = [run for run in runs if begins[run[0]] <= near]
     if not openings or not touching or max(map(len, openings)) * _ALONG_PX > _TOUCHED * pitch_px:
         return np.empty((0, 3))
-    middle, deepest = (np.array([at(run) for run in openings]) for at in (np.mean, lambda run: begins[run].max()))
-    nearest_there = [begins[run].min() for run in touching]
-    return np.stack(
-        [middle * _ALONG_PX, deepest, deepest - np.interp(middle, [run.mean() for run in touching], nearest_there)],
-        axis=1,
-    )
+    tips = np.array([(run.mean(), begins[run].min()) for run in touching])
+    middle, deepest = np.array([(run.mean(), begins[run].max()) for run in openings]).T
+    return np.column_stack([middle * _ALONG_PX, deepest, deepest - np.interp(middle, *tips.T)])
 
 
 def straight_cuts(

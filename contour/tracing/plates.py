@@ -103,7 +103,7 @@ class _Holes:
 def _holes(material: MaterialEdge) -> _Holes | None:
     """The holes in a sheet; None where there are too few."""
     apart = material.apart
-    holes = ((apart.region > 0) & (apart.difference <= apart.level)).astype(np.uint8)
+    holes = apart.openings
     _, labels, stats, middles = cv2.connectedComponentsWithStats(holes, connectivity=4)
     area = stats[1:, cv2.CC_STAT_AREA].astype(np.float64)
     # Specks are many, but little of all that is free.

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from contour.geometry.agreement import distances_to, places_along
-from contour.outline.fit import fit_ring
+from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import LEAST_PX, Coefficients, bound, ring_stretches, uncertainty
 from contour.tracing.trace import TraceSettings
 from contour.tracing.wall_tips import wall_tips
@@ -36,6 +36,16 @@ def without(evidence: RingEvidence, begin: float, end: float) -> RingEvidence:
     keep = (evidence.position < begin) | (evidence.position > end)
     parts = ("points", "position", "normal", "sigma", "kind")
     return replace(evidence, **{part: getattr(evidence, part)[keep] for part in parts})
+
+
+def with_two_inside(
+    evidence: RingEvidence, fitted: FittedRing, corner: NDArray[np.float64], off_pitches: float
+) -> FittedRing:
+    """The fit with the two witnesses nearest to a corner so far off it, negative inside, and left out."""
+    beside = np.argsort(np.hypot(*(evidence.points - corner).T))[:2]
+    residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
+    residual[beside], inlier[beside] = off_pitches * PITCH, False
+    return replace(fitted, residual=residual, inlier=inlier)
 
 
 def moved(evidence: RingEvidence, scale: float, angle: float) -> RingEvidence:
@@ -174,10 +184,7 @@ def test_a_corner_that_leaves_witnesses_inside_may_be_a_round_one(corners: int, 
     evidence = witnesses(ring, seed=3, sigma=0.05)
     fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
     calm = ring_stretches(evidence, fitted, pitch_px=PITCH, blur_px=1.0)
-    beside = np.argsort(np.hypot(*(evidence.points - ring[1]).T))[:2]
-    residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
-    residual[beside], inlier[beside] = -deep * PITCH, False
-    off = replace(fitted, residual=residual, inlier=inlier)
+    off = with_two_inside(evidence, fitted, ring[1], -deep)
     seen = ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0)
     assert calm.misfit.max() < 0.3
     assert np.count_nonzero(seen.misfit > 1.0) == (1 if blunt else 0)
@@ -192,10 +199,7 @@ def test_on_a_known_table_a_round_corner_leaves_no_walls_outside(wall: float, kn
     ring = 250.0 * np.column_stack([np.cos(angle), np.sin(angle)]) + np.array([700.0, 500.0])
     evidence = witnesses(ring, seed=3, sigma=0.05)
     fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
-    beside = np.argsort(np.hypot(*(evidence.points - ring[1]).T))[:2]
-    residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
-    residual[beside], inlier[beside] = -0.06 * PITCH, False
-    off = replace(fitted, residual=residual, inlier=inlier)
+    off = with_two_inside(evidence, fitted, ring[1], -0.06)
     inwards = (np.array([700.0, 500.0]) - ring[1]) / 250.0
     seen = replace(evidence, walls=EdgePoints(ring[1] + wall * PITCH * inwards[None]))
     before = ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0).misfit.max()
@@ -209,10 +213,7 @@ def test_on_a_known_table_ends_deep_in_the_comb_beside_a_notch_say_nothing_of_it
     notch = np.array([[300, 200], [800, 200], [800, 450], [550, 450], [550, 600], [300, 600]], dtype=np.float64)
     evidence = witnesses(notch, seed=3, sigma=0.05)
     fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
-    beside = np.argsort(np.hypot(*(evidence.points - notch[3]).T))[:2]
-    residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
-    residual[beside], inlier[beside] = -0.25 * PITCH, False
-    off = replace(fitted, residual=residual, inlier=inlier)
+    off = with_two_inside(evidence, fitted, notch[3], -0.25)
     unknown, known = (
         ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0, known_table=one).misfit.max()
         for one in (False, True)

@@ -86,6 +86,10 @@ class Cell:
         """Wait until the service says Ready."""
         until(lambda: "-> Ready" in self.service.text, what="Ready")
 
+    def in_error(self) -> None:
+        """Wait until the service says Error, after it was Ready last: it may say so of its start, too."""
+        until(lambda: "-> Error" in self.service.text.rpartition("-> Ready")[2], what="Error")
+
     def goes_on(self, count: int) -> None:
         """Wait until `count` more jobs have been accepted."""
         before = len(lines(self.accepted))

@@ -47,7 +47,7 @@ def test_bytes_of_a_pedal_and_a_scanner_are_a_job_each_and_a_pulled_plug_is_live
         terminal.type(b"4006381333931\r\n" * 200)  # a flood is one trigger
         until(lambda: len(by_kind(cell, "byte")) == 2, what="the scanner's job")
         terminal.close()
-        until(lambda: "-> Error" in cell.service.text, what="Error")
+        cell.in_error()
         other = Terminal()
         plug.unlink()
         plug.symlink_to(other.name)

@@ -237,8 +237,8 @@ def text_after(folder: Path, ends: list[tuple[int, int, str]], **options: Any) -
             assert job == started.number(nth)
             assert terminal.line(60).startswith(f"FAIL {job} {code} {name}" if code else f"DONE {job} ")
             until(lambda code=code, job=job: registers(started) == (code, job), what=f"reject_reason {code}")
-            said = f"job {job} refused: {code} {name}: " if code else f"job {job} "
-            until(lambda said=said: said in started.service.text, what=said)
+            said = f"job {job} refused: {code} {name}: "
+            until(lambda code=code, said=said: code == 0 or said in started.service.text, what=said)
         return started.service.text
     finally:
         started.stop()

@@ -66,7 +66,7 @@ def test_a_service_begun_on_a_disk_that_refuses_is_in_error_until_the_disk_accep
     refuse(disk, how)
     cell = cell_on(disk, tmp_path, port := free_port())
     try:
-        until(lambda: "-> Error" in cell.service.text, what="Error")
+        cell.in_error()
         until(lambda: Client(port).get("/").status == 200, what="the page")
         time.sleep(2.5)  # it tries again meanwhile
         assert cell.service.running
@@ -117,7 +117,7 @@ def test_while_it_waits_it_is_the_only_one_and_ends_when_told_to(disk: Path, tmp
     cell = cell_on(disk, tmp_path, free_port())
     config = ("--config", tmp_path / "config.yaml")
     try:
-        until(lambda: "-> Error" in cell.service.text, what="Error")
+        cell.in_error()
         status = until(lambda: called("status", *config), what="an answer")
         assert (status.returncode, "storage_full" in status.stdout) == (1, True), status.stdout + status.stderr
         second = combtrace("run", *config)

@@ -59,7 +59,7 @@ def test_losing_the_controller_leads_to_error_and_its_return_back_to_ready(tmp_p
     try:
         cell.goes_on(1)
         cell.controller.kill()
-        until(lambda: "-> Error" in cell.service.text.rpartition("-> Ready")[2], what="Error")
+        cell.in_error()
         assert cell.service.running
         cell.controller = cell.start_controller()
         cell.goes_on(1)
@@ -73,7 +73,7 @@ def test_losing_the_camera_leads_to_error_and_its_return_back_to_ready(tmp_path:
     try:
         cell.goes_on(1)
         pictures.rename(unplugged)
-        until(lambda: "-> Error" in cell.service.text.rpartition("-> Ready")[2], what="Error")
+        cell.in_error()
         unplugged.rename(pictures)
         cell.goes_on(2)
         assert cell.service.stop() == 0

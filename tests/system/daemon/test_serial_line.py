@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.processes.cell import Cell
-from tests.support.processes.processes import called, until
+from tests.support.processes.processes import called
 from tests.support.processes.terminal import Terminal
 
 
@@ -62,7 +62,7 @@ def test_ping_stat_and_nonsense_are_answered(cell: Cell, terminal: Terminal) -> 
 
 def test_a_trigger_while_the_controller_is_away_is_refused_at_once_with_121(cell: Cell, terminal: Terminal) -> None:
     cell.controller.kill()
-    until(lambda: "-> Error" in cell.service.text.rpartition("-> Ready")[2], what="Error")
+    cell.in_error()
     terminal.type(b"TRIG\n")
     assert terminal.line() == "NAK 121 not_ready"
     assert cell.settled() == []

@@ -58,7 +58,7 @@ def test_on_a_disk_that_fills_evidence_gives_way_then_triggers_are_refused_and_a
         cell.goes_on(1)  # no evidence any more, and jobs all the same
         theirs.unlink()
         theirs = fill(small_disk, 2 * MEGABYTE)
-        until(lambda: "-> Error" in cell.service.text.rpartition("-> Ready")[2], what="Error")
+        cell.in_error()
         assert "MB of the disk are free, 4 are needed. Free space" in cell.service.text
         taken = len(jobs(cell.journal))
         until(lambda: len(cell.settled()) == taken, what="the end of what was taken")

@@ -7,7 +7,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import signed_area
-from contour.walls.wall_ends import ring_tips
+from contour.walls.wall_ends import ring_tips, thin
 
 # Gaps of a broken wall, in pitches. The mouth of a bay between whole cells is hardly wider.
 _BROKEN_PITCHES = 0.62
@@ -17,6 +17,8 @@ _LARGEST_CELL = 1.5
 _FEWEST_CUT, _ROW_PITCHES = 3, 3.0
 # How near to its mouth a broken wall ends.
 _AT_MOUTH_PITCHES = 0.25
+# Corners of 90 degrees are as thin for 0.41 radii; what is left of a wall with a gap of half a pitch for 0.63.
+_THIN_RADII = 0.5
 
 
 def leaking_cells(material: Bytes, pitch_px: float, wall_px: float) -> Bytes:
@@ -62,12 +64,14 @@ def _leaking(material: Bytes, pitch_px: float, wall_px: float) -> Bytes:
 
 
 def _wall_ends_at(material: Bytes, cell: Bytes, pitch_px: float, wall_px: float) -> bool:
-    """Whether a wall ends at the mouth of an open cell."""
+    """Whether a wall ends at the mouth of an open cell: corners of whole cells beside a bay are no ends."""
     mouth = np.asarray(cv2.dilate(cell, np.ones((3, 3), np.uint8)), np.uint8) & (1 - cell) & (1 - material)
     away = cv2.distanceTransform(1 - mouth, cv2.DIST_L2, 5)
     rings, _ = cv2.findContours(material, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    largest = max(rings, key=len)[:, 0].astype(np.float64)
-    ends = np.rint(ring_tips(largest if signed_area(largest) < 0 else largest[::-1].copy(), pitch_px, wall_px)).astype(
-        int
-    )
-    return bool((away[ends[:, 1], ends[:, 0]] < _AT_MOUTH_PITCHES * pitch_px).any())
+    largest = max(rings, key=len)
+    ring = largest[:, 0].astype(np.float64)
+    ends = ring_tips(ring if signed_area(ring) < 0 else ring[::-1].copy(), pitch_px, wall_px)
+    column, row = np.rint(ends).astype(int).T
+    ends = ends[away[row, column] < _AT_MOUTH_PITCHES * pitch_px]
+    whole = cv2.drawContours(np.zeros_like(material), [largest], 0, 1, cv2.FILLED)
+    return bool(thin(whole, ends, wall_px, _THIN_RADII).any())

@@ -16,7 +16,7 @@ from contour.geometry.segments import BoxTree, distances_to_tree
 from contour.geometry.signed_distance import nearest
 from contour.material.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
-from contour.walls.wall_ends import ring_tips
+from contour.walls.wall_ends import ring_tips, thin
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 
 # Along a cut edge a wall ends every pitch or so, on an edge that follows a row of cells none for a while.
@@ -30,10 +30,9 @@ _LONGEST_WITHOUT_ENDS = 0.55
 _MOST_TIPS = 0.2
 # Glints look like ends of walls, and teeth of closed triangles stand out like them: what is both, is one.
 _SAME_PITCHES = 0.4
-# Of triangles only what a disc half again as wide as a wall does not get into is one, for so many of its radii: into a
-# tooth of 60 degrees it gets to one radius. Of 28 closed lattices none has such an end, of 28 cut along one line 26. Of
-# other fine cells, whose pixels make ends of corners: into one of 90 degrees it gets to 0.4 of a radius.
-_THIN_WALLS, _THIN_PX, _THIN_RADII = 0.6, 1.0, 1.15
+# Of triangles only thin ones are ends: of 28 closed lattices none has such an end, of 28 cut along one line 26. So are
+# those of other fine cells, whose pixels make ends of corners.
+_THIN_RADII = 1.15
 _FINE_PITCH_PX, _THIN_FINE_RADII = 12.0, 0.7
 # Of a triangle over the pitch of a hexagon as large.
 _TRIANGLE_SIDE = math.sqrt(2.0)
@@ -69,7 +68,8 @@ def sure_ends(material: MaterialEdge, ring: RingEvidence, seen: BlockEvidence) -
     """Which witnesses of a ring are ends of walls at the edge of material, too, shape (N,)."""
     tips = np.concatenate([ring_tips(one, seen.pitch_px, seen.wall_px) for one in material.border])
     if _triangular(seen) or seen.pitch_px < _FINE_PITCH_PX:
-        tips = tips[_thin(material, tips, seen.wall_px, _THIN_RADII if _triangular(seen) else _THIN_FINE_RADII)]
+        radii = _THIN_RADII if _triangular(seen) else _THIN_FINE_RADII
+        tips = tips[thin(material.apart.region, tips, seen.wall_px, radii)]
     if not len(tips):
         return np.zeros(len(ring.points), np.bool_)
     return (ring.kind <= WitnessKind.BLUNT) & (nearest(ring.points, tips) < _SAME_PITCHES * seen.pitch_px)
@@ -87,17 +87,6 @@ def tooth_px(seen: BlockEvidence) -> float:
 
 def _triangular(seen: BlockEvidence) -> bool:
     return seen.comb is not None and seen.comb.triangular
-
-
-def _thin(material: MaterialEdge, tips: Float64s, wall_px: float, radii: float) -> Bools:
-    """Which tips of material, (N, 2), pixels, are as thin as a wall for so many of its `radii` behind, shape (N,)."""
-    radius = _THIN_WALLS * wall_px + _THIN_PX
-    pad = int(radius) + 2
-    region = cv2.copyMakeBorder(material.apart.region, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0)
-    thick = (cv2.distanceTransform(region, cv2.DIST_L2, 5) > radius).astype(np.uint8)
-    away = cv2.distanceTransform(1 - thick, cv2.DIST_L2, 5)
-    column, row = (np.rint(tips) + pad).astype(int).T
-    return np.asarray(away[row, column] > (1.0 + radii) * radius)
 
 
 def check_promise(promise: str, kind: Edge, *, traced: bool) -> None:

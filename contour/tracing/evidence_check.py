@@ -17,6 +17,9 @@ _FAR_OFF_PITCHES = 0.5
 # A clean end outside is a chip, or a streak that a wall's side makes, only where the outline meets the ends beside it.
 _FAR_OUTSIDE_PITCHES, _CLEAN_OUTSIDE_PITCHES = 1.0 / 3.0, 1.0 / 6.0
 _IN_A_ROW, _IN_A_ROW_OUTSIDE = 4, 2
+# Where two ends on a line lie so far apart, the coarse edge lies 0.32 pitches inside between them at most (217 gaps),
+# more where cells are missing. A line is known by ends on both sides of these: a single wall may end on any.
+_GAP_PITCHES, _DEEP_PITCHES, _ONE_END_PITCHES, _ON_LINE_PITCHES = 2.0, 0.6, 0.5, 0.15
 # What stands out of a known table as walls do, and as far along, is one: of 288 outlines one leaves such outside, off
 # by 0.58 of a cell. Beside right ones lie streaks, 0.7 as high as walls at most, and specks, 0.4 pitches long.
 _OUTSIDE_PITCHES, _FAR_OUT_PITCHES, _LONG_PITCHES, _LIKE_WALLS = 0.2, 0.3, 0.5, 0.75
@@ -29,7 +32,7 @@ def check_against_evidence(
 ) -> None:
     """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side, or leaves
     two in a row outside by more than a third, or a clean one by more than a sixth beside another one that it passes, or
-    one of those that it was laid through: `inlier`, shape (N,).
+    one of those that it was laid through, `inlier`, shape (N,); and where a line leads over the table to a single one.
 
     A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
     picture a lens bends a long edge by more than a small cell.
@@ -59,6 +62,48 @@ def check_against_evidence(
                 f"no block found: the outline that fits most wall ends passes those near ({x:.0f}, {y:.0f}) px by more "
                 f"than {how_far}. Check that nothing lies against the block, and that its edge is in focus"
             )
+    over = _over_the_table(evidence, ring, own, pitch_px, rectifier)
+    if over is not None:
+        raise NoBlockFound(
+            f"no block found: the outline that fits most wall ends leads over the table near ({over[0]:.0f}, "
+            f"{over[1]:.0f}) px to a single one. Check that nothing lies against the block, and that its edge is in "
+            "focus"
+        )
+
+
+def _over_the_table(
+    evidence: RingEvidence, ring: Ring, own: Bools, pitch_px: float, rectifier: Rectifier | None
+) -> Float64s | None:
+    """The place, (2,), of the coarse edge where it lies farthest inside a line of the ring, before the first or behind
+    the last but one of the ends on it; None where it lies so far inside of none.
+    """
+    inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, evidence.coarse, rectifier)
+    if inside.max() < _DEEP_PITCHES * pitch_px:
+        return None
+    corners, ends, coarse = (
+        points if rectifier is None else rectifier.rectify(points)
+        for points in (ring, evidence.points[own], evidence.coarse)
+    )
+    worst, farthest = None, _DEEP_PITCHES * pitch_px
+    for start, stop in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        long = float(np.hypot(*(stop - start)))
+        if long < _GAP_PITCHES * pitch_px:
+            continue
+        along = (stop - start) / long
+        across = np.array([-along[1], along[0]])
+        at, off = (ends - start) @ along, (ends - start) @ across
+        reach = _ON_LINE_PITCHES * pitch_px
+        at = np.sort(at[(np.abs(off) < reach) & (at > -reach) & (at < long + reach)])
+        for k in np.flatnonzero(np.diff(at) > _GAP_PITCHES * pitch_px):
+            if min(at[k] - at[0], at[-1] - at[k + 1]) > _ONE_END_PITCHES * pitch_px:
+                continue
+            place, away = (coarse - start) @ along, (coarse - start) @ across
+            # Not of the edge across the block.
+            between = (place > at[k]) & (place < at[k + 1]) & (np.abs(away) < inside + reach)
+            depth = np.where(between, inside, 0.0)
+            if depth.max() > farthest:
+                worst, farthest = evidence.coarse[depth.argmax()], float(depth.max())
+    return worst
 
 
 def check_against_relief(

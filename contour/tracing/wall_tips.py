@@ -85,22 +85,26 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
     if plate is not None:
         seen = plate
     # Webs end all around a sheet that was cut along more than one line, or show no ends.
-    if plate is None and may_be_closed(seen):
-        closed, kind = _if_closed(solid, seen)
-        # Where something hides the border no walls end either.
-        if kind != "mixed" or not doubtful(seen.rings[0], look).any():
-            check_promise(promise, kind, traced=closed is not None)
-            if closed is not None:
-                return closed
+    closed, kind = _if_closed(solid, seen) if plate is None and may_be_closed(seen) else (None, None)
+    # Where something hides the border no walls end either.
+    if kind is not None and (kind != "mixed" or not doubtful(seen.rings[0], look).any()):
+        check_promise(promise, kind, traced=closed is not None)
+        if closed is not None:
+            return closed
     if seen.leaves_picture:
         return _cut_off(light, seen, on_stage)
     try:
         found = _cut_or_mirrored(lit, light, walls, (seen, look), rectifier, on_stage)
+        if kind == "mixed" and all(part.state == "seen" and part.by is None for part in found.evidence or ()):
+            # What seemed to hide it does not.
+            check_promise(promise, kind, traced=closed is not None)
+            found = closed or found
         return replace(found, parted=parted_by_seam(walls, seen))
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
-        closed = None if promise == "cut" or plate is not None else _if_closed(solid, seen)[0]
-        if closed is None:
+        if kind is None and promise != "cut" and plate is None:
+            closed, _ = _if_closed(solid, seen)
+        if promise == "cut" or closed is None:
             error.edge = "cut"
             raise
         return closed

@@ -113,8 +113,14 @@ def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
 
 @pytest.mark.parametrize(
     ("seed", "cells"),
-    [(1051302, "hexagonal"), (1051404, "triangular"), (1051322, "over-expanded"), (1092020, "square")],
-    ids=["no end", "no end of triangles", "an end beyond the second", "openings that grow"],
+    [
+        (1051302, "hexagonal"),
+        (1051404, "triangular"),
+        (1051322, "over-expanded"),
+        (1092020, "square"),
+        (1206035, "triangular"),
+    ],
+    ids=["no end", "no end of triangles", "an end beyond the second", "openings that grow", "nothing hides the border"],
 )
 def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed: int, cells: Cells) -> None:
     one = lattice(seed, cells, "mixed")
@@ -130,6 +136,11 @@ def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed
 )
 def test_rows_of_closed_cells_are_no_cut(seed: int, cells: Cells, pitch_px: float) -> None:
     assert wall_tips(smaller(lattice(seed, cells, "closed"), pitch_px), TraceSettings()).edge == "cells"
+
+
+def test_a_missing_cell_in_an_inner_corner_is_no_cell_that_a_broken_wall_opens() -> None:
+    one = lattice(1206004, "square", "closed")
+    assert agreement(traced(one).contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
 
 
 def test_fine_teeth_that_blur_rounds_are_no_cut() -> None:

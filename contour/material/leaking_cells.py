@@ -73,5 +73,5 @@ def _wall_ends_at(material: Bytes, cell: Bytes, pitch_px: float, wall_px: float)
     ends = ring_tips(ring if signed_area(ring) < 0 else ring[::-1].copy(), pitch_px, wall_px)
     column, row = np.rint(ends).astype(int).T
     ends = ends[away[row, column] < _AT_MOUTH_PITCHES * pitch_px]
-    whole = cv2.drawContours(np.zeros_like(material), [largest], 0, 1, cv2.FILLED)
+    whole = np.asarray(cv2.drawContours(np.zeros_like(material), [largest], 0, 1, cv2.FILLED), np.uint8)
     return bool(thin(whole, ends, wall_px, _THIN_RADII).any())

@@ -32,7 +32,7 @@ def check_against_evidence(
 ) -> None:
     """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side, or leaves
     two in a row outside by more than a third, or a clean one by more than a sixth beside another one that it passes, or
-    one of those that it was laid through, `inlier`, shape (N,); and where a line leads over the table to a single one.
+    one of those that it was laid through: `inlier`, shape (N,).
 
     A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
     picture a lens bends a long edge by more than a small cell.
@@ -62,7 +62,15 @@ def check_against_evidence(
                 f"no block found: the outline that fits most wall ends passes those near ({x:.0f}, {y:.0f}) px by more "
                 f"than {how_far}. Check that nothing lies against the block, and that its edge is in focus"
             )
-    over = _over_the_table(evidence, ring, own, pitch_px, rectifier)
+
+
+def check_lines(
+    evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
+) -> None:
+    """Raise NoBlockFound where a line of the ring leads over the table to a single wall; for edges all of which are
+    seen.
+    """
+    over = _over_the_table(evidence, ring, inlier, pitch_px, rectifier)
     if over is not None:
         raise NoBlockFound(
             f"no block found: the outline that fits most wall ends leads over the table near ({over[0]:.0f}, "
@@ -72,17 +80,17 @@ def check_against_evidence(
 
 
 def _over_the_table(
-    evidence: RingEvidence, ring: Ring, own: Bools, pitch_px: float, rectifier: Rectifier | None
+    evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
 ) -> Float64s | None:
-    """The place, (2,), of the coarse edge where it lies farthest inside a line of the ring, before the first or behind
-    the last but one of the ends on it; None where it lies so far inside of none.
+    """The place, (2,), of the coarse edge where it lies farthest inside a line of the ring that a single wall
+    witnesses, or one on that side of it; None where it lies so far inside of none.
     """
     inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, evidence.coarse, rectifier)
     if inside.max() < _DEEP_PITCHES * pitch_px:
         return None
     corners, ends, coarse = (
         points if rectifier is None else rectifier.rectify(points)
-        for points in (ring, evidence.points[own], evidence.coarse)
+        for points in (ring, evidence.points[inlier], evidence.coarse)
     )
     worst, farthest = None, _DEEP_PITCHES * pitch_px
     for start, stop in zip(corners, np.roll(corners, -1, axis=0), strict=True):
@@ -94,8 +102,11 @@ def _over_the_table(
         at, off = (ends - start) @ along, (ends - start) @ across
         reach = _ON_LINE_PITCHES * pitch_px
         at = np.sort(at[(np.abs(off) < reach) & (at > -reach) & (at < long + reach)])
+        one_wall = _ONE_END_PITCHES * pitch_px
+        if not len(at) or np.ptp(at) < one_wall:
+            at = np.array([0.0, long])
         for k in np.flatnonzero(np.diff(at) > _GAP_PITCHES * pitch_px):
-            if min(at[k] - at[0], at[-1] - at[k + 1]) > _ONE_END_PITCHES * pitch_px:
+            if min(at[k] - at[0], at[-1] - at[k + 1]) > one_wall:
                 continue
             place, away = (coarse - start) @ along, (coarse - start) @ across
             # Not of the edge across the block.

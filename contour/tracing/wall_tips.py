@@ -23,7 +23,7 @@ from contour.relief.relief import Relief
 from contour.seams.seam import parted_by_seam
 from contour.tracing.cut_lines import touched_cuts, with_cuts
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed, tooth_px
-from contour.tracing.evidence_check import check_against_evidence, check_against_relief
+from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_lines
 from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
@@ -205,6 +205,9 @@ def _cut(
         for number, (ring, one) in enumerate(zip(contour.rings, visible, strict=True))
         for stretch in ring_evidence(number, ring, one, look, rectifier, bounds[number])
     )
+    if all(stretch.state == "seen" for stretch in evidence):
+        for one in visible:
+            check_lines(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
     untold = next(((float(x), float(y)) for one in rings for x, y in one.untold), None)
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
     return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold)

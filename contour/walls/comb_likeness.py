@@ -10,14 +10,15 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Float64s, Indices, Int32s, median
 
-# Walls of fine cells look wide; from this pitch on they look as wide as they are.
+# Walls of fine cells look wide, whatever is taken off for that; from this pitch on they look as wide as they are.
 _FINE_PITCH_PX = 15.0
 # Walls look wider by about this, and, where blur is wider than that, by it: its full width at half maximum over its
 # standard deviation.
 _WIDER_PX, _BLUR_WIDTH = 1.5, 2.355
 # Of 183 scenes with cells of more than 15 px only foam has walls wider than 0.28 of their pitch, and of 60 that were
 # defocused or moved three have 0.31 to 0.32; of prints and boards the narrowest are 0.34.
-_WIDEST_WALL = 0.31
+# Of finer ones, of 5 to 12 px, none has more than 0.3; sheets whose holes are a few pixels have 0.4 and more.
+_WIDEST_WALL, _WIDEST_FINE = 0.31, 0.35
 _REGULAR = 0.5
 _FEW_CELLS = 18
 _POOR_SCORE = 0.23
@@ -85,10 +86,11 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
     share = min(sharp_px, comb.wall_px - _WIDER_PX) / comb.pitch_px
     # Foam has wide bright walls, and cells of all sizes between them; so has a sheet with letters, which closes them.
     even = not (cut and comb.bright) or comb.regular > _REGULAR
-    if comb.pitch_px > _FINE_PITCH_PX and share > _WIDEST_WALL and even and not comb.plate:
+    widest = _WIDEST_WALL if comb.pitch_px > _FINE_PITCH_PX else _WIDEST_FINE
+    if share > widest and even and not comb.plate:
         return (
             f"what lies between patches {comb.pitch_px:.0f} px apart is {100 * share:.0f} % as wide as that, cell "
-            f"walls are {100 * _WIDEST_WALL:g} % at most: a board, a print, a perforated plate, or foam whose cells "
+            f"walls are {100 * widest:g} % at most: a board, a print, a perforated plate, or foam whose cells "
             "are closed. Check that a block lies in view, and set edge: cells for a plate or foam"
         )
     if not comb.cellular:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contour.errors import NoBlockFound
 from contour.geometry.rings import densified
 from contour.relief.relief import Displacement, Relief
-from contour.tracing.evidence_check import check_against_evidence, check_against_relief
+from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_lines
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, rectangle, witnesses
 
@@ -130,9 +130,9 @@ def test_a_line_that_leads_over_the_table_to_a_single_end_is_refused(beyond: int
     on_line = np.ones(len(seen.points), np.bool_)
     if refused:
         with pytest.raises(NoBlockFound, match="leads over the table near"):
-            check_against_evidence(seen, BLOCK, on_line, PITCH, None)
+            check_lines(seen, BLOCK, on_line, PITCH, None)
     else:
-        check_against_evidence(seen, BLOCK, on_line, PITCH, None)
+        check_lines(seen, BLOCK, on_line, PITCH, None)
 
 
 @pytest.mark.parametrize(

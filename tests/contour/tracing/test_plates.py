@@ -52,6 +52,23 @@ def test_a_board_whose_squares_are_as_dark_as_the_table_is_none() -> None:
     )
 
 
+@pytest.mark.parametrize("border", ["closed", "mixed"])
+def test_a_sheet_with_holes_of_a_few_pixels_is_one(border: Border) -> None:
+    one = lattice(1211004, "round", border)
+    share = 9.9 / one.pitch_px
+    picture = np.asarray(cv2.resize(one.picture, None, fx=share, fy=share, interpolation=cv2.INTER_AREA), np.uint8)
+    truth = Contour(*((ring + 0.5) * share - 0.5 for ring in one.outline.rings))
+    found = Measurer(None).measure(picture, PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), {"closed": "cells", "mixed": "mixed"}[border])
+    assert found.pixels is not None
+    assert agreement(found.pixels, truth).hausdorff_px < 0.3 * 9.9
+
+
+def test_ink_of_a_few_pixels_is_a_print() -> None:
+    picture = np.asarray(cv2.resize(dotted(130), None, fx=0.35, fy=0.35, interpolation=cv2.INTER_AREA), np.uint8)
+    assert Reason.NO_BLOCK_FOUND in Measurer(None).measure(picture, PlainRecipe(), 0.0).reasons
+
+
 @pytest.mark.parametrize(("dot", "square"), [(130, False), (TABLE, True)], ids=["ink", "squares"])
 def test_patches_that_do_not_show_the_table_or_are_square_are_a_print(dot: int, square: bool) -> None:
     found = Measurer(None).measure(dotted(dot, square=square), PlainRecipe(), 0.0)

@@ -35,7 +35,8 @@ _FLUSH_PITCHES, _SUNK_PITCHES = 0.18, 0.5
 _CUT_SHARE = 0.8
 # What is darker than the table, as walls that fade are, must end on the line.
 _DARK_FLUSH_PITCHES = 0.1
-_ON_SHARE, _MOST_OUT = 0.7, 0.1
+# So much lies on an outline that was laid through it, and so little off but in open cells, so deep.
+_ON_SHARE, _MOST_OFF, _OPEN_PITCHES = 0.45, 0.1, 0.75
 # What lies along more of an edge than that is no part of it that was filled.
 _MOST = 0.5
 # Near its ends the outline through it turns by no more than that over a pitch: blocks are ten cells across and more.
@@ -47,7 +48,7 @@ _NEAR_PX, _NEAR_PITCHES, _SHARP = 2.0, 0.08, 0.6
 # An open cell beside filled ones is bridged, as in the coarse block.
 _CLOSING_PITCHES = 0.72
 
-Refit = Callable[[EdgePoints], Ring]
+Refit = Callable[[list[EdgePoints]], Ring]
 
 
 def cut_borders(
@@ -132,12 +133,12 @@ class _Border:
         return (1.0 if clear.is_hole else -1.0) * depth_inside(ring, self.ends.points)
 
     def _on(self, out: Float64s, pitch_px: float) -> EdgePoints:
-        """The run where it lies on an outline that it stands so far out of, (N,), if most of it does, and what does not
-        lies inside, as open cells do; else none of it.
+        """The run where it lies on an outline that it stands so far out of, (N,), if half of it does, and what does not
+        lies inside, no deeper than open cells are; else none of it.
         """
         cut = self.told & (np.abs(out) < _FLUSH_PITCHES * pitch_px)
-        sticks_out = np.mean(out > _FLUSH_PITCHES * pitch_px) > _MOST_OUT
-        return EdgePoints() if sticks_out or np.mean(cut) < _ON_SHARE else self.ends.take(cut)
+        off = (out > _FLUSH_PITCHES * pitch_px) | (out < -_OPEN_PITCHES * pitch_px)
+        return EdgePoints() if np.mean(off) > _MOST_OFF or np.mean(cut) < _ON_SHARE else self.ends.take(cut)
 
     def _flush(self, out: Float64s, pitch_px: float) -> EdgePoints:
         """The run where it stands so far out of the edge, (N,), if most of it is flush; else none of it."""
@@ -150,7 +151,7 @@ class _Border:
 def _outline_through(runs: Sequence[_Border], refit: Refit) -> RingLengths | None:
     """The outline through those runs that may be cut material, and what is seen; None without any."""
     some = [one.ends for one in runs if one.may_be_cut]
-    return RingLengths.of(refit(joined(some))) if some else None
+    return RingLengths.of(refit(some)) if some else None
 
 
 def _goes_on(lengths: RingLengths, points: Float64s, pitch_px: float) -> bool:

@@ -106,7 +106,7 @@ def fit_visible(
         return _plain(evidence, fit(evidence))
     walls = _without(evidence, distrusted, look)
     points = evidence.points[distrusted]
-    fills = cut_borders(picture, clear, ring, points, look, _refit(walls, fit))
+    fills = cut_borders(picture, clear, ring, points, look, _refit(walls, fit, look.pitch_px))
     walls = walls.take(~_behind(walls, fills, look.pitch_px))
     trusted, order = walls.joined_by(joined(fills), _FILL_SIGMA_PX, WitnessKind.BLUNT)
     fitted = fit(trusted)
@@ -185,7 +185,7 @@ def _flush(run: Indices, evidence: RingEvidence, picture: Bytes, look: TableLook
     beyond = points + _THING_PITCHES * look.pitch_px * evidence.normal[run]
     if np.count_nonzero(look.room_at(beyond) > _THING_ROOM * look.pitch_px) < _FEW:
         return False  # cells of a dark block whose walls fade
-    return len(cut_borders(picture, clear, fit(clear).ring, points, look, _refit(clear, fit))) > 0
+    return len(cut_borders(picture, clear, fit(clear).ring, points, look, _refit(clear, fit, look.pitch_px))) > 0
 
 
 def _behind(walls: RingEvidence, fills: list[EdgePoints], pitch_px: float) -> Bools:
@@ -198,9 +198,14 @@ def _behind(walls: RingEvidence, fills: list[EdgePoints], pitch_px: float) -> Bo
     return found
 
 
-def _refit(seen: RingEvidence, fit: Fit) -> Callable[[EdgePoints], Ring]:
-    """What fits the outline through what is seen and more points."""
-    return lambda more: fit(seen.joined_by(more, _FILL_SIGMA_PX, WitnessKind.BLUNT)[0]).ring
+def _refit(seen: RingEvidence, fit: Fit, pitch_px: float) -> Callable[[list[EdgePoints]], Ring]:
+    """What fits the outline through filled cells' ends and what is seen, but for what lies behind those."""
+
+    def through(fills: list[EdgePoints]) -> Ring:
+        clear = seen.take(~_behind(seen, fills, pitch_px))
+        return fit(clear.joined_by(joined(fills), _FILL_SIGMA_PX, WitnessKind.BLUNT)[0]).ring
+
+    return through
 
 
 def _without_gaps(chosen: Bools) -> Bools:

@@ -133,10 +133,10 @@ def parted_by_row(free: Openings) -> Parted | None:
     # Long openings count for more: of two cells each there are as many in a row through a large block as along a seam.
     weight = np.repeat(free.long[numbers[row, column]] - usual, _DIRECTIONS)
     cell = (np.arange(_DIRECTIONS) * wide + strip).ravel()
-    total = np.bincount(cell, weight, _DIRECTIONS * wide)
-    total[:-1] += total[1:]
+    total = np.bincount(cell, weight, _DIRECTIONS * wide).reshape(_DIRECTIONS, wide)
+    total[:, :-1] += total[:, 1:]
     lines = []
-    for number in np.argsort(total)[: -_BEST - 1 : -1].tolist():
+    for number in np.argsort(total, axis=None)[: -_BEST - 1 : -1].tolist():
         one, first = divmod(number, wide)
         on = (strip[:, one] == first) | (strip[:, one] == first + 1)
         lines.append(_line(free, place[on], normal[:, one]))

@@ -47,12 +47,12 @@ def test_a_row_between_a_hole_and_the_edge_parts_nothing() -> None:
     assert parted_by_row(square_cells(11, hole=True)) is None
 
 
-def with_opening(first: int, last: int) -> Openings:
-    """A block of 30 × 12 square cells, those of the fourth column one opening from one row to another."""
+def with_opening(first: int, last: int, column: int = 3) -> Openings:
+    """A block of 30 × 12 square cells, those of one column one opening from one row to another."""
     high, wide = 12 * PITCH, 30 * PITCH
     depth = cv2.distanceTransform(np.pad(np.ones((high - 2, wide - 2), np.uint8), 1), cv2.DIST_L2, 5) / PITCH
     free = np.kron(np.ones((12, 30), np.uint8), np.pad(np.ones((PITCH - 2, PITCH - 2), np.uint8), 1))
-    free[first * PITCH + 1 : last * PITCH - 1, 34:36] = 1
+    free[first * PITCH + 1 : last * PITCH - 1, column * PITCH + 4 : column * PITCH + 6] = 1
     return numbered(free, depth.astype(np.float32))
 
 
@@ -63,3 +63,9 @@ def test_a_strip_is_parted_by_an_opening_though_walls_of_both_touch_at_its_ends(
     assert parted_strip(with_opening(2, 10)) is not None
     assert parted_strip(with_opening(4, 9)) is None, "walls lead across beyond both of its ends"
     assert parted_strip(with_opening(1, 5)) is None, "it is no longer than those of single blocks"
+
+
+@pytest.mark.parametrize("column", [4, 25])
+def test_cells_that_merge_at_the_end_of_all_lines_are_no_row(column: int) -> None:
+    """A line's sum took in the first of the next direction's, and no cell lay on it."""
+    assert parted_by_row(with_opening(8, 11, column)) is None

@@ -26,8 +26,9 @@ _FARTHER_IN, _BEYOND, _FARTHER_OUT = np.array([-1.5, -2.0]), np.array([0.4, 0.6,
 # is taken together, and how near to what hides or fills it nothing is said.
 _CELL, _FINE, _COMB_OVER, _COMB_LEAST, _BESIDE = 1.3, 0.12, 6.0, 0.3, 1.0
 # In a shadow walls and cells are darker alike: light changes by that share of its brightest as it does in comb without
-# one (0.86 and more along shaded edges, 0.42 and less on compound and labels), and more than on the table beside.
-_SHADED = 0.75
+# one (0.86 and more along shaded edges, 0.42 and less on compound and labels), and by so many times what it does on the
+# table beside (7.7 and more), or grey levels: what is darker tells nothing.
+_SHADED, _SHADED_OVER_TABLE = 0.75, 5.0
 # What lies within is lighter than the table beyond by so many grey levels, and so many times what that changes by: no
 # table, be it shaded or not.
 _LEAST_LIGHTER = 6.0
@@ -143,7 +144,7 @@ def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> 
     goes_on = _changes(beyond) > np.maximum(_FAINT * usual, _OVER_TABLE * table)
     changes = _changes(within)
     in_shade = _SHADED * median(deeper / _brightest(farther_in)) * _brightest(within)
-    changes = np.where(changes > np.maximum(in_shade, _OVER_TABLE * table), comb, changes)
+    changes = np.where(changes > np.maximum(in_shade, _SHADED_OVER_TABLE * table), comb, changes)
     step = within.mean(axis=0) - beyond.mean(axis=0)
     return changes / comb, np.abs(step) / comb, step > np.maximum(_LEAST_LIGHTER, _OVER_TABLE * table), goes_on
 

@@ -105,6 +105,12 @@ def test_cells_in_a_shadow_are_darker_walls_and_all(depth: float) -> None:
     assert found(shaded, BLOCK | bulge) is not None
 
 
+def test_in_a_shadow_so_deep_that_walls_are_a_few_grey_levels_nothing_tells_them() -> None:
+    shaded = comb(BLOCK, 60, cells=20)
+    shaded[:, 376:] = np.rint(shaded[:, 376:] * 0.02)
+    assert found(shaded, BLOCK) is not None
+
+
 def test_what_is_a_little_lighter_than_the_table_and_in_line_with_the_edge_fills_cells() -> None:
     picture = comb(BLOCK, 40)
     picture[180:230, 340:400] = 60

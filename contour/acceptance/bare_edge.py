@@ -25,6 +25,13 @@ _FARTHER_IN, _BEYOND, _FARTHER_OUT = np.array([-1.5, -2.0]), np.array([0.4, 0.6,
 # No line through comb goes so far without a wall; what is finer is noise. Over how much of the edge the comb farther in
 # is taken together, and how near to what hides or fills it nothing is said.
 _CELL, _FINE, _COMB_OVER, _COMB_LEAST, _BESIDE = 1.3, 0.12, 6.0, 0.3, 1.0
+# In a shadow walls and cells are darker alike: light changes by that share of its brightest as it does in comb without
+# one (0.86 and more along shaded edges, 0.42 and less on compound and labels), and by so many times what it does on the
+# table beside (7.7 and more), or grey levels: what is darker tells nothing.
+_SHADED, _SHADED_OVER_TABLE = 0.75, 5.0
+# What lies within is lighter than the table beyond by so many grey levels, and so many times what that changes by: no
+# table, be it shaded or not.
+_LEAST_LIGHTER = 6.0
 # Nothing is looked at so far out, nor what blurs into it.
 _AROUND = 2.6
 # Of the changes of light farther in: those where no cells are, and what both sides of the outline differ by where they
@@ -40,6 +47,8 @@ _FLANK = (0.2, 3.0)
 # Filled cells stand so little out of these lines, up to the corner where they meet, or, on a curve, lie so little
 # within; most of them.
 _FLUSH, _SUNK, _MOSTLY = 0.18, 0.5, 0.8
+# Where the corner comes first, its last cell belongs to the edge beyond it.
+_LAST_CELL = 1.0
 
 
 def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgePart | None]:
@@ -55,12 +64,13 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
     for number, ring in enumerate(traced.contour.rings):
         lengths = RingLengths.of(ring)
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
-        changes, apart, goes_on = _beside(light, RingLengths.of(ring - first), at, out_px)
+        changes, apart, lighter, goes_on = _beside(light, RingLengths.of(ring - first), at, out_px)
         judged = ~_known(traced, number, at, _BESIDE * pitch_px)
         for quiet, alike, long in _BARE:
             chosen = judged & (changes < quiet) & (apart < alike)
-            for run in runs_of(chosen) if np.isinf(alike) and chosen.any() else []:
-                chosen[run] = not _in_line(_out_of_line(lengths, at[run], out_px))
+            for run in runs_of(chosen) if chosen.any() else []:
+                if np.isinf(alike) or np.mean(lighter[run]) > _MOSTLY:
+                    chosen[run] = not _in_line(_out_of_line(lengths, at[run], out_px))
             part = longest_part(chosen, lengths, at, _SPACING)
             if part is not None and part.length_pitches > long:
                 bare.append(part)
@@ -111,12 +121,14 @@ def _in_line(out: Float64s) -> bool:
     """Whether a part of a ring ends where the lines before and behind it do, up to the corner where these meet."""
     near = (out < _FLUSH) & (out > -_SUNK)
     most = np.mean(near[np.arange(len(out)), out.argmax(axis=1)]) > _MOSTLY
-    return bool(most and near[0, 0] and near[-1, 1])
+    ends = out[[0, -1], [0, 1]]
+    return bool(most and (ends < _FLUSH).all() and (ends > -_LAST_CELL).all())
 
 
-def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s, Bools]:
+def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s, Bools, Bools]:
     """By how much light changes just within a ring, at lengths along it, and by how much both sides of it differ, of
-    what it changes by farther in, and where it changes beyond as in comb, shape (N,) each.
+    what it changes by farther in, where it is lighter within than the table beyond, and where it changes beyond as in
+    comb, shape (N,) each.
 
     `out_px`: the cell pitch, negative where the ring's material lies to the right of its direction.
     """
@@ -130,7 +142,16 @@ def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> 
     comb = np.maximum(with_sides(deeper, _COMB_OVER / _SPACING).mean(axis=1), max(_COMB_LEAST * usual, 1.0))
     table = np.maximum(with_sides(_changes(farther_out), _TABLE_OVER / _SPACING).mean(axis=1), 1.0)
     goes_on = _changes(beyond) > np.maximum(_FAINT * usual, _OVER_TABLE * table)
-    return _changes(within) / comb, np.abs(within.mean(axis=0) - beyond.mean(axis=0)) / comb, goes_on
+    changes = _changes(within)
+    in_shade = _SHADED * median(deeper / _brightest(farther_in)) * _brightest(within)
+    changes = np.where(changes > np.maximum(in_shade, _SHADED_OVER_TABLE * table), comb, changes)
+    step = within.mean(axis=0) - beyond.mean(axis=0)
+    return changes / comb, np.abs(step) / comb, step > np.maximum(_LEAST_LIGHTER, _OVER_TABLE * table), goes_on
+
+
+def _brightest(light: Float64s) -> Float64s:
+    """The brightest light over a cell about each place along lines beside a ring, (K, N), or a grey level, (N,)."""
+    return np.asarray(np.maximum(with_sides(light.max(axis=0), _CELL / _SPACING).max(axis=1), 1.0))
 
 
 def _changes(light: Float64s) -> Float64s:

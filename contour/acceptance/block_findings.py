@@ -11,7 +11,7 @@ from contour.geometry.rings import Ring, area
 from contour.image.region import Region
 from contour.tracing.trace import Trace
 from contour.walls.comb_likeness import unlike_comb
-from contour.walls.pieces import Piece
+from contour.walls.pieces import STRIP_PITCHES, Piece
 
 # Of what contour and busy region may be apart in one place, the share that they may be apart everywhere. Of 500
 # traceable scenes none lies farther outside than 0.19 pitches; outlines a cell too fat lie 0.33 or more in 98 of 100.
@@ -21,8 +21,6 @@ _SURE_WITHIN_PITCHES = 0.25
 _SURE_WITHIN_SHARE = 0.01
 # Of two blocks whose areas differ by less than this the larger one is a matter of chance.
 _EQUAL_SHARE = 0.8
-# Narrower than so many cells a piece is a strip that was cut off, however long: no block is.
-_STRIP_PITCHES = 4.5
 
 
 def no_walls(traced: CheckedTrace | None, limits: QualityLimits) -> Finding | None:
@@ -94,7 +92,7 @@ def touches_region(outlines: list[Ring], region: Region | None, border_px: float
 def _other_blocks(traced: Trace, limits: Limits) -> list[Piece]:
     """The pieces beside the traced block for which it is refused, largest first."""
     share = max(limits.block_share, _EQUAL_SHARE) if limits.pieces == "largest" else limits.block_share
-    wide_px = _STRIP_PITCHES * (traced.pitch_px or 0.0)
+    wide_px = STRIP_PITCHES * (traced.pitch_px or 0.0)
     least_px2 = share * area(traced.contour)
     return [piece for piece in traced.others if piece.area_px2 >= least_px2 and piece.width_px > wide_px]
 

@@ -119,6 +119,18 @@ class TableLook:
         return _opened(self.things & ~self.shade, _THIN)
 
     @cached_property
+    def solid(self) -> Bools:
+        """Where everything is lighter than the table, and neither flat nor walls around dark cells: grain of what fills
+        cells.
+        """
+        lighter = cv2.erode(self.lighter.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        return np.asarray(lighter & ~self.table & ~self.things)
+
+    def solid_at(self, points: Float64s) -> Bools:
+        """Which points (N, 2), pixels, lie in such grain, shape (N,)."""
+        return self._at(self.solid, points)
+
+    @cached_property
     def hiding(self) -> Bytes:
         """The map of what is foreign and no shadow, with its own borders, uint8, 1 where it hides what lies beneath."""
         return np.asarray(cv2.dilate(self.lit.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)

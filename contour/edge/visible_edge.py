@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contour.edge.cut_material import cut_material
+from contour.edge.cut_material import cut_borders, joined
 from contour.edge.flanks import out_of_flanks
 from contour.edge.ring_places import runs_of, turns_deg
 from contour.edge.table_look import TableLook, beside
@@ -15,10 +15,10 @@ from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
-from contour.geometry.rings import Ring
+from contour.geometry.rings import Ring, perimeter
 from contour.geometry.signed_distance import depth_inside, nearest
 from contour.outline.fit import FittedRing, fit_ring
-from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
+from contour.walls.wall_evidence import BlockEvidence, EdgePoints, RingEvidence, WitnessKind
 
 SPACING_PITCHES = 0.25
 # Ends of walls beside a thing are the edge's own where they lie on the line of those that are seen well.
@@ -39,6 +39,8 @@ _THING_PITCHES, _THING_ROOM = 1.0, 0.8
 # At half a pitch a round outline of five pitches across turns by less.
 _CORNER_DEG = 15.0
 _LEAST_WITNESSES = 8
+# Grain of what fills cells looks like ends of walls; but it goes on beyond them.
+_GRAIN_PITCHES = (0.2, 0.4)
 
 Fit = Callable[[RingEvidence], FittedRing]
 
@@ -87,6 +89,7 @@ def fit_visible(
     """The ring fitted to those witnesses that do not lie at the border of something that is neither table nor comb, and
     to the ends of filled cells where these continue the edge. Raises NoBlockFound as `fit` does.
     """
+    evidence = _without_grain(evidence, look)
     near = _unshaded(doubtful(evidence, look), evidence, picture, look, fit)
     if not near.any():
         return _plain(evidence, fit(evidence))
@@ -101,12 +104,21 @@ def fit_visible(
     distrusted = near & ((apart > _AGREE_PITCHES * look.pitch_px) | _at_corners(near, evidence, ring, look.pitch_px))
     if not distrusted.any():
         return _plain(evidence, fit(evidence))
-    fills = cut_material(picture, clear, ring, evidence.points[distrusted], look)
     walls = _without(evidence, distrusted, look)
-    trusted, order = walls.joined_by(fills, _FILL_SIGMA_PX, WitnessKind.BLUNT)
-    fitted, points = fit(trusted), evidence.points[distrusted]
+    points = evidence.points[distrusted]
+    fills = cut_borders(picture, clear, ring, points, look, _refit(walls, fit, look.pitch_px))
+    walls = walls.take(~_behind(walls, fills, look.pitch_px))
+    trusted, order = walls.joined_by(joined(fills), _FILL_SIGMA_PX, WitnessKind.BLUNT)
+    fitted = fit(trusted)
     out = (1.0 if evidence.is_hole else -1.0) * depth_inside(fitted.ring, points, rectifier)
     return VisibleRing(trusted, fitted, points, order >= len(walls.points), points[out > _OUT_PITCHES * look.pitch_px])
+
+
+def _without_grain(evidence: RingEvidence, look: TableLook) -> RingEvidence:
+    """The evidence without witnesses beyond which material goes on that is no comb: walls end at cells or the table."""
+    beyond = [evidence.points + out * look.pitch_px * evidence.normal for out in _GRAIN_PITCHES]
+    grain = np.all([look.solid_at(points) for points in beyond], axis=0)
+    return evidence.take(~grain) if grain.any() else evidence
 
 
 def doubtful(evidence: RingEvidence, look: TableLook) -> Bools:
@@ -173,7 +185,27 @@ def _flush(run: Indices, evidence: RingEvidence, picture: Bytes, look: TableLook
     beyond = points + _THING_PITCHES * look.pitch_px * evidence.normal[run]
     if np.count_nonzero(look.room_at(beyond) > _THING_ROOM * look.pitch_px) < _FEW:
         return False  # cells of a dark block whose walls fade
-    return len(cut_material(picture, clear, fit(clear).ring, points, look, dark=True).points) > 0
+    return len(cut_borders(picture, clear, fit(clear).ring, points, look, _refit(clear, fit, look.pitch_px))) > 0
+
+
+def _behind(walls: RingEvidence, fills: list[EdgePoints], pitch_px: float) -> Bools:
+    """Which witnesses lie inside of filled cells' ends, where the coarse ring goes around what fills them, (N,)."""
+    found, whole = np.zeros(len(walls.points), np.bool_), perimeter(walls.coarse)
+    for one in fills:
+        long = (one.position[-1] - one.position[0]) % whole
+        within = (walls.position - one.position[0]) % whole < long
+        found |= within & (nearest(walls.points, one.points) > _AGREE_PITCHES * pitch_px)
+    return found
+
+
+def _refit(seen: RingEvidence, fit: Fit, pitch_px: float) -> Callable[[list[EdgePoints]], Ring]:
+    """What fits the outline through filled cells' ends and what is seen, but for what lies behind those."""
+
+    def through(fills: list[EdgePoints]) -> Ring:
+        clear = seen.take(~_behind(seen, fills, pitch_px))
+        return fit(clear.joined_by(joined(fills), _FILL_SIGMA_PX, WitnessKind.BLUNT)[0]).ring
+
+    return through
 
 
 def _without_gaps(chosen: Bools) -> Bools:

@@ -19,6 +19,9 @@ _TELL, _DEEP_IN, _ALIKE, _APART = 4, 0.1, 0.15, 0.5
 # Two lines explain the witnesses of an arc or a curve as well where they cost no more than so many nats above it; it
 # matters where they meet so far from any of these witnesses, pitches. A line's least number of witnesses.
 _AS_WELL, _FAR, _OF_A_LINE = 8.0, 0.4, 2
+# So is a line across a corner no longer than that, by so few witnesses, if less than a cell would be lost in it: of 135
+# blocks none has one, and one whose last walls are inked has.
+_BEVEL_LONG, _LOST = 2.0, 1.0
 # An outlier has no say in where a line lies.
 _LEAST_WEIGHT = 1e-9
 
@@ -26,7 +29,7 @@ _LEAST_WEIGHT = 1e-9
 def untold(
     witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools, residual: Float64s, chains: list[Chain]
 ) -> Complexes:
-    """Middles of arcs and free curves that may as well be corners, shape (K,), in the fitting plane.
+    """Middles of arcs, free curves and short lines that may as well be corners, shape (K,), in the fitting plane.
 
     Roundings of one block mostly have one radius: two that are alike tell each other.
     """
@@ -45,7 +48,8 @@ def untold(
         for index, price in curves
         if _may_be_a_corner(witnesses, index, residual[index], price)
     ]
-    return np.array(places + _hardly_seen(witnesses, segments, lone, found, inlier), np.complex128)
+    places += _hardly_seen(witnesses, segments, lone, found, inlier)
+    return np.array(places + _lone_bevels(witnesses, segments, found, inlier), np.complex128)
 
 
 def _may_be_a_corner(witnesses: Witnesses, index: Indices, residual: Float64s, price: float) -> bool:
@@ -112,4 +116,27 @@ def _hardly_seen(
         deep = away > _DEEP_IN * witnesses.pitch_px
         if np.count_nonzero(deep) + np.count_nonzero(deep & witnesses.clean[own]) < _TELL:
             places.append(ends.mean())
+    return places
+
+
+def _lone_bevels(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools) -> list[np.complex128]:
+    """Middles of those lines that two witnesses alone put across a corner, where the cell in it may as well be lost, or
+    its walls may be too dark to show.
+    """
+    begin, owner = rolled(found.begin, 1), segments.owner(len(witnesses))
+    count = np.bincount(owner[inlier], minlength=len(segments))
+    long = np.abs(found.end - begin)
+    places = []
+    for k in np.flatnonzero(~segments.bend & (count <= _OF_A_LINE) & (long < _BEVEL_LONG * witnesses.pitch_px)):
+        beside = np.array([k - 1, (k + 1) % len(segments)])
+        before, after = segments.models.take(beside).tangent
+        turn = np.angle(after * before.conjugate())
+        if segments.bend[beside].any() or not LEAST_TURN < abs(turn) < MOST_TURN:
+            continue
+        origin = segments.models.take(beside).origin
+        ahead = ((origin[1] - origin[0]) * after.conjugate()).imag / (before * after.conjugate()).imag
+        way = (found.end[k] - begin[k]) / max(long[k], 1e-9)
+        passed = abs(((origin[0] + ahead * before - begin[k]) * way.conjugate()).imag) / witnesses.pitch_px
+        if _APART < passed < _LOST:
+            places.append(0.5 * (begin[k] + found.end[k]))
     return places

@@ -58,6 +58,11 @@ class Order:
     across: float
 
     @property
+    def known(self) -> bool:
+        """Whether there are cells enough to say."""
+        return self.own > 0.0
+
+    @property
     def other(self) -> bool:
         """Whether cells lie in good order on both sides, and not in the same."""
         return self.own > _ORDERLY and self.across < _OTHER * self.own

@@ -23,6 +23,11 @@ _SAMPLES = 6.0
 _LINK, NEAR_OUTLINE = 1.25, 1.6
 # What is less of the block than this is no part.
 _LEAST_PART = 0.02
+# An opening parts a strip from the block where so many pitches lead from its ends to the outline, on along it (cosine):
+# walls of both touch there. The strip has so many cells, of so many square pitches, as much of it at the least, and so
+# much of the block at most.
+_TO_OUTLINE, _STRAIGHT_ON = 2.4, 0.6
+_STRIP_CELLS, _CELL_SHARE, _STRIP_PITCHES2, _STRIP_SHARE = 2, 0.25, 2.0, 0.15
 # How near to long openings a line lies where it runs along them; and what counts for the line itself.
 _BY, _ON_IT = 0.5, 0.2
 # How much of the line runs along openings: of 103 seams 0.62 and more along long ones, in 120 single blocks without a
@@ -64,6 +69,53 @@ def runs_along(free: Openings, found: Parted) -> bool:
     return float(np.mean(near[(found.away < _ON_IT) & (free.depth > NEAR_OUTLINE)])) > _ALONG
 
 
+def parted_strip(free: Openings) -> Parted | None:
+    """The strip of cells that a long opening parts from the rest of a block, from outline to outline; None without any.
+
+    A strip of swarf whose walls touch the block's at a place or two is traced as a part of it.
+    """
+    every = max(1, int(free.pitch / _SAMPLES))
+    depth, numbers, pitch = free.depth[::every, ::every], free.numbers[::every, ::every], free.pitch / every
+    block = depth > 0.0
+    for number in np.flatnonzero(free.long >= LONG).tolist():
+        barrier = _to_outline(numbers == number, block, pitch)
+        if barrier is None:
+            continue
+        for part in _pieces(block & (barrier == 0), _STRIP_PITCHES2 * pitch**2):
+            strip = part & block
+            cells = np.bincount(numbers[strip], minlength=len(free.area)) > _CELL_SHARE * pitch**2
+            cells[[0, number]] = False
+            few = np.count_nonzero(strip) < _STRIP_SHARE * np.count_nonzero(block)
+            if few and np.count_nonzero(cells) >= _STRIP_CELLS:
+                shape = free.numbers.shape
+                away = _away(barrier == 0) / np.float32(pitch)
+                return Parted(1.0, enlarged(strip, every, shape), enlarged(away, every, shape))
+    return None
+
+
+def _to_outline(opening: Bools, block: Bools, pitch: float) -> Bytes | None:
+    """An opening, (h, w), and what leads from both of its ends straight on to the outline of the block, 1 there; None
+    where that is far, or lies aside.
+    """
+    row, column = np.nonzero(opening)
+    place = np.column_stack([column, row]).astype(np.float64)
+    middle = place.mean(axis=0)
+    axis = np.linalg.eigh(np.cov((place - middle).T))[1][:, 1]
+    at = (place - middle) @ axis
+    edge_row, edge_column = np.nonzero(~block)
+    outside = np.column_stack([edge_column, edge_row]).astype(np.float64)
+    barrier = opening.astype(np.uint8)
+    for end, ahead in ((place[at.argmin()], -axis), (place[at.argmax()], axis)):
+        way = outside - end
+        far = np.hypot(*way.T)
+        onward = way @ ahead > _STRAIGHT_ON * far
+        if not onward.any() or far[onward].min() > _TO_OUTLINE * pitch:
+            return None
+        nearest = outside[onward][far[onward].argmin()]
+        cv2.line(barrier, np.rint(end).astype(int).tolist(), np.rint(nearest).astype(int).tolist(), 1, 2)
+    return np.asarray(cv2.dilate(barrier, np.ones((3, 3), np.uint8)), np.uint8)
+
+
 def parted_by_row(free: Openings) -> Parted | None:
     """The part of a block on one side of a straight line along merged cells; None where none runs along many."""
     usual = median(free.long[free.cells]) if free.cells.any() else np.inf
@@ -81,10 +133,10 @@ def parted_by_row(free: Openings) -> Parted | None:
     # Long openings count for more: of two cells each there are as many in a row through a large block as along a seam.
     weight = np.repeat(free.long[numbers[row, column]] - usual, _DIRECTIONS)
     cell = (np.arange(_DIRECTIONS) * wide + strip).ravel()
-    total = np.bincount(cell, weight, _DIRECTIONS * wide)
-    total[:-1] += total[1:]
+    total = np.bincount(cell, weight, _DIRECTIONS * wide).reshape(_DIRECTIONS, wide)
+    total[:, :-1] += total[:, 1:]
     lines = []
-    for number in np.argsort(total)[: -_BEST - 1 : -1].tolist():
+    for number in np.argsort(total, axis=None)[: -_BEST - 1 : -1].tolist():
         one, first = divmod(number, wide)
         on = (strip[:, one] == first) | (strip[:, one] == first + 1)
         lines.append(_line(free, place[on], normal[:, one]))

@@ -16,7 +16,7 @@ from contour.geometry.arrays import Bools, Bytes
 from contour.image.pixel_grid import averaged, pixels_of
 from contour.seams.both_sides import cell_order, comb_along
 from contour.seams.openings import Openings, openings
-from contour.seams.parting import LONG, Parted, parted, parted_by_row, runs_along
+from contour.seams.parting import LONG, Parted, parted, parted_by_row, parted_strip, runs_along
 from contour.walls.pieces import Piece
 from contour.walls.see_block import SeenWalls
 from contour.walls.wall_evidence import BlockEvidence
@@ -27,6 +27,9 @@ _STEP = 2
 # How much of a line runs along openings that part two blocks whose cells lie in one order: of those that lie alike by
 # chance, and of halves that were left where they were cut, all of it; of single blocks with such openings 0.88.
 _ALL_ALONG = 0.95
+# And where cells are in no order, but one opening is as long as in no single block, pitches, noise across it says
+# nothing.
+_OF_NO_BLOCK = 10.0
 
 
 def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
@@ -36,6 +39,12 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
     coarse = _STEP if seen.wall_px >= 2 * _STEP * walls.scale else 1
     for step in sorted({coarse, 1}, reverse=True):
         free = openings(walls, seen, seen.mask, step)
+        strip = parted_strip(free)
+        if strip is not None and parted_strip(_with_faint(walls, seen, step)) is not None:
+            # Ink hides walls along a line, too; but cells go on in the same order beyond.
+            order = cell_order(free, strip)
+            if order.other or not order.known:
+                return _smaller(free, strip.part, walls.scale)
         found = parted(free)
         if found is not None:
             sure = comb_along(_light(walls, seen, free), free, found) and _two(walls, seen, free, found)
@@ -56,9 +65,15 @@ def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -
     order = cell_order(free, found)
     if order.other or (order.same and found.along < _ALL_ALONG):
         return order.other
+    alone = not order.same and found.along >= _ALL_ALONG and float(free.long.max()) > _OF_NO_BLOCK
+    return alone or runs_along(_with_faint(walls, seen, free.step), found)
+
+
+def _with_faint(walls: SeenWalls, seen: BlockEvidence, step: int) -> Openings:
+    """The block's openings between walls at half the threshold."""
     assert seen.mask is not None
     faint = np.asarray(cv2.bitwise_or(seen.mask, walls.mask.faint()), np.uint8)
-    return runs_along(openings(walls, seen, faint, free.step), found)
+    return openings(walls, seen, faint, step)
 
 
 def _light(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Bytes:

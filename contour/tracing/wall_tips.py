@@ -21,6 +21,7 @@ from contour.material.foam import foam_edge
 from contour.outline.uncertainty import uncertainty
 from contour.relief.relief import Relief
 from contour.seams.seam import parted_by_seam
+from contour.seams.splice import spliced
 from contour.tracing.cut_lines import touched_cuts, with_cuts
 from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed, tooth_px
 from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_lines
@@ -216,10 +217,11 @@ def _cut(
 def looked_at(picture: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[BlockEvidence, TableLook]:
     """What is seen of the block, and of what lies on it and around it: once more where that hides some of its edge."""
     hidden: Bytes | None = None
+    joining: Bytes | None = None
     plain = False
     earlier: tuple[Piece, ...] = ()
     for _ in range(_LOOKS):
-        seen = see_block(walls, lambda: on_stage("mask"), hidden=hidden)
+        seen = see_block(walls, lambda: on_stage("mask"), hidden=hidden, joining=joining)
         earlier = with_earlier(seen.others, earlier, seen.rings[0].coarse)
         seen = replace(seen, others=earlier)
         look = table_look(picture, seen, plain=plain)
@@ -229,10 +231,22 @@ def looked_at(picture: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[Bloc
             break
         known = np.zeros_like(look.hiding) if hidden is None else hidden
         hidden, plain = look.hiding, look.plain
+        splice = spliced(look.things, look.table, look.light, seen, look.step)
+        if splice is not None:
+            between, part = splice
+            joining = _with(joining, between.astype(np.uint8))
+            hidden = np.where(part & ~between, np.uint8(0), hidden)
+            earlier = ()
+            continue
         # Where the pitch was told anew, so may be the maps' grid.
         if hidden.shape == known.shape and not (hidden > known).any():
             break
     return seen, look
+
+
+def _with(known: Bytes | None, more: Bytes) -> Bytes:
+    """A map and what was known before, on the same grid; more alone where that is another one."""
+    return more if known is None or known.shape != more.shape else known | more
 
 
 def _cut_off(light: Bytes, seen: BlockEvidence, on_stage: OnStage) -> Trace:

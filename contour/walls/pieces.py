@@ -26,6 +26,8 @@ _CLOSING_PITCHES = 0.72
 # to be in two, parts as large as this may be its own. No such strip has less wall, pitches times pixels.
 _LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
 _LEAST_CELL = 0.2
+STRIP_PITCHES = 4.5
+"""Narrower than so many cells a piece is a strip that was cut off, however long: no block is."""
 # A shaving is as long as several walls: of the block's own walls fewer may stand alone, between two that do not show.
 _SHAVING_PITCHES = 1.5
 _HEXAGON = 2 / np.sqrt(3)

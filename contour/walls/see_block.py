@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes
+from contour.geometry.arrays import Bools, Bytes
 from contour.image.pixel_grid import averaged, coarse_step, pixels_of
 from contour.relief.relief import Relief
 from contour.walls.cell_scale import CellScale, probe
@@ -91,12 +91,17 @@ def strong_walls(walls: SeenWalls, least: float) -> SeenWalls:
 
 
 def see_block(
-    walls: SeenWalls, on_mask: Callable[[], None] = lambda: None, *, hidden: Bytes | None = None
+    walls: SeenWalls,
+    on_mask: Callable[[], None] = lambda: None,
+    *,
+    hidden: Bytes | None = None,
+    joining: Bytes | None = None,
 ) -> BlockEvidence:
     """Witnesses of the largest block among the walls of a picture, in its pixels.
 
     `on_mask` is called when the mask of what belongs to blocks is made. `hidden`, (h, w), not 0 where something hides
-    the block, on a grid of any size over the picture: no walls are seen there. Raises NoBlockFound.
+    the block, on a grid of any size over the picture: no walls are seen there. `joining`, on such a grid, not 0 where
+    something joins parts of it as walls do. Raises NoBlockFound.
     """
     small, scale, cells = walls.small, walls.scale, walls.cells
     pitch_px = cells.pitch_px / scale
@@ -111,10 +116,16 @@ def see_block(
         every = with_faint_links(every, faint, pitch_px, few)
         few = few if every is seen.mask else averaged(every, coarse_step(pitch_px))
     on_mask()
+    if joining is not None:
+        between = _enlarged(joining, every.shape)
+        every = np.where(between, np.uint8(255), every)
+        few = averaged(every, coarse_step(pitch_px))
     seen = replace(seen, mask=without_loose_pieces(every, pitch_px, faint))
     loose = None if seen.mask is every else np.asarray(cv2.subtract(every, seen.mask), np.uint8)
     coarse = coarse_block(seen.mask, small, pitch_px, few if loose is None else None)
     others = pieces_beside(every, coarse.rings[0].vertices, pitch_px, scale, few)
+    if joining is not None:
+        seen = replace(seen, mask=np.where(between, np.uint8(0), seen.mask))
     evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway, walls.relief)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))
@@ -132,12 +143,17 @@ def _visible(seen: WallMask, hidden: Bytes | None) -> WallMask:
     """The mask without walls in what hides the block."""
     if hidden is None:
         return seen
-    there = cv2.resize(hidden, seen.mask.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+    there = _enlarged(hidden, seen.mask.shape)
 
     def visible(mask: Bytes) -> Bytes:
         return np.where(there, np.uint8(0), mask)
 
     return replace(seen, mask=visible(seen.mask), faint=lambda: visible(seen.faint()))
+
+
+def _enlarged(part: Bytes, shape: tuple[int, ...]) -> Bools:
+    """Where a map on a coarser grid is not 0, at the size of the wall mask, whose `shape` is (H, W)."""
+    return np.asarray(cv2.resize(part, shape[::-1], interpolation=cv2.INTER_NEAREST) > 0)
 
 
 def _darker_than_table(seen: WallMask, light: Bytes, midway: float) -> WallMask:

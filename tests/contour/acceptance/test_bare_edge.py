@@ -96,6 +96,29 @@ def test_filled_cells_end_in_line_with_the_edge_and_at_a_corner_with_both(part: 
     assert found(filled(part), BLOCK) is None
 
 
+@pytest.mark.parametrize("depth", [0.3, 0.7])
+def test_cells_in_a_shadow_are_darker_walls_and_all(depth: float) -> None:
+    shaded = comb(BLOCK, 60, cells=20)
+    shaded[:, 376:] = np.rint(shaded[:, 376:] * (1.0 - depth))
+    assert found(shaded, BLOCK) is None
+    bulge = shapely.Polygon([(400, 120), (400 + 0.9 * PITCH, 160), (400 + 0.9 * PITCH, 200), (400, 240)])
+    assert found(shaded, BLOCK | bulge) is not None
+
+
+def test_in_a_shadow_so_deep_that_walls_are_a_few_grey_levels_nothing_tells_them() -> None:
+    shaded = comb(BLOCK, 60, cells=20)
+    shaded[:, 376:] = np.rint(shaded[:, 376:] * 0.02)
+    assert found(shaded, BLOCK) is not None
+
+
+def test_what_is_a_little_lighter_than_the_table_and_in_line_with_the_edge_fills_cells() -> None:
+    picture = comb(BLOCK, 40)
+    picture[180:230, 340:400] = 60
+    assert found(picture, BLOCK) is None
+    picture[180:230, 340:400] = 30
+    assert found(picture, BLOCK) is not None, "it may be the table, shaded"
+
+
 LABEL = shapely.Polygon([(330, 130), (400 + 0.9 * PITCH, 130), (400 + 0.9 * PITCH, 280), (330, 280)])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from contour.edge.cut_material import cut_material
+from contour.edge.cut_material import cut_borders, joined
 from contour.edge.table_look import TableLook
 from contour.geometry.rings import densified
 from contour.walls.wall_evidence import EdgePoints
@@ -43,10 +43,9 @@ def found(
     image: NDArray[np.uint8],
     there: TableLook,
     gap: tuple[float, float] = GAP,
-    dark: bool = False,
 ) -> EdgePoints:
     clear = replace(witnesses(BLOCK, seed=1, gaps=(gap,)), coarse=densified(BLOCK, 5.0))
-    return cut_material(image, clear, BLOCK, area[:2], there, dark=dark)
+    return joined(cut_borders(image, clear, BLOCK, area[:2], there))
 
 
 @pytest.mark.parametrize("colour", [False, True])
@@ -76,7 +75,7 @@ def test_what_ends_on_a_curve_that_goes_on_along_it_is_cut_too() -> None:
     points, normal = along(round_block, np.linspace(*gap, 30))
     area = np.vstack([points, (points - 3.0 * PITCH * normal)[::-1]])
     clear = replace(witnesses(round_block, seed=1, gaps=(gap,)), coarse=densified(round_block, 5.0))
-    one = cut_material(picture(area), clear, round_block, area[[0, 29]], look(round_block, area))
+    one = joined(cut_borders(picture(area), clear, round_block, area[[0, 29]], look(round_block, area)))
     assert len(one.points) > 20
     assert distances(one.points, round_block).mean() < 0.05 * PITCH
 
@@ -90,7 +89,7 @@ def test_a_label_over_a_small_round_block_is_none() -> None:
     label = np.array([inner - side, inner + side, outer + side, outer - side])
     gap = (200.0 - 3.0 * PITCH, 200.0 + 3.0 * PITCH)
     clear = replace(witnesses(round_block, seed=1, gaps=(gap,)), coarse=densified(round_block, 5.0))
-    assert not len(cut_material(picture(label), clear, round_block, label[:2], look(round_block, label)).points)
+    assert cut_borders(picture(label), clear, round_block, label[:2], look(round_block, label)) == []
 
 
 @pytest.mark.parametrize("out", [0.4, 1.0, 3.0])
@@ -99,11 +98,11 @@ def test_what_sticks_out_is_none(out: float) -> None:
     assert not len(found(area, picture(area), look(BLOCK, area)).points)
 
 
-def test_what_is_darker_than_the_table_is_none_unless_that_is_asked() -> None:
+def test_what_is_darker_than_the_table_is_none_where_it_ends_as_softly_as_a_shadow() -> None:
     area = thing(*GAP)
-    dark = look(BLOCK, area, lighter=False)
-    assert not len(found(area, picture(area, 10), dark).points)
-    assert len(found(area, picture(area, 10), dark, dark=True).points)
+    dark, cut = look(BLOCK, area, lighter=False), picture(area, 10)
+    assert len(found(area, cut, dark).points)
+    assert not len(found(area, np.asarray(cv2.GaussianBlur(cut, (0, 0), 0.3 * PITCH), np.uint8), dark).points)
 
 
 def test_nor_is_what_the_table_does_not_follow() -> None:

@@ -18,7 +18,7 @@ from contour.errors import NoBlockFound
 from contour.outline.fit import fit_ring
 from contour.outline.uncertainty import RingBounds
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
-from tests.support.pictures.hand_looks import HEIGHT, WIDTH, look
+from tests.support.pictures.hand_looks import HEIGHT, WIDTH, drawn, look
 from tests.support.pictures.outline_scenes import PITCH, along, blob, circle, distances, errors, rectangle, witnesses
 
 PICTURE = np.full((HEIGHT, WIDTH), 40, np.uint8)
@@ -117,7 +117,46 @@ def test_dark_compound_that_ends_flush_with_the_edge_is_no_shadow_beside_it(out:
     picture = np.array(cv2.fillPoly(PICTURE.copy(), [np.rint(fill * 16).astype(np.int32)], 15, cv2.LINE_AA, 4))
     dark = look(BLOCK, fill, lighter=False, shade=True)
     one = fit_visible(evidence, picture, dark, None, FIT)
-    assert (told(one, dark) != []) is (out == 0.0)
+    assert told(one, dark) == []
+    assert bool(errors(one.fitted.ring, BLOCK).max() < 0.1 * PITCH) is (out == 0.0)
+
+
+def test_grain_of_what_fills_cells_is_no_end_of_a_wall() -> None:
+    """Its bright specks end deep inside, but it goes on beyond them."""
+    fill = patch(BLOCK, 350.0, 3.0, 8.0, out=0.0)
+    evidence = witnesses(BLOCK, seed=8)
+    deep = np.abs(evidence.position - 350.0) < 2.0 * PITCH
+    evidence = replace(evidence, points=evidence.points - np.where(deep, 1.5 * PITCH, 0.0)[:, None] * evidence.normal)
+    plain = look(BLOCK)
+    grainy = replace(plain, lighter=drawn(fill))
+    assert len(fitted(evidence, plain).evidence.points) == len(evidence.points)
+    one = fitted(evidence, grainy)
+    assert len(one.evidence.points) == np.count_nonzero(~deep)
+    assert errors(one.fitted.ring, BLOCK).max() < 0.1 * PITCH
+    assert len(fitted(witnesses(BLOCK, seed=8), grainy).evidence.points) == len(evidence.points), "table lies beyond"
+
+
+def filled_end(out: float) -> tuple[NDArray[np.uint8], TableLook, VisibleRing]:
+    """Compound that fills a block's end, both corners of it, three pitches deep; so much wider than the block."""
+    side, deep = BLOCK[1] - BLOCK[0], BLOCK[2] - BLOCK[1]
+    long, down = side / np.hypot(*side), deep / np.hypot(*deep)
+    wide = out * PITCH * down
+    inner = np.array([BLOCK[1] - wide, BLOCK[2] + wide]) - 3.0 * PITCH * long
+    fill = np.array([*inner, BLOCK[2] + wide, BLOCK[1] - wide])
+    evidence = witnesses(BLOCK, seed=7)
+    beyond = (evidence.points - inner[0]) @ long
+    evidence = replace(evidence, points=evidence.points - np.maximum(beyond, 0.0)[:, None] * long)
+    picture = np.array(cv2.fillPoly(PICTURE.copy(), [np.rint(fill * 16).astype(np.int32)], 150, cv2.LINE_AA, 4))
+    there = look(BLOCK, fill)
+    return picture, there, fit_visible(evidence, picture, there, None, FIT)
+
+
+def test_compound_that_fills_a_whole_end_is_cut_where_the_edges_on_both_sides_go_on_to_its_own() -> None:
+    _, there, one = filled_end(0.0)
+    assert told(one, there) == []
+    assert errors(one.fitted.ring, BLOCK).max() < 0.1 * PITCH
+    _, there, one = filled_end(1.0)
+    assert told(one, there) != [], "a sheet that is wider than the block leaves its edges at an angle"
 
 
 def test_a_dark_thing_over_a_corner_is_none_either() -> None:

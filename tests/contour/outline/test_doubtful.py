@@ -9,6 +9,8 @@ from contour.synthetic import render
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from tests.support.scenes.random_scenes import random_scene
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+from tests.support.scenes.trials import calibration_for
 
 
 @pytest.mark.parametrize(("seed", "place"), [(1_054_048, (633.0, 424.0)), (1_058_134, (598.0, 460.0))])
@@ -22,3 +24,13 @@ def test_a_curve_is_told_where_two_lines_would_do_and_lie_elsewhere(seed: int, p
 
 def test_a_curve_is_one_where_two_lines_hardly_turn() -> None:
     assert trace(render(random_scene(1_058_142).scene).picture, TraceSettings()).untold_px is None
+
+
+def test_a_line_that_two_ends_alone_put_across_a_corner_is_told() -> None:
+    """The walls of the cell in it are inked as dark as the table, 0.7 of a cell of the block."""
+    rendered = render(shop_floor_scene("writing", 1_310_004).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+    corner = max(rendered.truth_px.exterior.tolist())
+    assert traced.untold_px is not None
+    assert np.hypot(*np.subtract(traced.untold_px, corner)) < 1.5 * rendered.pitch_px

@@ -62,6 +62,15 @@ def test_two_halves_that_lie_as_they_were_cut_are_two() -> None:
     assert seam_in(halves(0.3, CELLS)) is not None
 
 
+def test_noise_across_one_opening_from_edge_to_edge_is_no_faint_wall() -> None:
+    irregular = replace(CELLS, kind="irregular", jitter=0.3)
+    picture = render(replace(halves(0.4, irregular), cells=irregular)).picture
+    walls = see_walls(picture, wall_light(picture), "auto")
+    seen = looked_at(picture, walls, lambda _: None)[0]
+    noisy = replace(walls, mask=replace(walls.mask, faint=lambda: np.full_like(walls.mask.mask, 255)))
+    assert parted_by_seam(noisy, seen) is not None
+
+
 def _line(width_mm: float) -> Contour:
     return thick_line([at(-20.0, 20.0), at(20.0, -WIDE - 20.0)], width_mm)
 

@@ -18,6 +18,7 @@ import numpy as np
 from contour.acceptance.block_level import exclusive_levels, table_activity
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median, quantile
 from contour.geometry.rings import Contour, Ring, signed_area
+from contour.image.channels import largest
 from contour.image.opencv import fewer_vertices, pieces_and_areas, pieces_of
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
@@ -127,9 +128,7 @@ def disagreement(
 def _activity(small: Bytes, small_pitch_px: float) -> Float32s:
     """By how much the picture differs from its mean over a pitch, averaged over another, in the channel where most."""
     window = _odd(small_pitch_px)
-    off = cv2.absdiff(small, cv2.blur(small, (window, window)))
-    if off.ndim == 3:
-        off = off.max(axis=2)
+    off = largest(np.asarray(cv2.absdiff(small, cv2.blur(small, (window, window))), np.uint8))
     return np.asarray(cv2.boxFilter(off, cv2.CV_32F, (window, window)), np.float32)
 
 

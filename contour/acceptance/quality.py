@@ -14,6 +14,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes, Float32s, Int64s, median
 from contour.geometry.rings import Contour, Ring
+from contour.image.channels import largest
 from contour.image.pixel_sampling import FULL_SCALE
 
 # So many pixels tell enough, and cost about a millisecond.
@@ -230,7 +231,7 @@ def picture_faults(picture: Bytes) -> tuple[str, ...]:
     but have no sharp edge anywhere.
     """
     hop = max(1, round(np.sqrt(picture.shape[0] * picture.shape[1] / _LOOKED_AT_PX)))
-    light = picture if picture.ndim == 2 else picture.max(axis=2)
+    light = largest(picture)
     brightest = float(np.quantile(light[::hop, ::hop], 1 - _SPECKS))
     clipped = float(np.mean(light[::hop, ::hop] >= FULL_SCALE))
     if brightest < _DARK_LEVEL:

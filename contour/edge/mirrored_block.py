@@ -83,7 +83,8 @@ def _axis(picture: Bytes, walls: SeenWalls, first: Contour | None, rectifier: Re
         if best is not None and best.whole:
             break
         strong = strong_walls(walls, rise)
-        best = _better(best, _found(picture, walls, strong, rectifier))
+        known = best is not None and best.shown.share >= _FEW
+        best = _better(best, _found(picture, walls, strong, rectifier, least=0.0 if known else _FEW))
         if best is None or best.shown.share < _FEW:
             return None
         for _ in range(_TURNS):
@@ -124,14 +125,26 @@ def _better(one: _Found | None, other: _Found | None) -> _Found | None:
     return max(one, other, key=lambda found: (found.whole, found.shown.share))
 
 
-def _found(picture: Bytes, walls: SeenWalls, seen: SeenWalls, rectifier: Rectifier | None) -> _Found | None:
-    """The outline of those walls that are `seen`, whatever they say against it; None without one."""
+def _found(
+    picture: Bytes, walls: SeenWalls, seen: SeenWalls, rectifier: Rectifier | None, *, least: float = 0.0
+) -> _Found | None:
+    """The outline of those walls that are `seen`, whatever they say against it; None without one, or where axes lie
+    within half a pitch of the coarse outline along less of it than `least`: along no more of a line through wall ends.
+    """
     try:
-        rings = visible_rings(picture, *_looked(picture, seen), rectifier)
+        looked, look = _looked(picture, seen)
+        if least and axis_beside(walls.light, _coarse(looked), walls.cells.pitch_px).share < least:
+            return None
+        rings = visible_rings(picture, looked, look, rectifier)
     except NoBlockFound:
         return None
     exterior, *holes = (one.fitted.ring[::-1].copy() for one in rings)
     return _judged(walls, Contour(exterior, tuple(holes)), seen)
+
+
+def _coarse(seen: BlockEvidence) -> Contour:
+    exterior, *holes = (ring.coarse[::-1].copy() for ring in seen.rings)
+    return Contour(exterior, tuple(holes))
 
 
 def _looked(picture: Bytes, walls: SeenWalls) -> Looked:

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, Int32s, median, quantiles
+from contour.image.channels import planes
 
 _LEVEL_PITCHES, _SHARE_KNOWN = 10.0, 0.02
 # Apart from the table around by so many grey levels, and so many of its spreads.
@@ -20,7 +21,7 @@ _ROUNDS, _FEW_SAMPLES = 4, 5.0
 @dataclass(frozen=True, eq=False)
 class TableLight:
     """Which samples lie on flat parts that are the table, `parts` (h, w), how far the picture is `off` its light, that
-    light, `level`, (h, w, channels), and its `spread` in each channel.
+    light, `level`, (channels, h, w), and its `spread` in each channel.
     """
 
     parts: Bools
@@ -31,12 +32,12 @@ class TableLight:
     @property
     def lighter(self) -> Bools:
         """Where the picture is lighter than the table in some channel."""
-        return np.asarray(np.any(self.off > _APART + _APART_SPREADS * self.spread, axis=2))
+        return np.asarray(np.any(self.off > (_APART + _APART_SPREADS * self.spread)[:, None, None], axis=0))
 
     @property
     def shade(self) -> Bools:
         """Where it is darker in all channels, as a shadow makes a table."""
-        return np.asarray(np.all(self.off < 0, axis=2)) & self._not_too_dark
+        return np.asarray(np.all(self.off < 0, axis=0)) & self._not_too_dark
 
     @property
     def alike(self) -> Bools:
@@ -45,7 +46,7 @@ class TableLight:
 
     @property
     def _not_too_dark(self) -> Bools:
-        return np.asarray(np.all(self.off > (_DEEPEST_SHADE - 1.0) * self.level, axis=2))
+        return np.asarray(np.all(self.off > (_DEEPEST_SHADE - 1.0) * self.level, axis=0))
 
 
 def table_light(small: Bytes, parts: Int32s, area: Indices, samples: float) -> TableLight:
@@ -58,10 +59,12 @@ def table_light(small: Bytes, parts: Int32s, area: Indices, samples: float) -> T
     flat = np.flatnonzero(parts)
     numbers = parts.ravel().take(flat).astype(np.intp)
     sizes = np.maximum(np.bincount(numbers, minlength=len(area)), 1)
-    light = np.asarray(cv2.blur(small, (3, 3)), np.float32).reshape(*small.shape[:2], -1)
+    channels, light = (
+        np.stack(planes(one)).astype(np.float32) for one in (small, np.asarray(cv2.blur(small, (3, 3)), np.uint8))
+    )
     # Plates of a table lie side by side under one lamp: those told from the first tell what the next ones look like.
     for _ in range(_ROUNDS):
-        level, spread = _table_level(small, table_parts.take(parts), samples)
+        level, spread = _table_level(channels, table_parts.take(parts), samples)
         off = light - level
         known, table_parts = table_parts, _table_parts(off, spread, (flat, numbers, sizes), main)
         if (known == table_parts).all() or area[table_parts & ~known].sum() < _FEW_SAMPLES * samples**2:
@@ -69,20 +72,19 @@ def table_light(small: Bytes, parts: Int32s, area: Indices, samples: float) -> T
     return TableLight(table_parts.take(parts), off, level, spread)
 
 
-def _table_level(small: Bytes, main: Bools, samples: float) -> tuple[Float32s, Float64s]:
-    """The light of the table around each sample, (h, w, channels), and its spread in each channel."""
-    channels = small.reshape(*main.shape, -1).astype(np.float32)
+def _table_level(channels: Float32s, main: Bools, samples: float) -> tuple[Float32s, Float64s]:
+    """The light of the table around each sample, (channels, h, w), and its spread in each channel."""
     size = 2 * round(0.5 * _LEVEL_PITCHES * samples) + 1
     share = cv2.blur(main.astype(np.float32), (size, size))
     unknown = ~(share > _SHARE_KNOWN)
     np.maximum(share, 1e-3, out=share)
     level = np.empty_like(channels)
-    spread = np.zeros(channels.shape[2])
-    for k in range(channels.shape[2]):
-        plane, some = channels[:, :, k], (slice(None, None, 3), slice(None, None, 3))
+    spread = np.zeros(len(channels))
+    for k, plane in enumerate(channels):
+        some = (slice(None, None, 3), slice(None, None, 3))
         here = plane[some][main[some]]
         lowest, highest = quantiles(here, (0.02, 0.98)).tolist() if len(here) else (0.0, 0.0)
-        local = np.divide(cv2.blur(plane * main, (size, size)), share, out=level[:, :, k])
+        local = np.divide(cv2.blur(plane * main, (size, size)), share, out=level[k])
         if len(here):
             spread[k] = 1.4826 * median(np.abs(here - local[some][main[some]]))
         # Far from any of it, in a hole, the table may be as light as it is anywhere, and a little more so.
@@ -96,8 +98,8 @@ def _table_parts(off: Float32s, spread: Float64s, parts: tuple[Indices, Indices,
     """
     flat, numbers, sizes = parts
     table = np.ones(len(sizes), np.bool_)
-    for k in range(off.shape[2]):
-        mean = np.bincount(numbers, weights=off[:, :, k].ravel().take(flat), minlength=len(sizes)) / sizes
+    for k, plane in enumerate(off):
+        mean = np.bincount(numbers, weights=plane.ravel().take(flat), minlength=len(sizes)) / sizes
         table &= np.abs(mean) < _APART + _APART_SPREADS * spread[k]
     table[0] = False
     table[main] = main > 0

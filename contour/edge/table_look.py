@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from contour.edge.table_light import table_light
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
+from contour.image import channels
 from contour.image.opencv import deep, pieces_and_boxes, pieces_of, within
 from contour.image.pixel_grid import samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
@@ -195,7 +196,7 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     foreign = _long(foreign, _LONG_PITCHES * samples)
     beside_block = _long(_opened((block == 0) & ~(table | told), _BAND * samples + 0.5), _LONG_PITCHES * samples)
     every = foreign | beside_block
-    mean = small if small.ndim == 2 else small.mean(axis=2).astype(np.uint8)
+    mean = channels.mean(small)
     shade = light.shade
     shade &= ~_opened(every & shade & (block == 0), _WIDEST_SHADE * samples)
     maps = light.lighter, shade, _away(every, step), mean, loose
@@ -253,7 +254,7 @@ def _slope(small: Bytes) -> NDArray[np.int16]:
     """Size of the gradient in eighths of a grey level a sample, the largest of all channels, shape (h, w)."""
     soft = cv2.GaussianBlur(small, (5, 5), 0)
     size = np.abs(cv2.Sobel(soft, cv2.CV_16S, 1, 0)) + np.abs(cv2.Sobel(soft, cv2.CV_16S, 0, 1))
-    return np.asarray(size.max(axis=2) if size.ndim == 3 else size, np.int16)
+    return np.asarray(channels.largest(size), np.int16)
 
 
 def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
@@ -286,7 +287,7 @@ def _borders(small: Bytes, slope: NDArray[np.int16], block: tuple[Bytes, Bytes],
     # Glare and half shadows have borders as steep, but wide ones.
     beside = slope * (material == 0)
     wide = cv2.morphologyEx(beside, cv2.MORPH_OPEN, np.ones((_SOFT, _SOFT), np.uint8))
-    light = small if small.ndim == 2 else small.max(axis=2)
+    light = channels.largest(small)
     table = light[::2, ::2][material[::2, ::2] == 0]
     lit = light > median(table) if len(table) else np.zeros(light.shape, np.bool_)
     # Dark things on a table have soft sides, too.

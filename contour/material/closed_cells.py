@@ -15,7 +15,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, median
 from contour.geometry.rings import Contour, Ring, signed_area
-from contour.image.opencv import fewer_vertices, pieces_and_areas
+from contour.image.opencv import fewer_vertices, pieces_and_areas, pieces_and_boxes, pieces_of
 from contour.image.pixel_sampling import sample_at
 from contour.image.side_by_side import side_by_side
 from contour.material.leaking_cells import leaking_cells
@@ -41,6 +41,8 @@ _LEAST_CELL = 0.5
 _LARGEST_CELL, _LARGE_CELLS, _LEAST_OPENING, _LEAST_OPEN, _LEAST_BAY = 1.2, 0.9, 0.2, 0.1, 0.1
 # An opening as large as this is a hole, however narrow; broken walls join fewer cells.
 _HOLE = 5.0
+# So is one in which a disc of this radius fits; whatever pixels are, it fills so much of its radius squared at least.
+_HOLE_PITCHES, _DISC_FILLS = 1.1, 1.5
 _SIMPLE_PX = 0.25
 # How near to a cut the outline runs along it: what is drawn is off by as much as pixels are, and walls end round.
 _ON_CUT_PX, _PARTED_PX = 2.0, 2
@@ -95,7 +97,7 @@ def material_edge(picture: Bytes, pitch_px: float, walls: Bytes) -> MaterialEdge
     difference, noise = difference_from_table(picture)
     level = _levels(difference, noise, pitch_px)
     apart = _without_soft_shadow(difference, level)
-    faint = (walls > 0) & (difference > np.maximum(level // 2, OUTLIER * noise))
+    faint = (walls > 0) & (difference > np.maximum(level // 2, np.uint8(min(255.0, OUTLIER * noise))))
     wall_px = wall_width(walls)
     surely, perhaps = side_by_side(
         lambda: _region(apart, pitch_px, wall_px), lambda: _region(apart | faint, pitch_px, wall_px)
@@ -214,18 +216,18 @@ def _without_soft_shadow(difference: Bytes, level: Bytes) -> Bools:
     """What differs from the table by more than the level, but for what the table passes into softly: its shadow."""
     apart = difference > level
     disc = np.ones((3, 3), np.uint8)
-    rough = cv2.morphologyEx(difference, cv2.MORPH_GRADIENT, disc) > np.maximum(_SOFT * level, 1.0)
-    _, labels = cv2.connectedComponents((~rough).astype(np.uint8), connectivity=4)
-    of_table = np.zeros(int(labels.max()) + 1, np.bool_)
-    of_table[labels[~apart & ~rough]] = True
+    soft = cv2.LUT(level, np.maximum(_SOFT * np.arange(256), 1.0).astype(np.uint8))
+    rough = cv2.morphologyEx(difference, cv2.MORPH_GRADIENT, disc) > soft
+    count, labels = pieces_of(~rough, 4)
+    of_table = np.bincount(labels.ravel().take(np.flatnonzero(~apart & ~rough)), minlength=count) > 0
     of_table[0] = False
-    return np.asarray(apart & ~of_table[labels])
+    return np.asarray(apart & ~of_table.take(labels))
 
 
 def _region(apart: Bools, pitch_px: float, wall_px: float) -> Bytes:
     """The largest piece with its cells filled; inner openings in which a disc of 1.1 pitches' radius fits stay open."""
     material = _closed(apart.astype(np.uint8), _GAP_PITCHES * pitch_px)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(material, connectivity=8)
+    labels, stats = pieces_and_boxes(material, 8)
     area = (stats[:, cv2.CC_STAT_WIDTH] * stats[:, cv2.CC_STAT_HEIGHT]).astype(np.float64)
     area[0] = 0
     if area.max() < _LEAST_SHARE * apart.size:
@@ -244,14 +246,16 @@ def _filled(piece: Bytes, pitch_px: float) -> Bytes:
     """A piece with its cells filled, but for openings in which a disc of 1.1 pitches' radius fits, or as large as
     five cells.
     """
-    padded = cv2.copyMakeBorder(piece, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
-    _, inner, stats, _ = cv2.connectedComponentsWithStats(1 - padded, connectivity=4)
-    room = cv2.distanceTransform(1 - padded, cv2.DIST_L2, 5)
-    open_ = stats[:, cv2.CC_STAT_AREA] > _HOLE * pitch_px * pitch_px
-    open_[inner[room > 1.1 * pitch_px]] = True
+    free = 1 - np.asarray(cv2.copyMakeBorder(piece, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0), np.uint8)
+    inner, area = pieces_and_areas(free, 4)
+    open_ = area > _HOLE * pitch_px * pitch_px
     open_[inner[0, 0]] = True
+    # Most of such discs fit into nothing smaller than what is large enough.
+    if (~open_ & (area > _DISC_FILLS * (_HOLE_PITCHES * pitch_px) ** 2))[1:].any():
+        room = cv2.distanceTransform(free, cv2.DIST_L2, 5)
+        open_[inner[room > _HOLE_PITCHES * pitch_px]] = True
     open_[0] = False
-    return np.asarray(1 - open_.astype(np.uint8)[inner][1:-1, 1:-1], np.uint8)
+    return np.asarray(1 - open_.view(np.uint8).take(inner)[1:-1, 1:-1], np.uint8)
 
 
 def _closed(material: Bytes, gap: float) -> Bytes:

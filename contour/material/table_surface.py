@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s, median, medians
+from contour.image.channels import largest
 
 OUTLIER = 4.0
 """Spreads of the table's light beyond which something is not the table."""
@@ -13,6 +14,8 @@ OUTLIER = 4.0
 _BORDER_SHARE = 0.015
 _ROUNDS = 6
 _GRID_PX = 4
+# So many samples tell six unknowns; the picture's border holds some hundred of them then.
+_SAMPLES = 10_000
 
 
 def difference_from_table(picture: Bytes) -> tuple[Bytes, float]:
@@ -29,9 +32,8 @@ def difference_from_table(picture: Bytes) -> tuple[Bytes, float]:
     surface, spread = _surface(small, texture)
     table = np.clip(np.rint(surface), 0, 255).astype(np.uint8)
     full = cv2.resize(table, (width, height), interpolation=cv2.INTER_LINEAR).reshape(channels.shape)
-    apart = cv2.absdiff(channels, full).reshape(height, width, -1)
-    largest = apart.max(axis=2) if apart.shape[2] > 1 else apart[:, :, 0]
-    return np.asarray(cv2.GaussianBlur(largest, (3, 3), 0), np.uint8), spread
+    apart = largest(np.asarray(cv2.absdiff(channels, full), np.uint8).reshape(height, width, -1))
+    return np.asarray(cv2.GaussianBlur(apart, (3, 3), 0), np.uint8), spread
 
 
 def _surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
@@ -41,12 +43,14 @@ def _surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
     First through the picture's border, then through all that lies near it and is as smooth as most of the border, so
     that vignetting is followed inwards while a board whose mean colour is the table's stays out.
     """
-    height, width, _ = small.shape
-    y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
-    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2).reshape(-1, 6)
-    values = small.reshape(len(terms), -1)
-    rim = np.maximum(np.abs(x), np.abs(y)).ravel() > 1 - 2 * _BORDER_SHARE
-    smooth = texture.ravel() <= 2 * max(1.0, median(texture.ravel()[rim]))
+    height, width, channels = small.shape
+    y, x = np.linspace(-1.0, 1.0, height), np.linspace(-1.0, 1.0, width)
+    hop = max(1, round(np.sqrt(height * width / _SAMPLES)))
+    terms = _terms(x[::hop], y[::hop]).reshape(-1, 6)
+    values = small[::hop, ::hop].reshape(len(terms), -1)
+    rim = np.maximum(np.abs(terms[:, 1]), np.abs(terms[:, 2])) > 1 - 2 * _BORDER_SHARE
+    roughness = texture[::hop, ::hop].ravel()
+    smooth = roughness <= 2 * max(1.0, median(roughness[rim]))
     rim &= smooth
     used = rim
     fitted = np.broadcast_to(medians(values[rim], axis=0), values.shape)
@@ -57,8 +61,15 @@ def _surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
         # Weights that fall with the distance: a block that touches the border must not bend the table.
         weighted = terms.T * (used / (1 + (off / spread) ** 4))
         # Normal equations: terms between -1 and 1 are far from alike, and a hundred thousand rows for six unknowns.
-        fitted = terms @ np.linalg.solve(weighted @ terms, weighted @ values)
+        found = np.linalg.solve(weighted @ terms, weighted @ values)
+        fitted = terms @ found
         off = np.abs(values - fitted).max(axis=1)
         near = smooth & (off < OUTLIER * spread)
         used = near if np.count_nonzero(near) > 0.3 * np.count_nonzero(rim) else rim
-    return fitted.reshape(small.shape), spread
+    return (_terms(x, y) @ found).reshape(height, width, channels), spread
+
+
+def _terms(x: Float64s, y: Float64s) -> Float64s:
+    """What a surface of second order is made of at each place of a grid, (h, w, 6)."""
+    across, down = np.meshgrid(x, y)
+    return np.stack([np.ones_like(across), across, down, across**2, across * down, down**2], axis=2)

@@ -66,6 +66,8 @@ class _Beside:
 
 def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     """The deepest bump or dent of a ring in pixels, None without one."""
+    if _convex(ring):
+        return None
     lengths = RingLengths.of(ring)
     count = max(16, int(lengths.length / (_SPACING * pitch_px)))
     places = lengths.at(np.linspace(0.0, lengths.length, count, endpoint=False, dtype=np.float64))
@@ -135,6 +137,14 @@ def _areas(path: Float64s) -> Float64s:
     """Areas between paths (N, M, 2) and their feet, signed, shape (N,)."""
     following = path[:, 1:] - path[:, :-1]
     return np.asarray(0.5 * (path[:, :-1, 0] * following[:, :, 1] - path[:, :-1, 1] * following[:, :, 0]).sum(axis=1))
+
+
+def _convex(ring: Ring) -> bool:
+    """Whether a simple ring turns one way alone: then nothing stands out of it, or goes in, between edges in line."""
+    before = ring - rolled(ring, 1)
+    after = rolled(before, -1)
+    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    return bool((turn >= 0.0).all() or (turn <= 0.0).all())
 
 
 def _unit(vectors: Float64s) -> Float64s:

@@ -223,11 +223,14 @@ def _excess(reach: Float64s, pitch_px: float, gap: Float64s) -> Float64s:
 def _cheapest_cycle(step: Float64s, first: Float64s) -> Indices:
     """Cheapest closed path: step[i] holds prices from i to i + 1 (cyclic), with the price of being there.
 
-    An open pass finds the path's longest run; a second pass starts and ends in the middle of it, in its state.
+    An open pass finds the path's longest run; where it does not close, a second pass starts and ends in the middle of
+    that, in its state.
     """
     count = len(step)
     start = int((first < _FAR).sum(axis=1).argmin())
     path = _cheapest_path(rolled(step, -start), first[start], None)
+    if step[start - 1, path[-1], path[0]] == first[start, path[0]]:
+        return rolled(path, start)  # it ends in the model that it began with: no closed path is cheaper
     change = np.flatnonzero(np.diff(path, prepend=-1, append=-1))
     longest = int(np.diff(change).argmax())
     anchor = int(change[longest] + change[longest + 1]) // 2

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float64s, median, medians
+from contour.geometry.arrays import Bytes, Float64s, median, medians, quantile
 from contour.geometry.rings import Ring
-from contour.image.opencv import closed_by_disc
+from contour.image.opencv import closed_by_disc, median_where, pieces_and_middles
 from contour.material.closed_cells import MaterialEdge, closed_along
 from contour.tracing.cut_lines import straight_cuts, touched_cuts
 from contour.tracing.trace import Edge
@@ -101,7 +101,7 @@ def _holes(material: MaterialEdge) -> _Holes | None:
     """The holes in a sheet; None where there are too few."""
     apart = material.apart
     holes = apart.openings
-    _, labels, stats, middles = cv2.connectedComponentsWithStats(holes, connectivity=4)
+    labels, stats, middles = pieces_and_middles(holes, 4)
     area = stats[1:, cv2.CC_STAT_AREA].astype(np.float64)
     # Specks are many, but little of all that is free.
     ascending = np.sort(area)
@@ -117,10 +117,10 @@ def _holes(material: MaterialEdge) -> _Holes | None:
         one = labels[top : top + high, left : left + wide] == number
         outline, _ = cv2.findContours(one.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         _, radius = cv2.minEnclosingCircle(outline[0])
-        shade = np.quantile(apart.difference[top : top + high, left : left + wide][one], 0.3)
+        shade = quantile(apart.difference[top : top + high, left : left + wide][one], 0.3)
         # The circle runs through the centres of the outermost pixels.
         figures.append((size / (np.pi * (radius + 0.5) ** 2), shade))
-    sheet = median(2.0 * apart.level[(apart.region > 0) & (holes == 0)].astype(np.float64))
+    sheet = 2.0 * median_where(apart.level, (apart.region > 0) & (holes == 0))
     away = np.hypot(*(middles[sampled, None] - middles[large]).T)
     pitch_px = median(np.sort(away, axis=0)[1])
     circled, shade = medians(np.array(figures), axis=0).tolist()

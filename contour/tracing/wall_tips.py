@@ -70,7 +70,7 @@ def wall_tips(
     solid = _Solid(picture, light, polarity, on_stage)
     if settings.edge == "cells":
         return solid.closed()
-    walls = replace(see_walls(picture, light, polarity), relief=relief)
+    walls = replace(see_walls(picture, light, polarity, solid.cells), relief=relief)
     foam = None if walls.cells.comb.cellular else solid.foam()
     return foam or _of_comb(solid, walls, settings.edge, rectifier)
 

@@ -50,12 +50,12 @@ class SeenWalls:
     relief: Relief | None = None
 
 
-def see_walls(picture: Bytes, light: Bytes, polarity: str) -> SeenWalls:
+def see_walls(picture: Bytes, light: Bytes, polarity: str, cells: CellScale | None = None) -> SeenWalls:
     """The walls in a picture, grey (H, W) or BGR (H, W, 3), uint8, of which `light` is the `wall_light`.
 
-    Raises NoBlockFound.
+    `cells`: what `probe` tells of that light, where it was asked. Raises NoBlockFound.
     """
-    cells = probe(light, polarity)
+    cells = cells or probe(light, polarity)
     if picture.ndim == 3:
         hop = 2 if cells.pitch_px > _SUBSAMPLED_PITCH else 1
         sample = np.ascontiguousarray(light[::hop, ::hop])

@@ -10,8 +10,9 @@ import pytest
 import shapely
 from numpy.typing import NDArray
 
+from contour.edge import mirrored_block
 from contour.edge.mirrored_block import is_mirrored
-from contour.edge.reflection import axis_beside, reflection
+from contour.edge.reflection import Reflection, axis_beside, reflection
 from contour.errors import NoBlockFound
 from contour.geometry.agreement import distances_to
 from contour.geometry.rings import Contour, oriented
@@ -125,3 +126,13 @@ def test_a_thing_over_its_edge_hides_that_there_as_well(thing: str) -> None:
         return
     assert traced.evidence is not None
     assert {stretch.state for stretch in traced.evidence} != {"seen"}
+
+
+def test_where_no_axis_lies_near_the_coarse_outline_no_line_is_laid(monkeypatch: pytest.MonkeyPatch) -> None:
+    rendered = mirrored(STRONG)
+    walls = see_walls(rendered.picture, light(rendered), "auto")
+    assert list(mirrored_block.mirrored_block(rendered.picture, walls, None, None))
+    nowhere = Reflection((rendered.truth_px.exterior,), (np.zeros(len(rendered.truth_px.exterior), np.bool_),))
+    monkeypatch.setattr(mirrored_block, "axis_beside", lambda *_seen: nowhere)
+    monkeypatch.setattr(mirrored_block, "visible_rings", lambda *_seen: pytest.fail("a line was laid"))
+    assert not list(mirrored_block.mirrored_block(rendered.picture, walls, None, None))

@@ -48,3 +48,14 @@ def test_what_touches_a_line_in_one_place_alone_is_no_cut() -> None:
     material = material_edge(picture, PITCH, wall_mask(picture, PITCH, bright=True).mask)
     touched = closed_along(material, np.full((1, 2, 2), [CUT_X, TOP + 3.0]), PITCH)
     assert area(touched.contour) == area(material.contour)
+
+
+@pytest.mark.parametrize(("wide", "high", "is_hole"), [(96, 96, True), (320, 22, False), (320, 26, True)])
+def test_an_opening_is_a_hole_where_a_disc_fits_in_or_five_cells_do(wide: int, high: int, is_hole: bool) -> None:
+    picture = np.full((400, 600), TABLE, np.uint8)
+    cv2.rectangle(picture, (100, 100), (500, 300), WALL, -1)
+    cv2.ellipse(picture, (300, 200), (wide // 2, high // 2), 0, 0, 360, TABLE, -1) if wide == high else cv2.rectangle(
+        picture, (300 - wide // 2, 200 - high // 2), (299 + wide // 2, 199 + high // 2), TABLE, -1
+    )
+    material = material_edge(picture, PITCH, np.zeros_like(picture))
+    assert len(material.contour.holes) == is_hole

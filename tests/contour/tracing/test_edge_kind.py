@@ -13,8 +13,11 @@ from contour.errors import EdgeContradicted, NoBlockFound
 from contour.geometry.agreement import agreement
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour
+from contour.tracing import wall_tips as tracing_wall_tips
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
+from contour.walls import see_block
+from contour.walls.cell_scale import CellScale, probe
 from tests.support.scenes.lattices import Border, Cells, Lattice, lattice
 
 # Drawn for these tests, and looked at by no rule.
@@ -208,3 +211,16 @@ def test_borders_that_were_once_mistaken_are_told_and_traced(
     found = traced(one)
     assert found.edge == kind
     assert agreement(found.contour, one.outline).hausdorff_px < 0.25 * one.pitch_px
+
+
+def test_the_scale_of_a_grey_picture_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+
+    def counted(light: Bytes, polarity: str) -> CellScale:
+        read.append(polarity)
+        return probe(light, polarity)
+
+    for module in (tracing_wall_tips, see_block):
+        monkeypatch.setattr(module, "probe", counted)
+    assert wall_tips(drawn("hexagonal", "closed").picture, TraceSettings()).edge == "cells"
+    assert read == ["auto"]

@@ -67,8 +67,8 @@ def _leaking(material: Bytes, pitch_px: float, wall_px: float) -> Bytes:
 
 
 def _wall_ends(material: Bytes, pitch_px: float, wall_px: float) -> Indices:
-    """Pixels (x, y) in which walls end along the longest border of material, (N, 2): corners of whole cells beside a bay
-    are no ends.
+    """Pixels (x, y) in which walls end along the longest border of material, (N, 2); corners of whole cells beside a
+    bay are no ends.
     """
     rings, _ = cv2.findContours(material, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     longest = max(rings, key=len)

@@ -11,8 +11,8 @@ import numpy as np
 from contour.errors import EdgeContradicted
 from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.ring_lengths import RingLengths
-from contour.geometry.rings import Ring
-from contour.geometry.segments import BoxTree, distances_to_tree
+from contour.geometry.rings import Contour, Ring, densified
+from contour.geometry.segments import BoxTree, distances_to_ring, distances_to_tree
 from contour.geometry.signed_distance import nearest
 from contour.material.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
@@ -33,7 +33,12 @@ _SAME_PITCHES = 0.4
 # Of triangles only thin ones are ends: of 28 closed lattices none has such an end, of 28 cut along one line 26. So are
 # those of other fine cells, whose pixels make ends of corners.
 _THIN_RADII = 1.15
-_FINE_PITCH_PX, _THIN_FINE_RADII = 12.0, 0.7
+_THIN_FINE_RADII = 0.7
+FINE_PITCH_PX = 12.0
+"""Cells below this are fine: their corners may pass for ends of walls."""
+# Corners of fine closed cells pass for ends all around: their teeth lie 0.15 pitches inside of lines through these and
+# more, in the mean. Material whose cells' floors differ from the table runs along a cut, 0.1 pitches off at most.
+_ALONG_PITCHES = 0.12
 # Of a triangle over the pitch of a hexagon as large.
 _TRIANGLE_SIDE = math.sqrt(2.0)
 
@@ -67,7 +72,7 @@ def edge_kind(material: MaterialEdge, seen: BlockEvidence, cuts: Sequence[Float6
 def sure_ends(material: MaterialEdge, ring: RingEvidence, seen: BlockEvidence) -> Bools:
     """Which witnesses of a ring are ends of walls at the edge of material, too, shape (N,)."""
     tips = np.concatenate([ring_tips(one, seen.pitch_px, seen.wall_px) for one in material.border])
-    if _triangular(seen) or seen.pitch_px < _FINE_PITCH_PX:
+    if _triangular(seen) or seen.pitch_px < FINE_PITCH_PX:
         radii = _THIN_RADII if _triangular(seen) else _THIN_FINE_RADII
         tips = tips[thin(material.apart.region, tips, seen.wall_px, radii)]
     if not len(tips):
@@ -105,6 +110,22 @@ def check_promise(promise: str, kind: Edge, *, traced: bool) -> None:
             "the recipe says edge: cut, but no walls end along the border: it closes its cells. Use edge: auto or "
             "edge: cells",
             kind,
+        )
+
+
+def check_fine(material: MaterialEdge, seen: BlockEvidence, outline: Contour) -> None:
+    """Raise EdgeContradicted where the edge of material around fine cells neither has ends on several sides nor runs
+    along the `outline` through those that were seen, pixels.
+    """
+    if edge_kind(material, seen) == "cut":
+        return
+    off = distances_to_ring(densified(outline.exterior, 1.0), material.contour.exterior)
+    if off.mean() > _ALONG_PITCHES * seen.pitch_px:
+        raise EdgeContradicted(
+            "walls seem to end all along the border, but the edge of the material shows few ends: cells of "
+            f"{seen.pitch_px:.0f} px are too small to tell a cut border from a closed one here. Give edge: cut or "
+            "edge: cells, or more pixels a cell",
+            "cut",
         )
 
 

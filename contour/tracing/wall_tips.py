@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,7 +24,15 @@ from contour.relief.relief import Relief
 from contour.seams.seam import parted_by_seam
 from contour.seams.splice import spliced
 from contour.tracing.cut_lines import touched_cuts, with_cuts
-from contour.tracing.edge_kind import check_closed, check_promise, edge_kind, may_be_closed, tooth_px
+from contour.tracing.edge_kind import (
+    FINE_PITCH_PX,
+    check_closed,
+    check_fine,
+    check_promise,
+    edge_kind,
+    may_be_closed,
+    tooth_px,
+)
 from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_lines
 from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
@@ -100,6 +109,8 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
             # What seemed to hide it does not.
             check_promise(promise, kind, traced=closed is not None)
             found = closed or found
+        if promise == "auto" and plate is None and kind is None:
+            solid.check_fine(seen, found.contour)
         return replace(found, parted=parted_by_seam(walls, seen))
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
@@ -305,6 +316,12 @@ class _Solid:
             return replace(foam, edge="cells")
         check_closed(self.edge.contour.exterior, self.cells.pitch_px, self.cells.wall_px)
         return self.around(self.edge)
+
+    def check_fine(self, seen: BlockEvidence, outline: Contour) -> None:
+        """Raise EdgeContradicted where cells are too fine to tell a cut border from a closed one."""
+        if seen.pitch_px < FINE_PITCH_PX:
+            with suppress(NoBlockFound):
+                check_fine(self.edge, seen, outline)
 
     def foam(self) -> Trace | None:
         """The outline of a slab of foam, cut as it mostly is; None where it is none."""

@@ -146,6 +146,18 @@ def test_a_missing_cell_in_an_inner_corner_is_no_cell_that_a_broken_wall_opens()
     assert agreement(traced(one).contour, one.outline).hausdorff_px < 0.3 * one.pitch_px
 
 
+@pytest.mark.parametrize(
+    ("seed", "cells", "pitch_px"),
+    [(1212002, "square", 6.05), (1212000, "hexagonal", 7.38)],
+    ids=["square", "hexagonal"],
+)
+def test_corners_of_fine_closed_cells_are_no_ends_of_walls(seed: int, cells: Cells, pitch_px: float) -> None:
+    """A cut border as fine is traced also where the material runs along it and has no ends."""
+    with pytest.raises(EdgeContradicted, match="too small to tell"):
+        wall_tips(smaller(lattice(seed, cells, "mixed"), pitch_px), TraceSettings())
+    assert wall_tips(smaller(lattice(1211009, "square", "cut"), 8.0), TraceSettings()).edge == "cut"
+
+
 def test_fine_teeth_that_blur_rounds_are_no_cut() -> None:
     assert traced(lattice(1205017, "triangular", "closed")).edge == "cells"
 

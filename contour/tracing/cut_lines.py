@@ -97,10 +97,11 @@ def touched_cuts(
 
 def _opened(openings: Float64s, pitch_px: float, tooth_px: float, *, alike: bool) -> bool:
     """Whether `openings` so deep, (N, 3), pixels, were cut into cells: they differ or grow, and two are deep, or may be
-    `alike`, or none is as deep as those between teeth.
+    `alike`, or one at most is as deep as those between teeth.
     """
     depths = np.sort(openings[:, 1])
-    if len(depths) >= _FEWEST_SHALLOW and depths[-1] < _SHALLOW * (tooth_px - _BLUNT_PX):
+    shallow = np.count_nonzero(depths < _SHALLOW * (tooth_px - _BLUNT_PX))
+    if shallow >= _FEWEST_SHALLOW and shallow >= len(depths) - 1:
         return True
     if alike:
         return len(depths) >= _FEWEST_ALIKE

@@ -122,8 +122,16 @@ def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
         (1051322, "over-expanded"),
         (1092020, "square"),
         (1206035, "triangular"),
+        (1214002, "triangular"),
     ],
-    ids=["no end", "no end of triangles", "an end beyond the second", "openings that grow", "nothing hides the border"],
+    ids=[
+        "no end",
+        "no end of triangles",
+        "an end beyond the second",
+        "openings that grow",
+        "nothing hides the border",
+        "one opening as deep as teeth",
+    ],
 )
 def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed: int, cells: Cells) -> None:
     one = lattice(seed, cells, "mixed")

@@ -7,6 +7,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Float64s, Indices, median
 from contour.geometry.rectifier import Rectifier
+from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside, nearest
 from contour.relief.relief import Relief
@@ -17,9 +18,9 @@ _FAR_OFF_PITCHES = 0.5
 # A clean end outside is a chip, or a streak that a wall's side makes, only where the outline meets the ends beside it.
 _FAR_OUTSIDE_PITCHES, _CLEAN_OUTSIDE_PITCHES = 1.0 / 3.0, 1.0 / 6.0
 _IN_A_ROW, _IN_A_ROW_OUTSIDE = 4, 2
-# Where two ends on a line lie so far apart, the coarse edge lies 0.32 pitches inside between them at most (217 gaps),
-# more where cells are missing. A line is known by ends on both sides of these: a single wall may end on any.
-_GAP_PITCHES, _DEEP_PITCHES, _ONE_END_PITCHES, _ON_LINE_PITCHES = 2.0, 0.6, 0.5, 0.15
+# Of 290 right outlines none lies so far from all that it was laid through where the coarse edge is so deep inside (0.57
+# pitches at most), but at corners of which cells are missing.
+_DEEP_PITCHES, _FAR_PITCHES, _CORNER = 0.6, 1.0, np.radians(35.0)
 # What stands out of a known table as walls do, and as far along, is one: of 288 outlines one leaves such outside, off
 # by 0.58 of a cell. Beside right ones lie streaks, 0.7 as high as walls at most, and specks, 0.4 pitches long.
 _OUTSIDE_PITCHES, _FAR_OUT_PITCHES, _LONG_PITCHES, _LIKE_WALLS = 0.2, 0.3, 0.5, 0.75
@@ -64,57 +65,44 @@ def check_against_evidence(
             )
 
 
-def check_lines(
+def check_unseen(
     evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
 ) -> None:
-    """Raise NoBlockFound where a line of the ring leads over the table to a single wall; for edges all of which are
-    seen.
+    """Raise NoBlockFound where the ring leads over the table: far from all that it was laid through, and from its
+    corners, with the coarse edge deep inside.
+
+    For rings of which nothing is hidden.
     """
-    over = _over_the_table(evidence, ring, inlier, pitch_px, rectifier)
-    if over is not None:
+    ring, points, coarse = (
+        one if rectifier is None else rectifier.rectify(one) for one in (ring, evidence.points[inlier], evidence.coarse)
+    )
+    inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, coarse)
+    deep = np.flatnonzero(inside > _DEEP_PITCHES * pitch_px)
+    if not len(deep):
+        return
+    lengths = RingLengths.of(ring)
+    feet = lengths.feet(coarse[deep])
+    known = np.concatenate([lengths.feet(points), lengths.starts[_corners(lengths, pitch_px)]])
+    away = np.abs(feet[:, None] - known)
+    away = np.minimum(away, lengths.length - away).min(axis=1, initial=lengths.length)
+    over = deep[away > _FAR_PITCHES * pitch_px]
+    if len(over):
+        x, y = evidence.coarse[over[inside[over].argmax()]]
         raise NoBlockFound(
-            f"no block found: the outline that fits most wall ends leads over the table near ({over[0]:.0f}, "
-            f"{over[1]:.0f}) px to a single one. Check that nothing lies against the block, and that its edge is in "
-            "focus"
+            f"no block found: the outline that fits most wall ends leads over the table near ({x:.0f}, {y:.0f}) px, "
+            "far from any of them. Check that nothing lies against the block, and that its edge is in focus"
         )
 
 
-def _over_the_table(
-    evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
-) -> Float64s | None:
-    """The place, (2,), of the coarse edge where it lies farthest inside a line of the ring that a single wall
-    witnesses, or one on that side of it; None where it lies so far inside of none.
-    """
-    inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, evidence.coarse, rectifier)
-    if inside.max() < _DEEP_PITCHES * pitch_px:
-        return None
-    corners, ends, coarse = (
-        points if rectifier is None else rectifier.rectify(points)
-        for points in (ring, evidence.points[inlier], evidence.coarse)
+def _corners(lengths: RingLengths, pitch_px: float) -> Bools:
+    """At which vertices a ring turns a corner, shape (M,): cells are lost there."""
+    before, after = (
+        lengths.at(lengths.starts + ahead * pitch_px) - lengths.at(lengths.starts + (ahead - 0.5) * pitch_px)
+        for ahead in (0.0, 0.5)
     )
-    worst, farthest = None, _DEEP_PITCHES * pitch_px
-    for start, stop in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        long = float(np.hypot(*(stop - start)))
-        if long < _GAP_PITCHES * pitch_px:
-            continue
-        along = (stop - start) / long
-        across = np.array([-along[1], along[0]])
-        at, off = (ends - start) @ along, (ends - start) @ across
-        reach = _ON_LINE_PITCHES * pitch_px
-        at = np.sort(at[(np.abs(off) < reach) & (at > -reach) & (at < long + reach)])
-        one_wall = _ONE_END_PITCHES * pitch_px
-        if not len(at) or np.ptp(at) < one_wall:
-            at = np.array([0.0, long])
-        for k in np.flatnonzero(np.diff(at) > _GAP_PITCHES * pitch_px):
-            if min(at[k] - at[0], at[-1] - at[k + 1]) > one_wall:
-                continue
-            place, away = (coarse - start) @ along, (coarse - start) @ across
-            # Not of the edge across the block.
-            between = (place > at[k]) & (place < at[k + 1]) & (np.abs(away) < inside + reach)
-            depth = np.where(between, inside, 0.0)
-            if depth.max() > farthest:
-                worst, farthest = evidence.coarse[depth.argmax()], float(depth.max())
-    return worst
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    turn = np.arctan2(cross, (before * after).sum(axis=1))
+    return np.asarray(np.abs(turn) > _CORNER)
 
 
 def check_against_relief(

@@ -33,7 +33,7 @@ from contour.tracing.edge_kind import (
     may_be_closed,
     tooth_px,
 )
-from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_lines
+from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_unseen
 from contour.tracing.plates import like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
@@ -219,7 +219,7 @@ def _cut(
     )
     if all(stretch.state == "seen" for stretch in evidence):
         for one in visible:
-            check_lines(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
+            check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
     untold = next(((float(x), float(y)) for one in rings for x, y in one.untold), None)
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
     return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contour.errors import NoBlockFound
 from contour.geometry.rings import densified
 from contour.relief.relief import Displacement, Relief
-from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_lines
+from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_unseen
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, rectangle, witnesses
 
@@ -113,26 +113,25 @@ def test_an_outline_that_cuts_off_the_end_of_an_edge_that_it_was_laid_through_is
         check_against_evidence(replace(evidence, points=moved), BLOCK, off | ~off, PITCH, None)
 
 
-@pytest.mark.parametrize(("beyond", "refused"), [(1, True), (3, False)], ids=["one end", "missing cells"])
-def test_a_line_that_leads_over_the_table_to_a_single_end_is_refused(beyond: int, refused: bool) -> None:
-    """A bay a cell deep in the first edge, up to its last ends."""
+@pytest.mark.parametrize(("wide", "deep", "refused"), [(4.0, 1.0, True), (1.2, 1.0, False), (4.0, 0.5, False)])
+def test_an_outline_far_over_the_table_and_far_from_all_it_was_laid_through_is_refused(
+    wide: float, deep: float, refused: bool
+) -> None:
+    """Across a bay of so many pitches in the first edge; a cell or two that are lost leave no more than that."""
     first, along = BLOCK[0], (BLOCK[1] - BLOCK[0]) / np.hypot(*(BLOCK[1] - BLOCK[0]))
     inwards = np.array([-along[1], along[0]])
+    begin, stop = 450.0 - 0.5 * wide * PITCH, 450.0 + 0.5 * wide * PITCH
+    bay = first + np.outer((begin, begin + 1, stop - 1, stop), along) + np.outer((0, 1, 1, 0), deep * PITCH * inwards)
     ends = witnesses(BLOCK, seed=2)
-    at = (ends.points - first) @ along
-    edge = np.flatnonzero(np.abs((ends.points - first) @ inwards) < 1.0)
-    begin, stop = at[edge[4]] + 1.0, at[edge[-beyond]] - 1.0
-    bay = first + np.outer((begin, begin + PITCH, stop - PITCH, stop), along) + np.outer((0, PITCH, PITCH, 0), inwards)
+    at, off = (ends.points - first) @ along, np.abs((ends.points - first) @ inwards)
     coarse = densified(np.concatenate([BLOCK[:1], bay, BLOCK[1:]]), 5.0)
-    seen = replace(
-        ends.take((at < begin) | (at > stop) | (np.abs((ends.points - first) @ inwards) > 5.0)), coarse=coarse
-    )
+    seen = replace(ends.take((at < begin) | (at > stop) | (off > 5.0)), coarse=coarse)
     on_line = np.ones(len(seen.points), np.bool_)
     if refused:
         with pytest.raises(NoBlockFound, match="leads over the table near"):
-            check_lines(seen, BLOCK, on_line, PITCH, None)
+            check_unseen(seen, BLOCK, on_line, PITCH, None)
     else:
-        check_lines(seen, BLOCK, on_line, PITCH, None)
+        check_unseen(seen, BLOCK, on_line, PITCH, None)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ _FAR_OUTSIDE_PITCHES, _CLEAN_OUTSIDE_PITCHES = 1.0 / 3.0, 1.0 / 6.0
 _IN_A_ROW, _IN_A_ROW_OUTSIDE = 4, 2
 # Of 290 right outlines none lies so far from all that it was laid through where the coarse edge is so deep inside (0.57
 # pitches at most), but at corners of which cells are missing.
-_DEEP_PITCHES, _FAR_PITCHES, _CORNER = 0.6, 1.0, np.radians(35.0)
+_DEEP_PITCHES, _FAR_PITCHES, _NEAR_PITCHES, _CORNER = 0.6, 1.0, 0.25, np.radians(35.0)
 # What stands out of a known table as walls do, and as far along, is one: of 288 outlines one leaves such outside, off
 # by 0.58 of a cell. Beside right ones lie streaks, 0.7 as high as walls at most, and specks, 0.4 pitches long.
 _OUTSIDE_PITCHES, _FAR_OUT_PITCHES, _LONG_PITCHES, _LIKE_WALLS = 0.2, 0.3, 0.5, 0.75
@@ -68,13 +68,15 @@ def check_against_evidence(
 def check_unseen(
     evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
 ) -> None:
-    """Raise NoBlockFound where the ring leads over the table: far from all that it was laid through, and from its
-    corners, with the coarse edge deep inside.
+    """Raise NoBlockFound where the ring leads over the table: far from all that it was laid through, from other
+    material, and from its corners, with the coarse edge deep inside.
 
     For rings of which nothing is hidden.
     """
-    ring, points, coarse = (
-        one if rectifier is None else rectifier.rectify(one) for one in (ring, evidence.points[inlier], evidence.coarse)
+    material = np.concatenate([evidence.walls.points, evidence.beside])
+    ring, points, coarse, material = (
+        one if rectifier is None else rectifier.rectify(one)
+        for one in (ring, evidence.points[inlier], evidence.coarse, material)
     )
     inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, coarse)
     deep = np.flatnonzero(inside > _DEEP_PITCHES * pitch_px)
@@ -82,7 +84,8 @@ def check_unseen(
         return
     lengths = RingLengths.of(ring)
     feet = lengths.feet(coarse[deep])
-    known = np.concatenate([lengths.feet(points), lengths.starts[_corners(lengths, pitch_px)]])
+    near = material[np.abs(depth_inside(ring, material)) < _NEAR_PITCHES * pitch_px] if len(material) else material
+    known = np.concatenate([lengths.feet(np.concatenate([points, near])), lengths.starts[_corners(lengths, pitch_px)]])
     away = np.abs(feet[:, None] - known)
     away = np.minimum(away, lengths.length - away).min(axis=1, initial=lengths.length)
     over = deep[away > _FAR_PITCHES * pitch_px]

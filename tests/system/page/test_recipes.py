@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import http.client
 import json
-import os
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -98,16 +97,16 @@ def test_what_was_tried_against_another_recipe_than_the_one_in_force_is_not_adop
     RecipeList.model_validate(served.client.get("/api/v1/recipes").json)
 
 
-def children(process_id: int) -> list[int]:
-    """Processes of a process."""
-    found = []
+def children(process_id: int) -> dict[int, int]:
+    """Processes of a process, and how nice each is."""
+    found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
-            parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-        except (OSError, ValueError):
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        except OSError:
             continue
-        if parent == process_id:
-            found.append(int(folder.name))
+        if int(fields[1]) == process_id:
+            found[int(folder.name)] = int(fields[16])
     return found
 
 
@@ -119,13 +118,13 @@ def test_one_try_at_a_time_which_gives_way_to_jobs_and_can_be_ended(served: Reci
     early = served.order("1/adopt", "person7", {"trial": served.trial()["number"], "note": "too early"})
     assert "has not come to its end" in early.json["error"]
     mine = served.cell.service.process_id
-    until(lambda: any(os.getpriority(os.PRIO_PROCESS, one) == 10 for one in children(mine)), what="low priority")
+    until(lambda: 10 in children(mine).values(), what="low priority")
     ended = served.order("trial/stop", "person7", {})
     assert (ended.status, ended.json["trial"]["state"]) == (200, "stopped")
     assert len(ended.json["trial"]["jobs"]) < ended.json["trial"]["wanted"]
     none = served.order("trial/stop", "person7", {})
     assert (none.status, none.json["error"]) == (409, "no recipe is being tried: there is nothing to end")
-    until(lambda: not [one for one in children(mine) if os.getpriority(os.PRIO_PROCESS, one) == 10], what="its end")
+    until(lambda: 10 not in children(mine).values(), what="its end")
     begun: list[int] = []
     many = [
         threading.Thread(target=lambda w=who: begun.append(served.order("1/trial", w, ask).status))  # type: ignore[misc]
@@ -193,7 +192,7 @@ def test_a_try_ends_with_its_service_also_by_kill_minus_nine(tmp_path: Path) -> 
         served.jobs(1, WHO[0])
         assert served.order("1/trial", WHO[0], {"changes": {"margin_mm": 1}}).status == 202
         mine = served.cell.service.process_id
-        trying = until(lambda: [one for one in children(mine) if os.getpriority(os.PRIO_PROCESS, one) >= 10], what="it")
+        trying = until(lambda: [one for one, nice in children(mine).items() if nice >= 10], what="it")
         served.cell.service.kill()
         until(lambda: not any(Path(f"/proc/{one}").exists() for one in trying), what="its end")
     finally:

@@ -21,6 +21,7 @@ from contour.geometry.rings import Ring, oriented
 from contour.geometry.signed_distance import depth_inside
 from contour.image.pixel_grid import pixels_of, samples_of
 from contour.image.pixel_sampling import planes_of, sample_at
+from contour.walls.coarse_block import CLOSING_PITCHES
 from contour.walls.wall_evidence import EdgePoints, RingEvidence
 
 # How near to its border on the map the material's edge lies, and how far beyond the table may begin: in between is the
@@ -45,8 +46,6 @@ _STEP_PX = 0.5
 _LEAST_CONTRAST = 6.0
 # Pixels and pitches about a sharp step, and how much of it there is to be there.
 _NEAR_PX, _NEAR_PITCHES, _SHARP = 2.0, 0.08, 0.6
-# An open cell beside filled ones is bridged, as in the coarse block.
-_CLOSING_PITCHES = 0.72
 
 Refit = Callable[[list[EdgePoints]], Ring]
 
@@ -160,13 +159,8 @@ def _goes_on(lengths: RingLengths, points: Float64s, pitch_px: float) -> bool:
     """
     feet = lengths.feet(points[[0, -1]])
     reach = np.arange(-_FOOT_PITCHES, _FOOT_PITCHES + 0.1, 0.25) * pitch_px
-    for foot in feet.tolist():
-        path = lengths.at(foot + np.concatenate([reach - pitch_px, reach, reach + pitch_px]))
-        before, here, after = np.split(path, 3)
-        one, two = (part[:, 0] + 1j * part[:, 1] for part in (here - before, after - here))
-        if np.abs(np.angle(two / one)).max() > _SMOOTH:
-            return False
-    return True
+    places = (feet[:, None] + reach).ravel()
+    return bool(np.abs(lengths.turns(places, pitch_px)).max() <= _SMOOTH)
 
 
 def joined(parts: Sequence[EdgePoints]) -> EdgePoints:
@@ -192,7 +186,8 @@ def _with_things(clear: RingEvidence, distrusted: Float64s, look: TableLook) -> 
     touching[0] = False
     union = touching[parts].astype(np.uint8)
     cv2.fillPoly(union, [np.rint(samples_of(clear.coarse, look.step)).astype(np.int32)], 1)
-    size = 2 * round(_CLOSING_PITCHES * look.pitch_px / look.step) + 1
+    # An open cell beside filled ones is bridged.
+    size = 2 * round(CLOSING_PITCHES * look.pitch_px / look.step) + 1
     union = np.asarray(
         cv2.morphologyEx(union, cv2.MORPH_CLOSE, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))), np.uint8
     )

@@ -50,6 +50,14 @@ class RingLengths:
         along /= np.maximum(np.hypot(*along.T)[:, None], np.finfo(float).tiny)
         return np.column_stack([along[:, 1], -along[:, 0]])
 
+    def turns(self, lengths: Float64s, reach: float) -> Float64s:
+        """By how much the ring turns at lengths, from the chord over so much before each to that after it, shape (M,),
+        radians, positive from x to y.
+        """
+        before, here, after = (self.at(lengths + step) for step in (-reach, 0.0, reach))
+        one, two = (part[:, 0] + 1j * part[:, 1] for part in (here - before, after - here))
+        return np.asarray(np.angle(two * one.conjugate()))
+
     def path(self, start: float, end: float) -> Float64s:
         """The ring from one length to a later one, no farther on than its end: both places and the vertices between."""
         between = self.ring[(self.starts > start) & (self.starts < end)]

@@ -11,6 +11,7 @@ import numpy as np
 from contour.geometry.arrays import Float64s, Indices, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
+from contour.geometry.segments import turns
 from contour.narrow_features.feature import DEPTH, WIDTH, NarrowFeature
 
 # In cell pitches. A wider bump is a strip or a label where it fills so much of the rectangle over its foot: an arm's
@@ -141,10 +142,8 @@ def _areas(path: Float64s) -> Float64s:
 
 def _convex(ring: Ring) -> bool:
     """Whether a simple ring turns one way alone: then nothing stands out of it, or goes in, between edges in line."""
-    before = ring - rolled(ring, 1)
-    after = rolled(before, -1)
-    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return bool((turn >= 0.0).all() or (turn <= 0.0).all())
+    turn = turns(rolled(ring, 1), ring, rolled(ring, -1))
+    return bool((turn >= 0).all() or (turn <= 0).all())
 
 
 def _unit(vectors: Float64s) -> Float64s:

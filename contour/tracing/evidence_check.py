@@ -20,7 +20,8 @@ _FAR_OUTSIDE_PITCHES, _CLEAN_OUTSIDE_PITCHES = 1.0 / 3.0, 1.0 / 6.0
 _IN_A_ROW, _IN_A_ROW_OUTSIDE = 4, 2
 # Of 290 right outlines none lies so far from all that it was laid through where the coarse edge is so deep inside (0.57
 # pitches at most), but at corners of which cells are missing.
-_DEEP_PITCHES, _FAR_PITCHES, _NEAR_PITCHES, _CORNER = 0.6, 1.0, 0.25, np.radians(35.0)
+_DEEP_PITCHES, _FAR_PITCHES, _NEAR_PITCHES = 0.6, 1.0, 0.25
+_CORNER, _TURN_PITCHES = np.radians(35.0), 0.5
 # What stands out of a known table as walls do, and as far along, is one: of 288 outlines one leaves such outside, off
 # by 0.58 of a cell. Beside right ones lie streaks, 0.7 as high as walls at most, and specks, 0.4 pitches long.
 _OUTSIDE_PITCHES, _FAR_OUT_PITCHES, _LONG_PITCHES, _LIKE_WALLS = 0.2, 0.3, 0.5, 0.75
@@ -73,19 +74,21 @@ def check_unseen(
 
     For rings of which nothing is hidden.
     """
-    material = np.concatenate([evidence.walls.points, evidence.beside])
-    ring, points, coarse, material = (
-        one if rectifier is None else rectifier.rectify(one)
-        for one in (ring, evidence.points[inlier], evidence.coarse, material)
-    )
+
+    def flat(points: Float64s) -> Float64s:
+        return points if rectifier is None else rectifier.rectify(points)
+
+    ring, coarse = flat(ring), flat(evidence.coarse)
     inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, coarse)
     deep = np.flatnonzero(inside > _DEEP_PITCHES * pitch_px)
     if not len(deep):
         return
     lengths = RingLengths.of(ring)
     feet = lengths.feet(coarse[deep])
+    points, material = flat(evidence.points[inlier]), flat(np.concatenate([evidence.walls.points, evidence.beside]))
     near = material[np.abs(depth_inside(ring, material)) < _NEAR_PITCHES * pitch_px] if len(material) else material
-    known = np.concatenate([lengths.feet(np.concatenate([points, near])), lengths.starts[_corners(lengths, pitch_px)]])
+    corners = lengths.starts[np.abs(lengths.turns(lengths.starts, _TURN_PITCHES * pitch_px)) > _CORNER]
+    known = np.concatenate([lengths.feet(np.concatenate([points, near])), corners])
     away = np.abs(feet[:, None] - known)
     away = np.minimum(away, lengths.length - away).min(axis=1, initial=lengths.length)
     over = deep[away > _FAR_PITCHES * pitch_px]
@@ -95,17 +98,6 @@ def check_unseen(
             f"no block found: the outline that fits most wall ends leads over the table near ({x:.0f}, {y:.0f}) px, "
             "far from any of them. Check that nothing lies against the block, and that its edge is in focus"
         )
-
-
-def _corners(lengths: RingLengths, pitch_px: float) -> Bools:
-    """At which vertices a ring turns a corner, shape (M,): cells are lost there."""
-    before, after = (
-        lengths.at(lengths.starts + ahead * pitch_px) - lengths.at(lengths.starts + (ahead - 0.5) * pitch_px)
-        for ahead in (0.0, 0.5)
-    )
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    turn = np.arctan2(cross, (before * after).sum(axis=1))
-    return np.asarray(np.abs(turn) > _CORNER)
 
 
 def check_against_relief(

@@ -13,15 +13,13 @@ from contour.image.opencv import closed_by_disc, median_where, pieces_and_middle
 from contour.material.closed_cells import MaterialEdge, closed_along
 from contour.tracing.cut_lines import straight_cuts, touched_cuts
 from contour.tracing.trace import Edge
-from contour.walls.comb_likeness import Comb
+from contour.walls.comb_likeness import FINE_PITCH_PX, WIDER_PX, WIDEST_FINE, Comb
 
 # Webs of a sheet are wider than most walls; its holes are orderly.
 _LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID = 0.2, 0.4, 0.93
 # And round: of the circle around it a hole of a dozen pixels and more fills 0.88 at least, a hexagon 0.86 at most. Of
 # smaller ones that cannot be told; squares and drawn-out cells fill 0.72 at most, round ones 0.8 at least.
 _ROUND, _MAYBE_ROUND, _FINE_HOLE_PX = 0.87, 0.76, 12.0
-# Webs of fine cells are not told from walls, which look wider than they are, unless they are as wide as this.
-_FINE_PITCH_PX, _WIDER_PX, _LEAST_FINE_WEB = 15.0, 1.5, 0.35
 # Of what the sheet differs from the table by, what its holes do: they are in shadow. Ink differs from most tables.
 _LIKE_TABLE = 0.45
 # A disc of so many pitches' radius does not get into a hole that was cut open by less than most of it.
@@ -43,8 +41,9 @@ def like_plate(comb: Comb | None) -> bool:
     """Whether patches may be the holes of a perforated sheet; whether they show the table, its outline tells."""
     if comb is None:
         return False
-    least = _LEAST_WEB if comb.pitch_px > _FINE_PITCH_PX else _LEAST_FINE_WEB
-    return comb.wall_px - _WIDER_PX > least * comb.pitch_px and comb.order > _LEAST_ORDER and comb.solid > _LEAST_SOLID
+    # Webs of fine cells are not told from walls, which look wider than they are, unless no wall is as wide.
+    least = _LEAST_WEB if comb.pitch_px > FINE_PITCH_PX else WIDEST_FINE
+    return comb.wall_px - WIDER_PX > least * comb.pitch_px and comb.order > _LEAST_ORDER and comb.solid > _LEAST_SOLID
 
 
 def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | None, Edge] | None:

@@ -20,7 +20,8 @@ from contour.image.pixel_grid import averaged, coarse_step
 from contour.walls.coarse_rings import PAD, CoarseBlock, sides, walls_at_frame, with_rings
 
 # A disc of 0.72 pitch bridges an open cell (1.15 pitches across its corners) and a wall broken out of it.
-_CLOSING_PITCHES = 0.72
+CLOSING_PITCHES = 0.72
+"""Radius of the disc that bridges an open cell at the border."""
 # A gap in a ring of single cells around an opening, up to a cell wide, is a missing wall and no way out.
 _LINK_PITCHES = 1.0
 _FRAGMENT_PITCHES = 2.0
@@ -57,7 +58,7 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float, small: Bytes | None
     samples = pitch_px / step
     pieces = pieces_and_boxes(walls, 8)
     kept = _main_piece(pieces, samples)
-    filled, kept = _linked(pieces, kept, closed_by_disc(kept, _CLOSING_PITCHES * samples), samples)
+    filled, kept = _linked(pieces, kept, closed_by_disc(kept, CLOSING_PITCHES * samples), samples)
     filled = without_threads(_largest(filled | kept), samples)
     kept &= filled
     filled = _fill_missing_cells(filled, kept, (light, step), _HOLE_RADIUS_PITCHES * samples)

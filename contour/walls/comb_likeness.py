@@ -10,15 +10,15 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Float64s, Indices, Int32s, median
 
-# Walls of fine cells look wide, whatever is taken off for that; from this pitch on they look as wide as they are.
-_FINE_PITCH_PX = 15.0
 # Walls look wider by about this, and, where blur is wider than that, by it: its full width at half maximum over its
 # standard deviation.
-_WIDER_PX, _BLUR_WIDTH = 1.5, 2.355
+WIDER_PX, _BLUR_WIDTH = 1.5, 2.355
+FINE_PITCH_PX = 15.0
+"""Walls of finer cells look wide, whatever is taken off for that; from this pitch on they look as wide as they are."""
 # Of 183 scenes with cells of more than 15 px only foam has walls wider than 0.28 of their pitch, and of 60 that were
 # defocused or moved three have 0.31 to 0.32; of prints and boards the narrowest are 0.34.
 # Of finer ones, of 5 to 12 px, none has more than 0.3; sheets whose holes are a few pixels have 0.4 and more.
-_WIDEST_WALL, _WIDEST_FINE = 0.31, 0.35
+_WIDEST_WALL, WIDEST_FINE = 0.31, 0.35
 _REGULAR = 0.5
 _FEW_CELLS = 18
 _POOR_SCORE = 0.23
@@ -83,10 +83,10 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
     border was cut through cells, so that it may be foam.
     """
     sharp_px = math.sqrt(max(comb.wall_px**2 - (_BLUR_WIDTH * blur_px) ** 2, 0.0))
-    share = min(sharp_px, comb.wall_px - _WIDER_PX) / comb.pitch_px
+    share = min(sharp_px, comb.wall_px - WIDER_PX) / comb.pitch_px
     # Foam has wide bright walls, and cells of all sizes between them; so has a sheet with letters, which closes them.
     even = not (cut and comb.bright) or comb.regular > _REGULAR
-    widest = _WIDEST_WALL if comb.pitch_px > _FINE_PITCH_PX else _WIDEST_FINE
+    widest = _WIDEST_WALL if comb.pitch_px > FINE_PITCH_PX else WIDEST_FINE
     if share > widest and even and not comb.plate:
         return (
             f"what lies between patches {comb.pitch_px:.0f} px apart is {100 * share:.0f} % as wide as that, cell "

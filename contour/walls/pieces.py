@@ -12,6 +12,7 @@ from contour.geometry.arrays import Bools, Bytes, Int32s, Int64s
 from contour.geometry.rings import Ring
 from contour.image.opencv import closed_by_disc, pieces_and_boxes, pieces_and_lesser
 from contour.image.pixel_grid import coarse_step, pixels_of, samples_of, whole_averaged
+from contour.walls.coarse_block import CLOSING_PITCHES
 
 _WALL_COVERAGE = 0.12
 # What lies within this of the traced outline is the block itself: its side seen at a slant, its broken walls.
@@ -20,8 +21,6 @@ _LEAST_SIZE_PITCHES = 3.0
 # Enclosed areas that are cells, in areas of one: broken walls join several, letters and chips enclose less.
 _CELL_AREAS = (0.25, 6.0)
 _FEWEST_CELLS = 7
-# Bridges an open cell at the border.
-_CLOSING_PITCHES = 0.72
 # A strip of swarf beside the block has closed cells of its own, and broken walls have none; but of a block that seems
 # to be in two, parts as large as this may be its own. No such strip has less wall, pitches times pixels.
 _LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
@@ -179,7 +178,7 @@ def _outline(filled: Bools) -> Ring:
 def _filled(walls: Bools, samples: float) -> Bools | None:
     """A piece with walls `walls` (h, w), its cells filled; None where it has too few cells of its own."""
     cell = samples**2 / _HEXAGON
-    pad = round(_CLOSING_PITCHES * samples) + 2
+    pad = round(CLOSING_PITCHES * samples) + 2
     free = cv2.copyMakeBorder((~walls).astype(np.uint8), pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=1)
     _, labels, stats, _ = cv2.connectedComponentsWithStats(free, connectivity=4)
     area = stats[:, cv2.CC_STAT_AREA].astype(np.float64)
@@ -189,4 +188,4 @@ def _filled(walls: Bools, samples: float) -> Bools | None:
     cells[[0, labels[0, 0]]] = False
     if np.count_nonzero(cells) < _FEWEST_CELLS:
         return None
-    return closed_by_disc(walls.astype(np.uint8), _CLOSING_PITCHES * samples) > 0
+    return closed_by_disc(walls.astype(np.uint8), CLOSING_PITCHES * samples) > 0

@@ -231,7 +231,7 @@ def test_a_refusal_is_told_with_its_reason(served: Served, reader: NodeClient) -
     until(lambda: bool(reader.events("-> Error")), what="the loss")
     served.cell._trigger_every = ("--trigger-every", "0.5", "--recipe", "2")
     served.cell.controller = served.cell.start_controller()
-    until(lambda: bool(reader.events("112 area_out_of_limits")), 60, "a refusal")
+    until(lambda: len(reader.events("112 area_out_of_limits")) >= 2, 60, "a refusal and what says more of it")
     ready, more = reader.events("112 area_out_of_limits")[:2]
     assert ready["ResultContent"][:3] == ["refused", 112, "area_out_of_limits"]
     assert (ready["ResultState"], ready["Severity"]) == (1, 500)

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, Float64s, median, medians, quantile
-from contour.geometry.rings import Ring
+from contour.geometry.rings import Ring, densified
+from contour.geometry.segments import distances_to_ring
+from contour.geometry.signed_distance import depth_inside
 from contour.image.opencv import closed_by_disc, median_where, pieces_and_middles
 from contour.material.closed_cells import MaterialEdge, closed_along
 from contour.tracing.cut_lines import straight_cuts, touched_cuts
@@ -17,6 +20,9 @@ from contour.walls.comb_likeness import FINE_PITCH_PX, WIDER_PX, WIDEST_FINE, Co
 
 # Webs of a sheet are wider than most walls; its holes are orderly.
 _LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID = 0.2, 0.4, 0.93
+# Those of large holes in a wide rim look narrower, and of a dozen holes few have neighbours all around: where holes are
+# large enough to be seen round, that is asked.
+_NARROW_WEB, _FEW_ORDER = 0.12, 0.2
 # And round: of the circle around it a hole of a dozen pixels and more fills 0.88 at least, a hexagon 0.86 at most. Of
 # smaller ones that cannot be told; squares and drawn-out cells fill 0.72 at most, round ones 0.8 at least.
 _ROUND, _MAYBE_ROUND, _FINE_HOLE_PX = 0.87, 0.76, 12.0
@@ -35,15 +41,22 @@ _OPEN_PITCHES = 1.0
 # Holes smaller than this share of the usual are specks, and fewer make no sheet. Of noise in the floor of cells, where
 # little of it differs from the table as little, all are: a pixel fills any circle.
 _SPECK, _FEWEST_HOLES, _LEAST_HOLE_PX = 1.0 / 3.0, 6, 4.0
+# Right outlines of 33 cut sheets leave out 0.07 pitches of material at most, and edges that are touched by 0.16, wrong
+# ones 0.54 or 0.4.
+_LEFT_OUT, _BESIDE = 0.2, 0.25
 
 
-def like_plate(comb: Comb | None) -> bool:
-    """Whether patches may be the holes of a perforated sheet; whether they show the table, its outline tells."""
-    if comb is None:
-        return False
+def like_plate(comb: Comb | None) -> tuple[bool, bool]:
+    """Whether patches may be the holes of a perforated sheet, and whether they may though too small to be seen round;
+    whether they show the table, its outline tells.
+    """
+    if comb is None or comb.solid <= _LEAST_SOLID:
+        return False, False
     # Webs of fine cells are not told from walls, which look wider than they are, unless no wall is as wide.
-    least = _LEAST_WEB if comb.pitch_px > FINE_PITCH_PX else WIDEST_FINE
-    return comb.wall_px - WIDER_PX > least * comb.pitch_px and comb.order > _LEAST_ORDER and comb.solid > _LEAST_SOLID
+    web = (comb.wall_px - WIDER_PX) / comb.pitch_px
+    wide = web > (_LEAST_WEB if comb.pitch_px > FINE_PITCH_PX else WIDEST_FINE) and comb.order > _LEAST_ORDER
+    seen_round = comb.pitch_px - comb.wall_px > _FINE_HOLE_PX
+    return wide or (seen_round and web > _NARROW_WEB and comb.order > _FEW_ORDER), wide
 
 
 def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | None, Edge] | None:
@@ -135,6 +148,21 @@ def _outermost(material: MaterialEdge, corners: Float64s, normals: Float64s, rad
         if len(near):
             moved[number] = near[np.argmax(near @ out)]
     return moved
+
+
+def check_sheet(material: MaterialEdge, outline: Ring, pitch_px: float) -> None:
+    """Raise NoBlockFound where an outline, pixels, of a sheet that was cut on several sides leaves material out, or an
+    edge that material touches at every hole: a sheet shows where it ends between these.
+    """
+    cuts = touched_cuts(material, pitch_px, alike=True)
+    edges = [densified(edge, pitch_px) for edge in np.concatenate(cuts)] if cuts else []
+    left_out = depth_inside(outline, np.concatenate(material.border)) < -_LEFT_OUT * pitch_px
+    beside = distances_to_ring(np.concatenate(edges), outline) > _BESIDE * pitch_px if edges else np.empty(0)
+    if left_out.any() or beside.any():
+        raise NoBlockFound(
+            "no block found: the outline that fits most ends of webs leaves the sheet's edge between them. Check that "
+            "nothing lies against the sheet, and the light"
+        )
 
 
 def _along_webs(rings: tuple[Ring, ...], cut: Float64s) -> Float64s:

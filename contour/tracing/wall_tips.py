@@ -34,7 +34,7 @@ from contour.tracing.edge_kind import (
     tooth_px,
 )
 from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_unseen
-from contour.tracing.plates import like_plate, plate_edge
+from contour.tracing.plates import check_sheet, like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
@@ -109,6 +109,8 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
             # What seemed to hide it does not.
             check_promise(promise, kind, traced=closed is not None)
             found = closed or found
+        if plate is not None:
+            check_sheet(solid.edge, found.contour.exterior, seen.pitch_px)
         if promise == "auto" and plate is None and kind is None:
             solid.check_fine(seen, found.contour)
         return replace(found, parted=parted_by_seam(walls, seen))
@@ -377,11 +379,12 @@ def _plate(solid: _Solid, seen: BlockEvidence) -> Trace | BlockEvidence | None:
     """The outline of a perforated sheet; what is seen of it, as of a sheet, where it was cut along more than one line;
     None where it is none.
     """
-    if not like_plate(seen.comb):
+    asked, wide = like_plate(seen.comb)
+    if not asked:
         return None
     cells, _ = solid.cells, solid.walls
     try:
-        found = plate_edge(solid.edge, wide=True)
+        found = plate_edge(solid.edge, wide=wide)
     except NoBlockFound:
         return None
     if found is None:

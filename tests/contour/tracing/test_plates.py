@@ -41,6 +41,21 @@ def test_a_sheet_whose_round_holes_show_the_table_is_traced() -> None:
     assert agreement(found.pixels, truth).p95_px < 1.0
 
 
+@pytest.mark.parametrize("seed", [1222006, 1222045])
+def test_a_dozen_large_holes_in_a_wide_rim_make_a_sheet(seed: int) -> None:
+    one = lattice(seed, "round", "closed")
+    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), "cells")
+    assert found.pixels is not None
+    assert agreement(found.pixels, one.outline).hausdorff_px < 0.15 * one.pitch_px
+
+
+@pytest.mark.parametrize("seed", [1224003, 1240010], ids=["material left out", "beside its edge"])
+def test_an_outline_that_leaves_the_edge_of_a_cut_sheet_is_refused(seed: int) -> None:
+    found = Measurer(None).measure(lattice(seed, "round", "cut").picture, PlainRecipe(), 0.0)
+    assert Reason.NO_BLOCK_FOUND in found.reasons
+
+
 def test_a_board_whose_squares_are_as_dark_as_the_table_is_none() -> None:
     picture = np.full((520, 640), TABLE, np.uint8)
     rows, columns = np.mgrid[:360, :480] // 40

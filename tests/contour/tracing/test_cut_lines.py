@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 
 from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour
 from contour.material.closed_cells import Apart, MaterialEdge
-from contour.tracing.cut_lines import touched_cuts
+from contour.tracing.cut_lines import straight_cuts, touched_cuts
 
 PITCH = 60.0
 
@@ -40,6 +42,28 @@ def test_openings_that_grow_steadily_were_cut_open_and_those_that_only_vary_were
     growing = np.array([25.0, 26.0, 27.0, 28.0, 29.0, 30.0, 31.0, 32.0])
     assert len(touched_cuts(material(growing), PITCH)) == 1
     assert touched_cuts(material(np.roll(growing, 3)[[0, 4, 1, 5, 2, 6, 3, 7]]), PITCH) == []
+
+
+def test_walls_of_different_thickness_were_cut_and_as_thick_ones_were_not() -> None:
+    """Openings are alike, and behind what touches the line lie cells, nearer and nearer to it or not."""
+    for thick, told in ((np.array([10.0, 8.5, 7.0, 5.5, 4.0, 10.0]), 1), (np.full(6, 8.0), 0)):
+        block = material(np.full(6, 28.0))
+        difference = np.full_like(block.apart.region, 9)
+        for number, wall in enumerate(thick[:-1]):
+            x, y = round(PITCH * (number + 1)) + 50, round(100.0 + wall)
+            difference[y : y + 30, x - 6 : x + 6] = 0
+        apart = replace(block.apart, difference=difference, level=np.full_like(difference, 5))
+        assert len(touched_cuts(replace(block, apart=apart), PITCH)) == told
+
+
+def test_a_cut_runs_along_the_hull_that_its_few_ends_lie_on() -> None:
+    """Three ends at one end of the edge, half a pixel off, point beside its other end."""
+    block = material(np.array([12.0, 20.0, 33.0, 15.0, 28.0, 40.0, 18.0, 25.0]))
+    ends = np.array([[60.0, 100.0], [110.0, 101.0], [170.0, 102.0]])
+    up = np.tile([0.0, -1.0], (3, 1))
+    (cut,) = straight_cuts(block, ends, up, PITCH, open_px=2.0 * PITCH)
+    assert np.allclose(cut[0, :, 1], 100.0, atol=1.0)
+    assert abs(cut[0, 1, 0] - cut[0, 0, 0]) > 7.9 * PITCH
 
 
 def test_two_openings_tell_that_a_sheet_was_cut() -> None:

@@ -123,6 +123,11 @@ def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
         (1092020, "square"),
         (1206035, "triangular"),
         (1214002, "triangular"),
+        (1224005, "over-expanded"),
+        (1224023, "over-expanded"),
+        (1246032, "hexagonal"),
+        (1250012, "hexagonal"),
+        (1222036, "flex"),
     ],
     ids=[
         "no end",
@@ -131,6 +136,11 @@ def test_one_cut_across_a_dent_is_one_cut(seed: int, cells: Cells) -> None:
         "openings that grow",
         "nothing hides the border",
         "one opening as deep as teeth",
+        "walls thinner and thinner",
+        "ends at one end of it",
+        "a last wall that stops short",
+        "a wall's end beside closed cells that another cut left",
+        "walls of which one is left whole",
     ],
 )
 def test_a_cut_at_which_hardly_a_wall_ends_is_seen_by_what_touches_its_line(seed: int, cells: Cells) -> None:

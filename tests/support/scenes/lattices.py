@@ -25,6 +25,7 @@ WIDTH, HEIGHT = 900, 700
 _FINER = 3
 _MARGIN_PX = 6.0
 _ROW = np.sqrt(3.0) / 2.0
+_PARTLY = 0.05
 
 Floats = NDArray[np.float32]
 
@@ -39,8 +40,17 @@ class Lattice:
     border: Border
     bright_table: bool
     pitch_px: float
+    opened: int = 0
+    """Cells of whose inside the border leaves a part, a twentieth at least, and not all."""
     ribbon_deg: float | None = None
     """Direction of the walls that the cells are symmetric about alone, degrees from x, counter-clockwise as seen."""
+
+    @property
+    def edge(self) -> str:
+        """How its border runs: a cut between cells, or along walls, leaves it closed."""
+        if self.border == "cut":
+            return "cut"
+        return "mixed" if self.border == "mixed" and self.opened else "cells"
 
 
 def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
@@ -70,7 +80,15 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
     bright_table = bool(rng.random() < 0.5)
     picture = _rendered(rng, body, material, bright_table)
     ribbon_deg = (90.0 - float(np.degrees(angle))) % 180.0 if cells in ("over-expanded", "flex") else None
-    return Lattice(picture, _contour(body), cells, border, bright_table, pitch, ribbon_deg)
+    opened = _opened(number, into_wall < 0, body)
+    return Lattice(picture, _contour(body), cells, border, bright_table, pitch, opened, ribbon_deg)
+
+
+def _opened(number: NDArray[np.int64], inside: NDArray[np.bool_], body: NDArray[np.bool_]) -> int:
+    """How many cells, by their numbers, are partly inside a body."""
+    whole, kept = (np.bincount(number[part], minlength=int(number.max()) + 1) for part in (inside, inside & body))
+    share = kept / np.maximum(whole, 1)
+    return int(np.count_nonzero((share > _PARTLY) & (share < 1.0 - _PARTLY)))
 
 
 def _box(rng: np.random.Generator, x: Floats, y: Floats, pitch: float, *, holed: bool) -> NDArray[np.bool_]:

@@ -9,6 +9,8 @@ comb.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import cv2
 import numpy as np
 
@@ -16,7 +18,15 @@ from contour.geometry.arrays import Bools, Bytes
 from contour.image.pixel_grid import averaged, pixels_of
 from contour.seams.both_sides import cell_order, comb_along
 from contour.seams.openings import Openings, openings
-from contour.seams.parting import LONG, Parted, parted, parted_by_row, parted_strip, runs_along
+from contour.seams.parting import (
+    LONG,
+    Parted,
+    parted,
+    parted_by_order,
+    parted_by_row,
+    parted_strip,
+    runs_along,
+)
 from contour.walls.pieces import Piece
 from contour.walls.see_block import SeenWalls
 from contour.walls.wall_evidence import BlockEvidence
@@ -46,16 +56,28 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
             if order.other or not order.known:
                 return _smaller(free, strip.part, walls.scale)
         found = parted(free)
-        if found is not None:
-            sure = comb_along(_light(walls, seen, free), free, found) and _two(walls, seen, free, found)
-            return _smaller(free, found.part, walls.scale) if sure else None
+        if found is not None and _comb(walls, seen, free, found) and _two(walls, seen, free, found):
+            return _smaller(free, found.part, walls.scale)
         if step == coarse:
-            row = parted_by_row(free)
-            if row is not None and cell_order(free, row).other and comb_along(_light(walls, seen, free), free, row):
-                return _smaller(free, row.part, walls.scale)
+            for one in _by_order(free):
+                if cell_order(free, one).other and _comb(walls, seen, free, one):
+                    return _smaller(free, one.part, walls.scale)
         if free.long.max(initial=0.0) < LONG:
             return None
     return None
+
+
+def _comb(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:
+    """Whether light along a line is that of comb."""
+    return comb_along(_light(walls, seen, free), free, found)
+
+
+def _by_order(free: Openings) -> Iterator[Parted]:
+    """Parts between which the order of cells may change."""
+    row = parted_by_row(free)
+    if row is not None:
+        yield row
+    yield from parted_by_order(free)
 
 
 def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:

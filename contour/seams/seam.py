@@ -58,10 +58,9 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
         found = parted(free)
         if found is not None and _comb(walls, seen, free, found) and _two(walls, seen, free, found):
             return _smaller(free, found.part, walls.scale)
-        if step == coarse:
-            for one in _by_order(free):
-                if cell_order(free, one).other and _comb(walls, seen, free, one):
-                    return _smaller(free, one.part, walls.scale)
+        for one in _by_order(free):
+            if cell_order(free, one).other and _comb(walls, seen, free, one):
+                return _smaller(free, one.part, walls.scale)
         if free.long.max(initial=0.0) < LONG:
             return None
     return None

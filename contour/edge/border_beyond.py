@@ -38,8 +38,10 @@ _CLEAR, _EVERY = 0.35, 4
 _OVER_OTHERS, _OVER_NOISE, _LEAST = 2.0, 2.5, 1.0
 # Both ends of one edge run on along the same line: the cosine between them, and pitches across it; by so much more.
 _STRAIGHT, _ASIDE, _MORE = 0.99, 0.5, 1.4
-# Light on beside the border is that along the edge, within a share of the step; where it is looked at, pitches.
-_SAME, _BESIDE, _ALONG = 0.3, np.array([0.4, 0.5, 0.6]), np.arange(-3.0, -0.4, 0.1)
+# Light on beside the border is that along the edge, within a share of the step, more where it is a clear one, since
+# sheets are mottled and lit unevenly; where it is looked at, pitches.
+_SAME, _SAME_IF_CLEAR, _CLEAR_BORDER = 0.3, 0.6, 1.3
+_BESIDE, _ALONG = np.array([0.4, 0.5, 0.6]), np.arange(-3.0, -0.4, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,8 @@ def _of_things(
     edge = np.broadcast_to(_ALONG * pitch_px, (len(rays.begin), len(_ALONG)))
     own = _mean_light(light, rays, edge, np.zeros_like(edge), pitch_px)
     shadow = (inner < outer) & (np.abs(inner - usual) > np.abs(outer - usual))
-    alone = (np.abs(outer - own) < _SAME * np.abs(outer - inner)) & ~shadow
+    same = np.where(over > _CLEAR_BORDER, _SAME_IF_CLEAR, _SAME)
+    alone = (np.abs(outer - own) < same * np.abs(outer - inner)) & ~shadow
     sign = np.where(over > 1.0, np.sign(outer - inner), 0.0)
     twice = _at_both_ends(rays, np.where(over > _MORE, sign, 0.0), pitch_px) | _around_notch(rays, sign)
     return np.asarray(((over > 1.0) & alone) | twice)

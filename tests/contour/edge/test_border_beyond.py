@@ -117,13 +117,20 @@ def test_a_border_beyond_both_ends_of_an_edge_is_told_where_light_falls_off_alon
         assert (border_beyond(dimmed, contour, PITCH_PX) is not None) == told
 
 
+def test_a_clear_border_may_be_a_mottled_sheets() -> None:
+    lighter = box(RIGHT - 60, TOP - 40, RIGHT, TOP)
+    for levels, told in ((4.0, True), (8.0, False)):
+        light, contour = block_on_table((BESIDE_TOP_RIGHT, 10.0), (lighter, levels))
+        assert (border_beyond([light], contour, PITCH_PX) is not None) == told
+
+
 def test_borders_beyond_both_ends_of_a_notch_are_told_where_a_sheet_is_lighter_in_it() -> None:
     """A sheet's corner over the block's; what goes on beyond one end of a notch alone may be the table's own light."""
     left, low = RIGHT - 90, TOP + 70
     notched = np.array([[LEFT, TOP], [left, TOP], [left, low], [RIGHT, low], [RIGHT, BOTTOM], [LEFT, BOTTOM]])
     for right, told in ((RIGHT + 80, True), (RIGHT - 25, False)):
         sheet, lighter = box(left, TOP - 60, right, low), box(left, TOP, min(right, RIGHT), low)
-        light, contour = block_on_table((sheet, 6.0), (lighter, 9.0), block=notched)
+        light, contour = block_on_table((sheet, 6.0), (lighter, 6.0), block=notched)
         assert (border_beyond([light], contour, PITCH_PX) is not None) == told
 
 

@@ -40,7 +40,7 @@ _OVER_OTHERS, _OVER_NOISE, _LEAST = 2.0, 2.5, 1.0
 _STRAIGHT, _ASIDE, _MORE = 0.99, 0.5, 1.4
 # Light on beside the border is that along the edge, within a share of the step, more where it is a clear one, since
 # sheets are mottled and lit unevenly; where it is looked at, pitches.
-_SAME, _SAME_IF_CLEAR, _CLEAR_BORDER = 0.3, 0.6, 1.3
+_SAME, _SAME_IF_CLEAR, _CLEAR_BORDER = 0.3, 0.6, 2.0
 _BESIDE, _ALONG = np.array([0.4, 0.5, 0.6]), np.arange(-3.0, -0.4, 0.1)
 
 

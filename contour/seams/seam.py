@@ -2,9 +2,9 @@
 
 Each has cells of its own, and both were cut, so few walls lead from one to the other: along their common edge cells run
 into each other. Where the blocks do not touch, what is free of walls makes one opening from outline to outline; where
-they do, many short ones in a row. Walls that are lost in one block leave openings, too, but faint ones lead across, and
-its cells go on in the same order beyond. Adhesive in a splice, compound or ink leave some in which light is not as in
-comb.
+they do, many short ones in a row, or none: then the order of cells alone tells them apart. Walls that are lost in one
+block leave openings, too, but faint ones lead across, and its cells go on in the same order beyond. Adhesive in a
+splice, compound or ink leave some in which light is not as in comb.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@ Walls end at the border of a tape or a sheet that lies over a block as they do a
 table, or takes a whole edge away, is told from it by nothing else: but its border mostly is longer than the block is
 wide there, and runs on past the corner that the outline makes. A table has no reason to change just there, along just
 that line. A block's own shadow has where light comes along an edge: then it is what lies on the other side that is
-darker than beside most of the block, and at one end of that edge alone.
+darker than beside most of the block, and at one end of that edge alone. So a border at both ends of an edge is a
+thing's, and so is one at both ends of a notch that a sheet's corner leaves: no light comes along both of its edges.
 """
 
 from __future__ import annotations
@@ -37,14 +38,17 @@ _CLEAR, _EVERY = 0.35, 4
 _OVER_OTHERS, _OVER_NOISE, _LEAST = 2.0, 2.5, 1.0
 # Both ends of one edge run on along the same line: the cosine between them, and pitches across it; by so much more.
 _STRAIGHT, _ASIDE, _MORE = 0.99, 0.5, 1.4
-# Light on beside the border is that along the edge, within a share of the step; where it is looked at, pitches.
-_SAME, _BESIDE, _ALONG = 0.3, np.array([0.4, 0.5, 0.6]), np.arange(-3.0, -0.4, 0.1)
+# Light on beside the border is that along the edge, within a share of the step, more where it is a clear one, since
+# sheets are mottled and lit unevenly; where it is looked at, pitches.
+_SAME, _SAME_IF_CLEAR, _CLEAR_BORDER = 0.3, 0.6, 2.0
+_BESIDE, _ALONG = np.array([0.4, 0.5, 0.6]), np.arange(-3.0, -0.4, 0.1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Rays:
     """Edges of a ring, going on past its corners: the corner and the ray's origin, unit vectors along it and out of
-    the material across it, (R, 2) each, and the length from which on it is free, (R,). All in pixels.
+    the material across it, (R, 2) each, and the length from which on it is free, (R,). All in pixels. inner: whether
+    the ring turns into the material at each corner, (R,). Corners come twice: edges before them, then those behind.
     """
 
     corner: Float64s
@@ -52,6 +56,7 @@ class _Rays:
     along: Float64s
     across: Float64s
     begin: Float64s
+    inner: Bools
 
     def at(self, ahead: Float64s, out: Float64s) -> Float64s:
         """Places so far along the rays and out across them, (R, ...) both, shape (R, ..., 2)."""
@@ -109,8 +114,10 @@ def _of_things(
     edge = np.broadcast_to(_ALONG * pitch_px, (len(rays.begin), len(_ALONG)))
     own = _mean_light(light, rays, edge, np.zeros_like(edge), pitch_px)
     shadow = (inner < outer) & (np.abs(inner - usual) > np.abs(outer - usual))
-    alone = (np.abs(outer - own) < _SAME * np.abs(outer - inner)) & ~shadow
-    twice = _at_both_ends(rays, np.where(over > _MORE, np.sign(outer - inner), 0.0), pitch_px)
+    same = np.where(over > _CLEAR_BORDER, _SAME_IF_CLEAR, _SAME)
+    alone = (np.abs(outer - own) < same * np.abs(outer - inner)) & ~shadow
+    sign = np.where(over > 1.0, np.sign(outer - inner), 0.0)
+    twice = _at_both_ends(rays, np.where(over > _MORE, sign, 0.0), pitch_px) | _around_notch(rays, sign)
     return np.asarray(((over > 1.0) & alone) | twice)
 
 
@@ -122,6 +129,15 @@ def _at_both_ends(rays: _Rays, sign: Float64s, pitch_px: float) -> Bools:
     aside = np.abs(((rays.origin[one] - rays.origin[other]) * rays.across[other]).sum(axis=1))
     both = straight & (aside < _ASIDE * pitch_px) & (sign[one] * sign[other] > 0.0)
     return np.concatenate([both, np.roll(both, -1)])
+
+
+def _around_notch(rays: _Rays, sign: Float64s) -> Bools:
+    """Which rays have a border of the same sign, (R,), at the other end of a notch with one corner inside."""
+    last = np.arange(len(sign) // 2)
+    first = len(last) + np.roll(last, 2)  # from the corner before the one inside, backwards
+    notch = np.roll(rays.inner[last], 1) & ~rays.inner[last] & ~rays.inner[first]
+    both = notch & (sign[last] * sign[first] > 0.0)
+    return np.concatenate([both, np.roll(both, -2)])
 
 
 def _usual_light(light: Bytes, ring: Ring, out_px: float) -> float:
@@ -138,11 +154,12 @@ def _rays(ring: Ring, side: float, pitch_px: float) -> _Rays:
     count = len(points)
     if count < 3 * _CHORD:
         empty = np.empty((0, 2))
-        return _Rays(empty, empty, empty, empty, np.empty(0))
+        return _Rays(empty, empty, empty, empty, np.empty(0), np.empty(0, np.bool_))
     place: Complexes = points[:, 0] + 1j * points[:, 1]
     before = rolled(place, _SKIP) - rolled(place, _SKIP + _CHORD)
     behind = rolled(place, -_SKIP - _CHORD) - rolled(place, -_SKIP)
-    turn = np.abs(np.angle(behind * before.conj()))
+    turned = np.angle(behind * before.conj())
+    turn = np.abs(turned)
     most = np.max([rolled(turn, k) for k in range(-_NEIGHBOURS, _NEIGHBOURS + 1)], axis=0)
     # Between straight edges several places turn alike, but for rounding: the middle one is the corner.
     alike = runs_of((turn > most - _ALIKE) & (turn > np.radians(_CORNER_DEG)))
@@ -156,7 +173,7 @@ def _rays(ring: Ring, side: float, pitch_px: float) -> _Rays:
     across: Complexes = -1j * side * way * heading
     sine = np.sin(np.minimum(turn[index], 0.5 * np.pi))
     begin = pitch_px * np.maximum(_NEAREST, _FREE / np.maximum(sine, 1e-3))
-    return _Rays(points[index], _pairs(origin), _pairs(heading), _pairs(across), begin)
+    return _Rays(points[index], _pairs(origin), _pairs(heading), _pairs(across), begin, side * turned[index] < 0.0)
 
 
 def _pairs(places: Complexes) -> Float64s:

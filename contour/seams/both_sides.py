@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from contour.geometry.arrays import Bytes, quantile
-from contour.seams.openings import Openings
-from contour.seams.parting import NEAR_OUTLINE, Parted
+from contour.seams.openings import NEAR_OUTLINE, NEIGHBOURS, Openings
+from contour.seams.parting import Parted
 
 # Light within so many pitches of the line is held against that of the comb beside it, of so much of which it is as dark
 # as the floors of cells, as light as walls, and blacker.
@@ -19,13 +19,12 @@ _FLOOR, _WALL, _BLACK = 0.35, 0.92, 0.05
 # 0.07. Of 36 splices that are lighter than cells the first is 0.70 at most.
 _DARK, _LIGHT = 0.12, 0.5
 _FLOORS, _WALLS, _BLACKER = 0.85, 0.68, 0.1
-# Cells within so many pitches of the line, the distances of neighbours, and what the step between two of them leads to:
-# the cell so many steps on, within a share of a pitch.
-_ROWS, _NEIGHBOURS, _STEPS, _MET = 2.0, (0.6, 1.45), (2, 3, 4), 0.25
+# Cells within so many pitches of the line, and what the step between two neighbours leads to: a cell so many steps on.
+_ROWS, _STEPS = 2.0, (2, 3, 4)
 _FEWEST = 12
 # How often it does on the same side of the line at the least for another order across to be told, or the same: one of
 # five places lies as near to some cell by chance, and of irregular cells two or three of five.
-_ORDERLY, _IN_SOME_ORDER = 0.6, 0.35
+_ORDERLY, _IN_SOME_ORDER = 0.5, 0.35
 # Of how often it does on the same side, how often it does across a seam at the most: of 60 seams 0.51 and less, but for
 # three whose blocks lie alike by chance (0.68 to 0.79); across lines through accepted single blocks, drawn anywhere,
 # 0.62 and more in 599 of 600, 0.54 once. And how often it does across one block at the least: in nine of ten 0.88.
@@ -34,20 +33,22 @@ _OTHER, _SAME = 0.5, 0.82
 
 def comb_along(light: Bytes, free: Openings, found: Parted) -> bool:
     """Whether light along a line, bright where walls are, is that of comb: floors as dark as cells', none blacker, and
-    walls.
+    walls. Cells of one block may look into another light than those of the other, so each side has its own.
     """
     inside = free.depth > NEAR_OUTLINE
     near, beside = inside & (found.away < _BAND), inside & (found.away > _BESIDE[0]) & (found.away < _BESIDE[1])
-    seam, sides = light[near], [light[beside & side] for side in (found.part, ~found.part)]
-    if min(map(len, (seam, *sides))) == 0:
+    both = [(light[near & side], light[beside & side]) for side in (found.part, ~found.part)]
+    if min(len(light) for side in both for light in side) == 0:
         return False
-    comb = np.concatenate(sides)
-    # Cells of one block may look into another light than those of the other.
-    floor, wall = max(quantile(side, _FLOOR) for side in sides), quantile(comb, _WALL)
-    dark, bright = (floor + share * (wall - floor) for share in (_DARK, _LIGHT))
-    blacker = np.mean(seam < min(quantile(side, _BLACK) for side in sides)) < _BLACKER
-    floors = np.mean(seam < dark) > _FLOORS * np.mean(comb < dark)
-    return bool(blacker and floors and np.mean(seam > bright) > _WALLS * np.mean(comb > bright))
+    black = min(quantile(comb, _BLACK) for _, comb in both)
+    count, usual = np.zeros(3), np.zeros(2)
+    for seam, comb in both:
+        floor, wall = quantile(comb, _FLOOR), quantile(comb, _WALL)
+        dark, bright = (floor + share * (wall - floor) for share in (_DARK, _LIGHT))
+        count += [np.count_nonzero(seam < black), np.count_nonzero(seam < dark), np.count_nonzero(seam > bright)]
+        usual += len(seam) * np.array([np.mean(comb < dark), np.mean(comb > bright)])
+    blacker = count[0] / sum(len(seam) for seam, _ in both)
+    return bool(blacker < _BLACKER and count[1] > _FLOORS * usual[0] and count[2] > _WALLS * usual[1])
 
 
 @dataclass(frozen=True)
@@ -77,25 +78,23 @@ def cell_order(free: Openings, found: Parted) -> Order:
     """The order of cells on both sides of a line; none where they are too few to say."""
     column, row = np.rint(free.centre).astype(np.intp).T
     away = np.where(free.cells, found.away[row, column], np.inf)
-    near, about = np.flatnonzero(away < _ROWS), np.flatnonzero(away < _ROWS + _NEIGHBOURS[1])
+    near, about = np.flatnonzero(away < _ROWS), np.flatnonzero(away < _ROWS + NEIGHBOURS[1])
     side = found.part[row, column]
     apart = free.centre[near][:, None] - free.centre[about]
     far = np.hypot(apart[:, :, 0], apart[:, :, 1]) / free.pitch
-    start, other = np.nonzero((far > _NEIGHBOURS[0]) & (far < _NEIGHBOURS[1]) & (side[near][:, None] == side[about]))
+    start, other = np.nonzero((far > NEIGHBOURS[0]) & (far < NEIGHBOURS[1]) & (side[near][:, None] == side[about]))
     step, start = apart[start, other], near[start]
     hits: tuple[list[bool], list[bool]] = ([], [])
     for steps in _STEPS:
         aim = free.centre[start] + steps * step
-        x, y = np.rint(aim).astype(np.intp).T
-        within = (x >= 0) & (y >= 0) & (x < free.depth.shape[1]) & (y < free.depth.shape[0])
-        x, y, aim, own = x[within], y[within], aim[within], side[start][within]
-        number = free.numbers[y, x]
+        number, inside = free.at(aim)
         # What lies in a merged cell or beyond the edge says nothing, a wall that there is no cell.
-        said = (free.cells[number] | (number == 0)) & (free.depth[y, x] > NEAR_OUTLINE)
-        hit = free.cells[number] & (np.hypot(*(aim - free.centre[number]).T) < _MET * free.pitch)
-        across = found.part[y, x] != own
-        hits[0].extend(hit[said & ~across].tolist())
-        hits[1].extend(hit[said & across].tolist())
+        said = (free.cells[number] | (number == 0)) & inside
+        hit = free.met(aim[said], number[said])
+        x, y = np.rint(aim[said]).astype(np.intp).T
+        across = found.part[y, x] != side[start][said]
+        hits[0].extend(hit[~across].tolist())
+        hits[1].extend(hit[across].tolist())
     if min(map(len, hits)) < _FEWEST:
         return Order(0.0, 0.0)
     return Order(float(np.mean(hits[0])), float(np.mean(hits[1])))

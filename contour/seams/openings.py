@@ -16,12 +16,20 @@ from contour.walls.wall_evidence import BlockEvidence
 
 # A sample is wall where so much of it is.
 _COVERAGE = 100
-# Cell pitches. What lies nearer to the outline are cells that were cut open.
-OPENED = 0.9
+# Cell pitches. What lies nearer to the outline are cells that were cut open; and no nearer to it a seam ends, where
+# cells of both blocks happen to close it.
+OPENED, NEAR_OUTLINE = 0.9, 1.6
 # The outline is known to so many samples a pitch.
 _SAMPLES = 6.0
 # Of the median area; and of a cell's, what is counted for it.
-_USUAL, _LEAST_CELL = (0.5, 1.6), 0.15
+_USUAL, _OF_EITHER, _LEAST_CELL = (0.5, 1.6), (0.35, 2.5), 0.15
+# Pitches: how far neighbours are apart, and within how much of where it is looked for a cell's middle lies.
+NEIGHBOURS, _MET = (0.6, 1.45), 0.25
+# A cell's neighbours are looked for in so many directions; so many of them must be seen, and so much of them lie
+# opposite others.
+_AROUND, _FEWEST, _OPPOSITE = 18, 5, 0.75
+# By how much the pitch of hexagons grows with the root of their area.
+_PITCH_OF_SIDE = 1.07
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +53,49 @@ class Openings:
     @cached_property
     def cells(self) -> Bools:
         """Which openings are single cells, (N,)."""
+        return self._large(*_USUAL)
+
+    def _large(self, least: float, most: float) -> Bools:
+        """Which openings are so large of what is usual, (N,)."""
         large = self.area > _LEAST_CELL * self.pitch**2
         usual = median(self.area[large]) if large.any() else 0.0
-        return np.asarray(large & (self.area > _USUAL[0] * usual) & (self.area < _USUAL[1] * usual))
+        return np.asarray(large & (self.area > least * usual) & (self.area < most * usual))
+
+    def at(self, places: Float64s) -> tuple[Int32s, Bools]:
+        """What opening places lie in, (..., 2), 0 in none, and whether that is well within the outline, both (...)."""
+        x, y = np.moveaxis(np.rint(places).astype(np.intp), -1, 0)
+        high, wide = self.depth.shape
+        within = (x >= 0) & (y >= 0) & (x < wide) & (y < high)
+        x, y = np.where(within, x, 0), np.where(within, y, 0)
+        return np.where(within, self.numbers[y, x], 0), within & (self.depth[y, x] > NEAR_OUTLINE)
+
+    def met(self, aim: Float64s, number: Int32s) -> Bools:
+        """Whether the opening in which a place lies, (..., 2), is a cell and has its middle there, (...)."""
+        off = aim - self.centre[number]
+        return np.asarray(self.cells[number] & (np.hypot(off[..., 0], off[..., 1]) < _MET * self.pitch))
+
+    @cached_property
+    def orderly(self) -> Float64s:
+        """Middles of cells whose neighbours lie opposite others, as they do in one lattice however it is stretched and
+        turned, and not where another begins, (N, 2). Cells of either may be the larger ones.
+        """
+        cells = self._large(*_OF_EITHER)
+        middle = self.centre[cells][:, None]
+        if not len(middle):
+            return np.empty((0, 2))
+        side = np.sqrt(self.area[cells])
+        pitch = np.maximum(self.pitch + _PITCH_OF_SIDE * (side - median(side)), 1.0)[:, None]
+        turn = np.arange(_AROUND) * (2.0 * np.pi / _AROUND)
+        beside, _ = self.at(middle + pitch[..., None] * np.column_stack([np.cos(turn), np.sin(turn)]))
+        step = self.centre[beside] - middle
+        far = np.hypot(step[..., 0], step[..., 1]) / pitch
+        opposite, inside = self.at(middle - step)
+        seen = inside & cells[beside] & (far > NEIGHBOURS[0]) & (far < NEIGHBOURS[1])
+        off = middle - step - self.centre[opposite]
+        both = seen & cells[opposite] & (np.hypot(off[..., 0], off[..., 1]) < _MET * pitch)
+        count = np.count_nonzero(seen, axis=1)
+        orderly = (count >= _FEWEST) & (np.count_nonzero(both, axis=1) > _OPPOSITE * count)
+        return np.asarray(middle[orderly, 0])
 
 
 def openings(walls: SeenWalls, seen: BlockEvidence, mask: Bytes, step: int) -> Openings:

@@ -11,16 +11,18 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median
 from contour.image.pixel_grid import averaged, enlarged
-from contour.seams.openings import OPENED, Openings
+from contour.seams.openings import NEAR_OUTLINE, OPENED, Openings
 
 # Pitches. Of 150 single blocks without compound, ink or splice the longest opening is 2 to 4 cells long, where walls
 # are broken or dim; moved and faded ones have up to 5.8.
 LONG, _SHORT = 4.2, 2.5
 # So many samples a pitch tell what is parted.
 _SAMPLES = 6.0
-# Openings of one seam are no farther apart than twice this; and no nearer to the outline one ends, where cells of both
-# blocks happen to close it.
-_LINK, NEAR_OUTLINE = 1.25, 1.6
+# Openings of one seam are no farther apart than twice this.
+_LINK = 1.25
+# Cells in one order are no farther apart than twice this, and what joins two parts of them is wider than twice that: a
+# cell or two that lie alike by chance join none. A part has so many square pitches at the least.
+_IN_ORDER, _NECK, _LEAST_IN_ORDER = 0.75, 0.3, 4.0
 # What is less of the block than this is no part.
 _LEAST_PART = 0.02
 # An opening parts a strip from the block where so many pitches lead from its ends to the outline, on along it (cosine):
@@ -189,13 +191,32 @@ def _parts(free: Openings) -> Iterator[Parted]:
         for least in (LONG, _SHORT)
     )
     for away in (longest, longer):
-        for part in _pieces(inside & (away > _LINK), _LEAST_PART * np.count_nonzero(depth)):
-            border = cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((2, 2), np.uint8))
-            line = inside & (border > 0)
-            if line.any():
-                along = float(np.mean(longest[line] < _BY))
-                apart = _away(~line) / np.float32(pitch)
-                yield Parted(along, enlarged(part, every, shape), enlarged(apart, every, shape))
+        for part, line in _pieces_and_lines(inside & (away > _LINK), inside, _LEAST_PART * np.count_nonzero(depth)):
+            apart = _away(~line) / np.float32(pitch)
+            along = float(np.mean(longest[line] < _BY))
+            yield Parted(along, enlarged(part, every, shape), enlarged(apart, every, shape))
+
+
+def parted_by_order(free: Openings) -> Iterator[Parted]:
+    """Parts of the block that no cells in one order join, be there openings between them or none."""
+    every = max(1, int(free.pitch / _SAMPLES))
+    depth, pitch = free.depth[::every, ::every], free.pitch / every
+    inside, shape = depth > NEAR_OUTLINE, free.numbers.shape
+    column, row = np.rint(free.orderly / every).astype(np.intp).T
+    middles = np.zeros(depth.shape, np.bool_)
+    middles[np.minimum(row, depth.shape[0] - 1), np.minimum(column, depth.shape[1] - 1)] = True
+    near = inside & (_away(~middles) < _IN_ORDER * pitch)
+    for part, line in _pieces_and_lines(_away(near) > _NECK * pitch, inside, _LEAST_IN_ORDER * pitch**2):
+        apart = _away(~line) / np.float32(pitch)
+        yield Parted(0.0, enlarged(part, every, shape), enlarged(apart, every, shape))
+
+
+def _pieces_and_lines(rest: Bools, inside: Bools, least: float) -> Iterator[tuple[Bools, Bools]]:
+    """Pieces of the rest, as `_pieces`, and the lines around them."""
+    for part in _pieces(rest, least):
+        line = inside & (cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((2, 2), np.uint8)) > 0)
+        if line.any():
+            yield part, line
 
 
 def _pieces(rest: Bools, least: float) -> Iterator[Bools]:

@@ -2,12 +2,14 @@
 
 Each has cells of its own, and both were cut, so few walls lead from one to the other: along their common edge cells run
 into each other. Where the blocks do not touch, what is free of walls makes one opening from outline to outline; where
-they do, many short ones in a row. Walls that are lost in one block leave openings, too, but faint ones lead across, and
-its cells go on in the same order beyond. Adhesive in a splice, compound or ink leave some in which light is not as in
-comb.
+they do, many short ones in a row, or none: then the order of cells alone tells them apart. Walls that are lost in one
+block leave openings, too, but faint ones lead across, and its cells go on in the same order beyond. Adhesive in a
+splice, compound or ink leave some in which light is not as in comb.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import cv2
 import numpy as np
@@ -16,7 +18,15 @@ from contour.geometry.arrays import Bools, Bytes
 from contour.image.pixel_grid import averaged, pixels_of
 from contour.seams.both_sides import cell_order, comb_along
 from contour.seams.openings import Openings, openings
-from contour.seams.parting import LONG, Parted, parted, parted_by_row, parted_strip, runs_along
+from contour.seams.parting import (
+    LONG,
+    Parted,
+    parted,
+    parted_by_order,
+    parted_by_row,
+    parted_strip,
+    runs_along,
+)
 from contour.walls.pieces import Piece
 from contour.walls.see_block import SeenWalls
 from contour.walls.wall_evidence import BlockEvidence
@@ -46,16 +56,27 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
             if order.other or not order.known:
                 return _smaller(free, strip.part, walls.scale)
         found = parted(free)
-        if found is not None:
-            sure = comb_along(_light(walls, seen, free), free, found) and _two(walls, seen, free, found)
-            return _smaller(free, found.part, walls.scale) if sure else None
-        if step == coarse:
-            row = parted_by_row(free)
-            if row is not None and cell_order(free, row).other and comb_along(_light(walls, seen, free), free, row):
-                return _smaller(free, row.part, walls.scale)
+        if found is not None and _comb(walls, seen, free, found) and _two(walls, seen, free, found):
+            return _smaller(free, found.part, walls.scale)
+        for one in _by_order(free):
+            if cell_order(free, one).other and _comb(walls, seen, free, one):
+                return _smaller(free, one.part, walls.scale)
         if free.long.max(initial=0.0) < LONG:
             return None
     return None
+
+
+def _comb(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:
+    """Whether light along a line is that of comb."""
+    return comb_along(_light(walls, seen, free), free, found)
+
+
+def _by_order(free: Openings) -> Iterator[Parted]:
+    """Parts between which the order of cells may change."""
+    row = parted_by_row(free)
+    if row is not None:
+        yield row
+    yield from parted_by_order(free)
 
 
 def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:

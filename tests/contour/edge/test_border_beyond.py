@@ -24,21 +24,23 @@ def turned(points: Float64s, degrees: float) -> Float64s:
     return np.asarray((points - middle) @ turn + middle)
 
 
-def block_on_table(*things: tuple[Float64s, float], degrees: float = 20.0, hole: bool = False) -> tuple[Bytes, Contour]:
+def block_on_table(
+    *things: tuple[Float64s, float], degrees: float = 20.0, hole: bool = False, block: Float64s = CORNERS
+) -> tuple[Bytes, Contour]:
     """Light on a noisy table with a block, and things of so many grey levels above the table over it; the outline."""
     rng = np.random.default_rng(7)
     light = np.full((480, 640), TABLE, np.float32) + cv2.GaussianBlur(rng.normal(0, 8, (480, 640)), (0, 0), 3.0)
-    ring = turned(CORNERS, degrees)
-    block = np.zeros(light.shape, np.uint8)
-    cv2.fillPoly(block, [np.rint(ring).astype(np.int32)], 1)
+    ring = turned(block, degrees)
+    walls = np.zeros(light.shape, np.uint8)
+    cv2.fillPoly(walls, [np.rint(ring).astype(np.int32)], 1)
     if hole:
-        block = 1 - block
-    light[block > 0] = WALLS
+        walls = 1 - walls
+    light[walls > 0] = WALLS
     for corners, levels in things:
         there = np.zeros(light.shape, np.float32)
         cv2.fillPoly(there, [np.rint(turned(corners, degrees)).astype(np.int32)], 1.0)
         there = cv2.GaussianBlur(there, (0, 0), 0.8)
-        light = np.where(block > 0, light, light + there * np.float32(levels))
+        light = np.where(walls > 0, light, light + there * np.float32(levels))
     light += rng.normal(0, 0.8, light.shape)
     grey = np.clip(np.rint(light), 0, 255).astype(np.uint8)
     if not hole:
@@ -113,6 +115,23 @@ def test_a_border_beyond_both_ends_of_an_edge_is_told_where_light_falls_off_alon
         light, contour = block_on_table((thing, 6.0), degrees=0.0)
         dimmed = [np.rint(np.where(light > 100, light, falls * light)).astype(np.uint8)]
         assert (border_beyond(dimmed, contour, PITCH_PX) is not None) == told
+
+
+def test_a_clear_border_may_be_a_mottled_sheets() -> None:
+    lighter = box(RIGHT - 60, TOP - 40, RIGHT, TOP)
+    for levels, told in ((4.0, True), (8.0, False)):
+        light, contour = block_on_table((BESIDE_TOP_RIGHT, 10.0), (lighter, levels))
+        assert (border_beyond([light], contour, PITCH_PX) is not None) == told
+
+
+def test_borders_beyond_both_ends_of_a_notch_are_told_where_a_sheet_is_lighter_in_it() -> None:
+    """A sheet's corner over the block's; what goes on beyond one end of a notch alone may be the table's own light."""
+    left, low = RIGHT - 90, TOP + 70
+    notched = np.array([[LEFT, TOP], [left, TOP], [left, low], [RIGHT, low], [RIGHT, BOTTOM], [LEFT, BOTTOM]])
+    for right, told in ((RIGHT + 80, True), (RIGHT - 25, False)):
+        sheet, lighter = box(left, TOP - 60, right, low), box(left, TOP, min(right, RIGHT), low)
+        light, contour = block_on_table((sheet, 6.0), (lighter, 6.0), block=notched)
+        assert (border_beyond([light], contour, PITCH_PX) is not None) == told
 
 
 def test_a_thing_of_another_colour_is_told_in_the_plane_that_shows_it() -> None:

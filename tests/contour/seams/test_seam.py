@@ -13,7 +13,7 @@ from contour.acceptance.trace_check import check_trace
 from contour.geometry.rings import Contour, area
 from contour.polygon.polygon import Polygon
 from contour.seams.seam import parted_by_seam
-from contour.synthetic import CellGeometry, Fade, Filling, Ink, Scene, Slip, Strip, render, thick_line
+from contour.synthetic import CellGeometry, Fade, Filling, Ink, Scene, Slip, Strip, polygon, render, thick_line
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from contour.tracing.wall_tips import looked_at
@@ -60,6 +60,16 @@ def test_a_small_block_against_the_edge_of_a_large_one_is_the_part(gap: float) -
 
 def test_two_halves_that_lie_as_they_were_cut_are_two() -> None:
     assert seam_in(halves(0.3, CELLS)) is not None
+
+
+@pytest.mark.parametrize(("turn_deg", "pitch_mm"), [(25.0, 12.0), (25.0, 8.0), (10.0, 12.0)])
+def test_blocks_that_touch_along_a_curve_are_told_by_the_order_of_their_cells(turn_deg: float, pitch_mm: float) -> None:
+    x = np.linspace(-0.5 * LONG, 0.5 * LONG, 60)
+    y = 10.0 * np.cos(5.0 * x / LONG) - 0.5 * WIDE
+    seam = [at(along, out) for along, out in zip(x.tolist(), y.tolist(), strict=True)]
+    lower = polygon([at(-0.5 * LONG, -WIDE), at(0.5 * LONG, -WIDE), *seam[::-1]])
+    upper = polygon([*seam, at(0.5 * LONG, 0.0), at(-0.5 * LONG, 0.0)])
+    assert seam_in(two(lower, upper, replace(OTHER, ribbon_deg=turn_deg, pitch_mm=pitch_mm))) is not None
 
 
 def test_noise_across_one_opening_from_edge_to_edge_is_no_faint_wall() -> None:

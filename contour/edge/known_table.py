@@ -8,16 +8,16 @@ from functools import cached_property
 import cv2
 import numpy as np
 
+from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float32s, median, quantile
 from contour.image.opencv import grey
 from contour.image.taught_table import TableLook
 from contour.relief.relief import Displacement, Relief, relief_of
+from contour.walls.cell_scale import probe
 from contour.walls.end_profile import true_width
 from contour.walls.lightness import wall_light
 from contour.walls.see_block import SeenWalls, see_walls
 
-# Walls stand out of the table where they do by this share of what they stand out of their cells by.
-_STANDS_OUT = 0.5
 # Of the table's light, and grey levels: what differs by that is not the table. The block is where much of a cell does.
 _APART_SHARE, _APART_LEVELS, _MUCH = 0.15, 6.0, 0.4
 _SAMPLES = 1e5
@@ -25,23 +25,30 @@ _SAMPLES = 1e5
 _FAR_DARKER, _BRIGHT = 0.35, 0.9
 # A lens's usual blur and that of the mask.
 _BLUR_PX = 1.2
+# Window of the shade by which cells are looked for where the picture shows none: that of cells of a few to 60 px.
+_ANY_PITCH_PX = 20.0
 
 
 def over_known_table(picture: Bytes, look: TableLook, polarity: str, displacement: Displacement) -> Relief | None:
     """How the picture, grey (H, W) or BGR (H, W, 3), uint8, stands out of the table; None where walls stand out of it
-    as they do out of their cells. Raises NoBlockFound.
+    no less than out of their cells. Raises NoBlockFound.
     """
     hop = max(1, round(np.sqrt(picture.shape[0] * picture.shape[1] / _SAMPLES)))
     light, taught = (grey(np.ascontiguousarray(one[::hop, ::hop])).astype(np.float32) for one in (picture, look.known))
     sampled = _Sampled(light, taught * np.float32(look.gain), hop)
     if sampled.far_darker:
         return None
-    walls = see_walls(look.picture, wall_light(look.picture), polarity)
-    if not sampled.alike(walls):
-        return None
     table = np.asarray(cv2.convertScaleAbs(look.known, alpha=look.gain), np.uint8)
-    width = true_width(walls.cells.wall_px, _BLUR_PX)
-    return relief_of(picture, table, walls.cells.pitch_px, displacement, width)
+    try:
+        walls = see_walls(look.picture, wall_light(look.picture), polarity)
+    except NoBlockFound:
+        # Walls as light as the table hang together with it. What differs from it has cells, or there are none.
+        cells = probe(relief_of(picture, table, _ANY_PITCH_PX, displacement, 1.0).apart, "bright")
+    else:
+        if not sampled.alike(walls):
+            return None
+        cells = walls.cells
+    return relief_of(picture, table, cells.pitch_px, displacement, true_width(cells.wall_px, _BLUR_PX))
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,15 +72,11 @@ class _Sampled:
         return median(self.table[self.apart]) < _FAR_DARKER * quantile(self.light[self.apart], _BRIGHT)
 
     def alike(self, walls: SeenWalls) -> bool:
-        """Whether a block's walls are about as light as the table beneath them, or stand out of it less."""
+        """Whether a block's walls stand out of the table beneath them less than out of their cells."""
         wall = cv2.resize(walls.mask.mask, self.light.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
         window = max(3, round(walls.cells.pitch_px / self.hop))
         block = cv2.blur(self.apart.astype(np.float32), (window, window)) > _MUCH
         if not (block & wall).any() or not (block & ~wall).any():
             return False
-        top, cell, below = (
-            median(light[part])
-            for light, part in ((self.light, block & wall), (self.light, block & ~wall), (self.table, block & wall))
-        )
-        sign = 1.0 if walls.cells.bright else -1.0
-        return sign * (top - below) < _STANDS_OUT * sign * (top - cell)
+        cell, below = median(self.light[block & ~wall]), median(self.table[block & wall])
+        return below > cell if walls.cells.bright else below < cell

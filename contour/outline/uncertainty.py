@@ -26,7 +26,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from contour.geometry.arrays import Complexes, Float64s, Indices, medians, rolled
+from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, medians, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.outline.fit import FittedRing
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
@@ -56,6 +56,9 @@ _OBTUSE, _INSIDE_PITCHES = (math.radians(20.0), math.radians(75.0)), 0.03
 _SHARP, _DEEP_PITCHES = math.radians(100.0), 0.2
 """And so may a right one, where they lie as far inside as this."""
 
+_WIDEST_PITCHES = 1.0
+"""A corner that an arc on a known table may pass by so much is not told: how much more it may is of no account."""
+
 _HALVINGS = 24
 _REACH = np.linspace(0.0, 6.0, 601)
 _WITHIN = np.array([math.erf(reach / math.sqrt(2.0)) for reach in _REACH])
@@ -82,8 +85,9 @@ class Coefficients:
 class Stretches:
     """Stretches of outline between neighbouring witnesses on it, shape (S,) each, pixels.
 
-    length: along the coarse ring. inside: how far inside of the outline ends of walls tell that the edge may run. The
-    others are the causes of `Coefficients`, by the same names.
+    length: along the coarse ring. inside: how far inside of the outline ends of walls tell that the edge may run.
+    corner: how far at most, on a known table, since it may be round there. The others are the causes of `Coefficients`,
+    by the same names.
     """
 
     length: Float64s
@@ -94,6 +98,7 @@ class Stretches:
     misfit: Float64s
     outside: Float64s
     inside: Float64s
+    corner: Float64s
 
     def sigma(self, coefficients: Coefficients) -> Float64s:
         """Standard deviation of the outline's place in each stretch."""
@@ -125,22 +130,26 @@ def uncertainty(
     pitch_px: float,
     blur_px: float,
     clipped: float = 0.0,
-    known_table: bool = False,
+    unreached: Sequence[Float64s] | None = None,
 ) -> tuple[RingBounds, ...]:
     """How sure the outline is: each ring by place, and all of them as a whole.
 
-    clipped: share of the witnesses beside which walls are at full scale. known_table: walls are what differs from a
-    table that was taught, so that nothing of it passes for one.
+    clipped: share of the witnesses beside which walls are at full scale. unreached: of an outline on a table that was
+    taught, so that nothing of it passes for a wall, where none reaches it: along each ring from and to, (K, 2), pixels.
     """
+    gaps: Sequence[Float64s | None] = unreached or [None] * len(rings)
     stretches = [
-        ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, clipped=clipped, known_table=known_table)
-        for ring in rings
+        ring_stretches(*ring, pitch_px=pitch_px, blur_px=blur_px, clipped=clipped, unreached=one)
+        for ring, one in zip(rings, gaps, strict=True)
     ]
-    sigma = [one.sigma(Coefficients()) for one in stretches]
-    whole = max(bound(np.concatenate(sigma), np.concatenate([one.length for one in stretches])), LEAST_PX)
+    causes = Coefficients()
+    sigma = [one.sigma(causes) for one in stretches]
+    corners = [causes.misfit * np.minimum(one.corner, _CAP_PITCHES * pitch_px) for one in stretches]
+    every = np.hypot(np.concatenate(sigma), np.concatenate(corners))
+    whole = max(bound(every, np.concatenate([one.length for one in stretches])), LEAST_PX)
     found = []
     for (evidence, fitted), deviation, stretch in zip(rings, sigma, stretches, strict=True):
-        own = np.maximum(_NORMAL * deviation, whole) + _BEYOND * stretch.inside
+        own = np.maximum(_NORMAL * deviation, whole) + _BEYOND * np.maximum(stretch.inside, stretch.corner)
         places = evidence.points[_on_line(evidence, fitted)]
         # A witness lies between two stretches.
         found.append(RingBounds(whole, places, np.maximum(own, rolled(own, 1))))
@@ -168,9 +177,12 @@ def ring_stretches(
     pitch_px: float,
     blur_px: float,
     clipped: float = 0.0,
-    known_table: bool = False,
+    unreached: Float64s | None = None,
 ) -> Stretches:
-    """The stretches of one ring and the causes of error in each."""
+    """The stretches of one ring and the causes of error in each.
+
+    Where walls are seen to reach the outline, ends of others within it are no edge.
+    """
     on_line = _on_line(evidence, fitted)
     position = evidence.position[on_line]
     coarse = evidence.coarse
@@ -178,8 +190,14 @@ def ring_stretches(
     length = np.maximum(np.diff(position, append=position[0] + around), 0.0)
     leverage = _leverage(evidence, fitted, np.mod(position + 0.5 * length, around), around)
     residual = np.clip(fitted.residual, -_CAP_PITCHES * pitch_px, _CAP_PITCHES * pitch_px)
-    blunt = _blunt_corners(evidence, fitted, on_line, pitch_px, blur_px if known_table else None)
-    together = np.maximum(_largest_between(np.abs(_middle_of_five(residual)), on_line), blunt)
+    blunt = _blunt_corners(evidence, fitted, on_line, pitch_px, None if unreached is None else blur_px)
+    together, corner = _largest_between(np.abs(_middle_of_five(residual)), on_line), np.zeros(len(length))
+    inside = _inside(evidence, fitted, on_line, _CAP_PITCHES * pitch_px)
+    if unreached is None:
+        together = np.maximum(together, blunt)
+    else:
+        free = _within(evidence, fitted, on_line, unreached)
+        together, inside, corner = np.where(free, together, 0.0), np.where(free, inside, 0.0), blunt
     left_out = ~fitted.inlier & (evidence.kind != WitnessKind.OUTERMOST)
     return Stretches(
         length=length,
@@ -189,8 +207,20 @@ def ring_stretches(
         gap=np.maximum(length - pitch_px, 0.0),
         misfit=np.sqrt(np.maximum(together**2 - (_OF_SCATTER * fitted.spread_px) ** 2, 0.0)),
         outside=_largest_between(np.where(left_out, np.maximum(residual, 0.0), 0.0), on_line),
-        inside=_inside(evidence, fitted, on_line, _CAP_PITCHES * pitch_px),
+        inside=inside,
+        corner=corner,
     )
+
+
+def _within(evidence: RingEvidence, fitted: FittedRing, on_line: Indices, parts: Float64s) -> Bools:
+    """Which stretches share a place with parts of the fitted ring, from and to along it, (K, 2), shape (S,)."""
+    lengths = RingLengths.of(fitted.ring)
+    start = lengths.feet(evidence.points[on_line])
+    long = (rolled(start, -1) - start) % lengths.length
+    first, wide = parts[:, 0], parts[:, 1] - parts[:, 0]
+    before = (first - start[:, None]) % lengths.length < long[:, None]
+    behind = (start[:, None] - first) % lengths.length < wide
+    return np.asarray((before | behind).any(axis=1))
 
 
 def _inside(evidence: RingEvidence, fitted: FittedRing, on_line: Indices, deepest_px: float) -> Float64s:
@@ -242,7 +272,8 @@ def _blunt_corners(
 
     Between the witnesses on both sides of an obtuse corner others may lie inside of it and be left out as broken walls:
     they are those of a round corner. An arc that leaves both lines at a distance a from a corner that turns by t passes
-    it by a tan(t / 4). Where it is known within how many pixels walls are seen, none leaves any of them outside.
+    it by a tan(t / 4). Where it is known within how many pixels walls are seen, none leaves any of them outside, nor an
+    end that the outline was laid through.
     """
     found = np.zeros(len(on_line))
     ring = fitted.ring
@@ -255,6 +286,8 @@ def _blunt_corners(
         return found
     feet = lengths.feet(evidence.points)
     inside = np.where(fitted.inlier, 0.0, -fitted.residual)
+    known = np.concatenate([evidence.walls.points, evidence.points[fitted.inlier]])
+    most = _CAP_PITCHES if walls_within_px is None else _WIDEST_PITCHES
     for corner in corners.tolist():
         ahead = (feet - lengths.starts[corner]) % lengths.length
         after, before = on_line[ahead[on_line].argmin()], on_line[ahead[on_line].argmax()]
@@ -268,12 +301,12 @@ def _blunt_corners(
                     continue
                 inwards = heading[corner] / abs(heading[corner]) - heading[corner - 1] / abs(heading[corner - 1])
                 inwards /= abs(inwards)
-                off = evidence.walls.points - ring[corner]
+                off = known - ring[corner]
                 walls = (off[:, 0] + 1j * off[:, 1]) * inwards.conjugate() + walls_within_px
                 leaves = min(leaves, _farthest_around(walls, float(turn[corner])))
             passed = leaves * math.tan(abs(turn[corner]) / 4.0)
             stretch = int(np.searchsorted(on_line, before))
-            found[stretch] = max(found[stretch], min(passed, _CAP_PITCHES * pitch_px))
+            found[stretch] = max(found[stretch], min(passed, most * pitch_px))
     return found
 
 

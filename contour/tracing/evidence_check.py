@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from contour.errors import NoBlockFound
@@ -10,6 +12,7 @@ from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside, nearest
+from contour.relief.reach import Reach
 from contour.relief.relief import Relief
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
@@ -24,7 +27,9 @@ _DEEP_PITCHES, _FAR_PITCHES, _NEAR_PITCHES = 0.6, 1.0, 0.25
 _CORNER, _TURN_PITCHES = np.radians(35.0), 0.5
 # What stands out of a known table as walls do, and as far along, is one: of 288 outlines one leaves such outside, off
 # by 0.58 of a cell. Beside right ones lie streaks, 0.7 as high as walls at most, and specks, 0.4 pitches long.
-_OUTSIDE_PITCHES, _FAR_OUT_PITCHES, _LONG_PITCHES, _LIKE_WALLS = 0.2, 0.3, 0.5, 0.75
+# More than a cell's side is one also where it is fainter: a curve was cut off by 0.7 of a cell so.
+_OUTSIDE_PITCHES, _FAR_OUT_PITCHES = 0.2, 0.3
+_LONG_AND_LIKE_WALLS = ((0.5, 0.75), (0.9, 0.4))
 # Neighbours on a wall's boundary are an eighth of a pitch apart, its two sides a wall's width.
 _ONE_WALL_PITCHES = 0.3
 
@@ -116,13 +121,30 @@ def check_against_relief(
     for wall in _pieces(walls[left], _ONE_WALL_PITCHES * pitch_px):
         one = left[wall]
         long = max(float(np.hypot(*(walls[one] - point).T).max()) for point in walls[one])
-        far = outside[one].max() > _FAR_OUT_PITCHES and long > _LONG_PITCHES * pitch_px
-        if far and median(height[one]) > _LIKE_WALLS * usual:
+        high = median(height[one]) / max(usual, 1e-9)
+        like_walls = any(long > least * pitch_px and high > part for least, part in _LONG_AND_LIKE_WALLS)
+        if outside[one].max() > _FAR_OUT_PITCHES and like_walls:
             x, y = walls[one].mean(axis=0)
             raise NoBlockFound(
                 f"no block found: the outline that fits most wall ends leaves a wall outside near ({x:.0f}, {y:.0f}) "
                 "px. Check that nothing lies against the block, and that its edge is in focus"
             )
+
+
+def check_reached(reaches: Sequence[Reach], least_px: float) -> None:
+    """Raise NoBlockFound where an outline leads over a known table, reached by no wall over so many pixels or more.
+
+    For rings of which nothing is hidden.
+    """
+    for one in reaches:
+        for first, last in one.gaps(least_px):
+            if one.plain_between(first, last):
+                x, y = one.lengths.at(np.array([0.5 * (first + last)]))[0]
+                where = f"({x:.0f}, {y:.0f}) px"
+                raise NoBlockFound(
+                    f"no block found: the outline that fits most wall ends leads over the table near {where}, "
+                    "where no wall reaches it. Check that nothing lies against the block, and that its edge is in focus"
+                )
 
 
 def _pieces(points: Float64s, reach_px: float) -> list[Indices]:

@@ -20,6 +20,7 @@ from contour.geometry.rings import Contour
 from contour.material.closed_cells import MaterialEdge, material_edge
 from contour.material.foam import foam_edge
 from contour.outline.uncertainty import uncertainty
+from contour.relief.reach import reach
 from contour.relief.relief import Relief
 from contour.seams.seam import parted_by_seam
 from contour.seams.splice import spliced
@@ -33,7 +34,7 @@ from contour.tracing.edge_kind import (
     may_be_closed,
     tooth_px,
 )
-from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_unseen
+from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_reached, check_unseen
 from contour.tracing.plates import check_sheet, like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
@@ -45,9 +46,11 @@ from contour.walls.wall_mask import wall_mask
 
 # Bounds that are wider than that share of a pitch are refused.
 _SURE_PITCHES = 0.25
-# On a table as light as walls a part known no better than that may be off by half a cell: of 385 outlines it alone
-# holds back two that are, own bounds 0.86 and 1.16 there.
+# On a table as light as walls a part known no better than that may be off by half a cell: of 385 outlines it alone held
+# back two that were, own bounds 0.86 and 1.16 there.
 _GROSS_PITCHES = 0.8
+# On a known table: of 490 right outlines none is reached by no wall over more than 2.1 pitches, which one is.
+_GAP_PITCHES = 2.5
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
 # What of a thing lay inside the block as it was first seen shows once the rest of it is known.
@@ -206,12 +209,13 @@ def _cut(
     # Rings are fitted with the material on their left in pixels; seen in the work frame, whose y runs up, that is
     # clockwise.
     contour = Contour(exterior.ring[::-1].copy(), tuple(hole.ring[::-1].copy() for hole in rings[1:]))
+    reaches = None if relief is None else [reach(relief, one.ring, seen.pitch_px, rectifier) for one in rings]
     bounds = uncertainty(
         [(one.evidence, one.fitted) for one in visible],
         pitch_px=seen.pitch_px,
         blur_px=seen.blur_px,
         clipped=seen.clipped,
-        known_table=seen.known_table,
+        unreached=None if reaches is None else [one.gaps(_GAP_PITCHES * seen.pitch_px) for one in reaches],
     )
     on_stage("trace")
     evidence = tuple(
@@ -222,6 +226,7 @@ def _cut(
     if all(stretch.state == "seen" for stretch in evidence):
         for one in visible:
             check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
+        check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     untold = next(((float(x), float(y)) for one in rings for x, y in one.untold), None)
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
     return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold)

@@ -101,7 +101,7 @@ class BlockEvidence:
     others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
     pixels. comb: what its cells look like. clipped: share of its witnesses beside which light is at full scale. loose:
     walls of small pieces that were told from it, however near they lie, uint8, 255 there, on a grid over the picture.
-    mask: all other walls, on the same grid. known_table: whether walls are what differs from a table that was taught.
+    mask: all other walls, on the same grid.
     """
 
     rings: tuple[RingEvidence, ...]
@@ -118,4 +118,3 @@ class BlockEvidence:
     comb: Comb | None = None
     loose: Bytes | None = None
     mask: Bytes | None = None
-    known_table: bool = False

@@ -130,7 +130,6 @@ def block_evidence(
         # What is told by top and side together is as unsure as light at full scale: half of a height lies elsewhere.
         _clipped(light, np.concatenate([tips.points, sides.points])) if relief is None else 1.0,
         coarse.leaves,
-        known_table=relief is not None,
     )
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from contour.geometry.agreement import distances_to, places_along
+from contour.geometry.ring_lengths import RingLengths
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.uncertainty import LEAST_PX, Coefficients, bound, ring_stretches, uncertainty
 from contour.tracing.trace import TraceSettings
@@ -46,6 +47,14 @@ def with_two_inside(
     residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
     residual[beside], inlier[beside] = off_pitches * PITCH, False
     return replace(fitted, residual=residual, inlier=inlier)
+
+
+def octagon() -> tuple[NDArray[np.float64], RingEvidence, FittedRing]:
+    """A ring with eight corners, its witnesses, and the fit."""
+    angle = 0.25 * np.pi * np.arange(8)
+    ring = 250.0 * np.column_stack([np.cos(angle), np.sin(angle)]) + np.array([700.0, 500.0])
+    evidence = witnesses(ring, seed=3, sigma=0.05)
+    return ring, evidence, fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
 
 
 def moved(evidence: RingEvidence, scale: float, angle: float) -> RingEvidence:
@@ -192,20 +201,53 @@ def test_a_corner_that_leaves_witnesses_inside_may_be_a_round_one(corners: int, 
         assert seen.misfit.max() == pytest.approx(1.3 * PITCH * np.tan(0.5 * np.pi / corners), rel=0.4)
 
 
+NOWHERE = np.empty((0, 2))
+
+
 @pytest.mark.parametrize(("wall", "known", "passed"), [(0.1, False, 1.0), (0.1, True, 0.3), (1.0, True, 1.0)])
 def test_on_a_known_table_a_round_corner_leaves_no_walls_outside(wall: float, known: bool, passed: float) -> None:
     """Of a wall `wall` pitches from the corner of a block, and of how far the roundest corner passes it."""
-    angle = 0.25 * np.pi * np.arange(8)
-    ring = 250.0 * np.column_stack([np.cos(angle), np.sin(angle)]) + np.array([700.0, 500.0])
-    evidence = witnesses(ring, seed=3, sigma=0.05)
-    fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
+    ring, evidence, fitted = octagon()
     off = with_two_inside(evidence, fitted, ring[1], -0.06)
     inwards = (np.array([700.0, 500.0]) - ring[1]) / 250.0
     seen = replace(evidence, walls=EdgePoints(ring[1] + wall * PITCH * inwards[None]))
     before = ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0).misfit.max()
-    after = ring_stretches(seen, off, pitch_px=PITCH, blur_px=1.0, known_table=known).misfit.max()
+    after = ring_stretches(seen, off, pitch_px=PITCH, blur_px=1.0, unreached=NOWHERE if known else None)
     assert before > 0.2 * PITCH
-    assert after == pytest.approx(before) if passed == 1.0 else after < 0.15 * PITCH < before
+    if passed == 1.0:
+        assert max(after.misfit.max(), after.corner.max()) == pytest.approx(before, rel=0.05)
+    else:
+        assert after.corner.max() < 0.15 * PITCH < before
+
+
+def test_on_a_known_table_a_round_corner_leaves_no_end_outside_and_is_passed_by_no_more_than_it_can_be() -> None:
+    """Of two ends beside a corner, one on the outline tells as much as two."""
+    ring, evidence, fitted = octagon()
+    lengths = RingLengths.of(fitted.ring)
+    ahead = (lengths.feet(evidence.points) - lengths.feet(ring[1:2])) % lengths.length
+    after, before = int(ahead.argmin()), int(ahead.argmax())
+    passed = []
+    for inside in ([after], [after, before]):
+        residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
+        residual[inside], inlier[inside] = -0.06 * PITCH, False
+        off = replace(fitted, residual=residual, inlier=inlier)
+        passed.append(ring_stretches(evidence, off, pitch_px=PITCH, blur_px=0.2, unreached=NOWHERE).corner.max())
+        (sure,) = uncertainty([(evidence, off)], pitch_px=PITCH, blur_px=0.2, unreached=[NOWHERE])
+        assert sure.own_px.max() == pytest.approx(sure.whole_px + 1.1 * passed[-1], rel=0.1)
+    assert 0.0 < passed[0] < 0.75 * passed[1]
+
+
+def test_on_a_known_table_ends_inside_of_what_walls_reach_make_nothing_less_sure() -> None:
+    evidence = witnesses(WIDE, seed=1, sigma=0.05)
+    fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
+    evidence = replace(evidence, kind=np.full_like(evidence.kind, WitnessKind.CLEAN))
+    residual, inlier = fitted.residual.copy(), fitted.inlier.copy()
+    residual[10:14], inlier[10:14] = -0.3 * PITCH, False
+    off = replace(fitted, residual=residual, inlier=inlier)
+    foot = RingLengths.of(fitted.ring).feet(evidence.points[[11, 12]])
+    for unreached, doubted in ((NOWHERE, False), (np.sort(foot)[None], True)):
+        seen = ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0, unreached=unreached)
+        assert bool(seen.misfit.max() > 0.2 * PITCH) == bool(seen.inside.max() > 0.2 * PITCH) == doubted
 
 
 def test_on_a_known_table_ends_deep_in_the_comb_beside_a_notch_say_nothing_of_its_roundness() -> None:
@@ -214,11 +256,8 @@ def test_on_a_known_table_ends_deep_in_the_comb_beside_a_notch_say_nothing_of_it
     evidence = witnesses(notch, seed=3, sigma=0.05)
     fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
     off = with_two_inside(evidence, fitted, notch[3], -0.25)
-    unknown, known = (
-        ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0, known_table=one).misfit.max()
-        for one in (False, True)
-    )
-    assert known < 0.3 < unknown
+    assert ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0).misfit.max() > 0.3
+    assert ring_stretches(evidence, off, pitch_px=PITCH, blur_px=1.0, unreached=NOWHERE).corner.max() == 0.0
 
 
 @given(st.floats(0.1, 3.0), st.integers(1, 40))

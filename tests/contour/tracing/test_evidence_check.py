@@ -136,8 +136,8 @@ def test_an_outline_far_over_the_table_and_far_from_all_it_was_laid_through_is_r
 
 @pytest.mark.parametrize(
     ("long", "height", "refused"),
-    [(0.8, 1.0, True), (0.8, 0.5, False), (0.2, 1.5, False)],
-    ids=["wall", "streak", "dust"],
+    [(0.8, 1.0, True), (0.8, 0.5, False), (1.2, 0.5, True), (1.2, 0.3, False), (0.2, 1.5, False)],
+    ids=["wall", "streak", "faint wall", "long streak", "dust"],
 )
 def test_a_wall_outside_that_stands_out_of_a_known_table_as_walls_do_is_refused(
     long: float, height: float, refused: bool

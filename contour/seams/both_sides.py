@@ -29,6 +29,9 @@ _ORDERLY, _IN_SOME_ORDER = 0.5, 0.35
 # three whose blocks lie alike by chance (0.68 to 0.79); across lines through accepted single blocks, drawn anywhere,
 # 0.62 and more in 599 of 600, 0.54 once. And how often it does across one block at the least: in nine of ten 0.88.
 _OTHER, _SAME = 0.5, 0.82
+# Between parts that their order alone makes of one block it does in 0.49 at the least, where three arms meet; across
+# seams mostly in 0.3 and less.
+_SURELY_OTHER = 0.45
 
 
 def comb_along(light: Bytes, free: Openings, found: Parted) -> bool:
@@ -67,6 +70,11 @@ class Order:
     def other(self) -> bool:
         """Whether cells lie in good order on both sides, and not in the same."""
         return self.own > _ORDERLY and self.across < _OTHER * self.own
+
+    @property
+    def surely_other(self) -> bool:
+        """As `other`, where nothing but the order tells."""
+        return self.other and self.across < _SURELY_OTHER * self.own
 
     @property
     def same(self) -> bool:

@@ -58,8 +58,8 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
         found = parted(free)
         if found is not None and _comb(walls, seen, free, found) and _two(walls, seen, free, found):
             return _smaller(free, found.part, walls.scale)
-        for one in _by_order(free):
-            if cell_order(free, one).other and _comb(walls, seen, free, one):
+        for one in _in_another_order(free):
+            if _comb(walls, seen, free, one):
                 return _smaller(free, one.part, walls.scale)
         if free.long.max(initial=0.0) < LONG:
             return None
@@ -71,12 +71,12 @@ def _comb(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) 
     return comb_along(_light(walls, seen, free), free, found)
 
 
-def _by_order(free: Openings) -> Iterator[Parted]:
-    """Parts between which the order of cells may change."""
+def _in_another_order(free: Openings) -> Iterator[Parted]:
+    """Parts in which cells lie in another order than beyond: along a row of openings, or by the order alone."""
     row = parted_by_row(free)
-    if row is not None:
+    if row is not None and cell_order(free, row).other:
         yield row
-    yield from parted_by_order(free)
+    yield from (one for one in parted_by_order(free) if cell_order(free, one).surely_other)
 
 
 def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:

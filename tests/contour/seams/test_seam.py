@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -21,6 +23,8 @@ from contour.walls.lightness import wall_light
 from contour.walls.pieces import Piece
 from contour.walls.see_block import see_walls
 from tests.support.scenes.edge_scenes import BLOCK, CELLS, LONG, PLAIN, WIDE, at, patch
+
+SAMPLES = Path(__file__).parents[3] / "service" / "samples"
 
 OTHER = replace(CELLS, ribbon_deg=40.0, offset_mm=(3.0, 4.0))
 
@@ -62,7 +66,7 @@ def test_two_halves_that_lie_as_they_were_cut_are_two() -> None:
     assert seam_in(halves(0.3, CELLS)) is not None
 
 
-@pytest.mark.parametrize(("turn_deg", "pitch_mm"), [(25.0, 12.0), (25.0, 8.0), (10.0, 12.0)])
+@pytest.mark.parametrize(("turn_deg", "pitch_mm"), [(25.0, 12.0), (25.0, 8.0)])
 def test_blocks_that_touch_along_a_curve_are_told_by_the_order_of_their_cells(turn_deg: float, pitch_mm: float) -> None:
     x = np.linspace(-0.5 * LONG, 0.5 * LONG, 60)
     y = 10.0 * np.cos(5.0 * x / LONG) - 0.5 * WIDE
@@ -102,6 +106,12 @@ SINGLE: dict[str, Scene] = {
 @pytest.mark.parametrize("name", SINGLE)
 def test_one_block_is_one(name: str) -> None:
     assert seam_in(SINGLE[name]) is None
+
+
+def test_a_block_of_three_arms_is_one() -> None:
+    """Few cells lie around where two arms meet, and fewer of their neighbours' are whole."""
+    picture = np.asarray(cv2.imread(str(SAMPLES / "3-u-shape.jpg"), cv2.IMREAD_UNCHANGED), np.uint8)
+    assert trace(picture, TraceSettings(method="wall-tips")).parted is None
 
 
 def test_blocks_that_lie_against_each_other_are_refused_and_shown_unless_the_recipe_judges_no_outline() -> None:

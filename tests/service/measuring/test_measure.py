@@ -62,9 +62,9 @@ def test_a_step_above_twice_the_core_is_logged_once_a_recipe(
     followed = Recipe(number=1, name="a", method="sliding-matrix", parameters={"step_px": 25})  # the core is 10
     given = Recipe(number=2, name="b", method="sliding-matrix", parameters={"step_px": 25, "core_px": 12})
     sound = Recipe(number=3, name="c", method="sliding-matrix", parameters={"step_px": 24, "core_px": 12})
-    measurer = Measurer(None)
+    measurer, part = Measurer(None), np.ascontiguousarray(rendered.picture[400:800, 500:1000])
     for recipe in (followed, given, sound, followed, given):
-        measurer.measure(rendered.picture, recipe, THICKNESS_MM)
+        measurer.measure(part, recipe, THICKNESS_MM)
     assert [record.getMessage().split(":")[0] for record in caplog.records] == ["recipe 1", "recipe 2"]
     assert "step_px is 25, expected up to 24, twice core_px" in caplog.text
 

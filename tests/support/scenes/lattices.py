@@ -140,12 +140,21 @@ def _pattern(
             gap = 0.5 - np.maximum.reduce(across)
     into = 0.5 * wall - np.asarray(gap, np.float32) * pitch
     number = (np.rint(i) * 8192 + np.rint(j)).astype(np.int64)
-    _, index = np.unique(number, return_inverse=True)
-    index = index.reshape(number.shape)
+    index = _ranked(number)
     count = np.maximum(np.bincount(index.ravel()), 1)
     centre_x = (np.bincount(index.ravel(), x.ravel()) / count).astype(np.float32)
     centre_y = (np.bincount(index.ravel(), y.ravel()) / count).astype(np.float32)
     return into.astype(np.float32), index, (centre_x, centre_y)
+
+
+def _ranked(number: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Which of all numbers in order each is, as NumPy tells of unique ones by sorting them all."""
+    number = number - number.min()
+    if number.max() > number.size:
+        return np.unique(number, return_inverse=True)[1].reshape(number.shape)
+    there = np.zeros(int(number.max()) + 1, np.bool_)
+    there[number] = True
+    return np.asarray((np.cumsum(there) - 1)[number], np.int64)
 
 
 def _nearest_hex(u: Floats, v: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -8,6 +8,7 @@ through wall ends describes it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -67,7 +68,7 @@ class Apart:
     region: Bytes
     wall_px: float
 
-    @property
+    @cached_property
     def openings(self) -> Bytes:
         """Where the region shows the table, (H, W), 1 or 0: holes, and cells whose floor is as light as it."""
         return ((self.region > 0) & (self.difference <= self.level)).astype(np.uint8)

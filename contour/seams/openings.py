@@ -71,8 +71,12 @@ class Openings:
 
     def met(self, aim: Float64s, number: Int32s) -> Bools:
         """Whether the opening in which a place lies, (..., 2), is a cell and has its middle there, (...)."""
+        return np.asarray(self.cells[number] & self._centred(aim, number, self.pitch))
+
+    def _centred(self, aim: Float64s, number: Int32s, pitch: float | Float64s) -> Bools:
+        """Whether an opening has its middle, within a share of the pitch, at a place, (..., 2), shape (...)."""
         off = aim - self.centre[number]
-        return np.asarray(self.cells[number] & (np.hypot(off[..., 0], off[..., 1]) < _MET * self.pitch))
+        return np.asarray(np.hypot(off[..., 0], off[..., 1]) < _MET * pitch)
 
     @cached_property
     def orderly(self) -> Float64s:
@@ -91,8 +95,7 @@ class Openings:
         far = np.hypot(step[..., 0], step[..., 1]) / pitch
         opposite, inside = self.at(middle - step)
         seen = inside & cells[beside] & (far > NEIGHBOURS[0]) & (far < NEIGHBOURS[1])
-        off = middle - step - self.centre[opposite]
-        both = seen & cells[opposite] & (np.hypot(off[..., 0], off[..., 1]) < _MET * pitch)
+        both = seen & cells[opposite] & self._centred(middle - step, opposite, pitch)
         count = np.count_nonzero(seen, axis=1)
         orderly = (count >= _FEWEST) & (np.count_nonzero(both, axis=1) > _OPPOSITE * count)
         return np.asarray(middle[orderly, 0])

@@ -89,9 +89,7 @@ def parted_strip(free: Openings) -> Parted | None:
             cells[[0, number]] = False
             few = np.count_nonzero(strip) < _STRIP_SHARE * np.count_nonzero(block)
             if few and np.count_nonzero(cells) >= _STRIP_CELLS:
-                shape = free.numbers.shape
-                away = _away(barrier == 0) / np.float32(pitch)
-                return Parted(1.0, enlarged(strip, every, shape), enlarged(away, every, shape))
+                return _parted(free, every, 1.0, strip, barrier == 0)
     return None
 
 
@@ -177,38 +175,40 @@ def _beside(free: Openings, share: float, start: Float64s, stop: Float64s) -> Pa
     part = next(_pieces((depth > OPENED) & off_line, _LEAST_PART * np.count_nonzero(depth)), None)
     if part is None:
         return None
-    away, shape = _away(off_line) / np.float32(pitch), free.numbers.shape
-    return Parted(share, enlarged(part, every, shape), enlarged(away, every, shape))
+    return _parted(free, every, share, part, off_line)
 
 
 def _parts(free: Openings) -> Iterator[Parted]:
     """Parts of the block that openings part from the rest of it: long ones alone, and with shorter ones."""
     every = max(1, int(free.pitch / _SAMPLES))
     depth, pitch = free.depth[::every, ::every], free.pitch / every
-    inside, shape = depth > NEAR_OUTLINE, free.numbers.shape
+    inside = depth > NEAR_OUTLINE
     longest, longer = (
         _away(averaged(np.where(free.long >= least, np.uint8(255), np.uint8(0))[free.numbers], every) == 0) / pitch
         for least in (LONG, _SHORT)
     )
     for away in (longest, longer):
         for part, line in _pieces_and_lines(inside & (away > _LINK), inside, _LEAST_PART * np.count_nonzero(depth)):
-            apart = _away(~line) / np.float32(pitch)
-            along = float(np.mean(longest[line] < _BY))
-            yield Parted(along, enlarged(part, every, shape), enlarged(apart, every, shape))
+            yield _parted(free, every, float(np.mean(longest[line] < _BY)), part, ~line)
 
 
 def parted_by_order(free: Openings) -> Iterator[Parted]:
     """Parts of the block that no cells in one order join, be there openings between them or none."""
     every = max(1, int(free.pitch / _SAMPLES))
     depth, pitch = free.depth[::every, ::every], free.pitch / every
-    inside, shape = depth > NEAR_OUTLINE, free.numbers.shape
+    inside = depth > NEAR_OUTLINE
     column, row = np.rint(free.orderly / every).astype(np.intp).T
     middles = np.zeros(depth.shape, np.bool_)
     middles[np.minimum(row, depth.shape[0] - 1), np.minimum(column, depth.shape[1] - 1)] = True
     near = inside & (_away(~middles) < _IN_ORDER * pitch)
     for part, line in _pieces_and_lines(_away(near) > _NECK * pitch, inside, _LEAST_IN_ORDER * pitch**2):
-        apart = _away(~line) / np.float32(pitch)
-        yield Parted(0.0, enlarged(part, every, shape), enlarged(apart, every, shape))
+        yield _parted(free, every, 0.0, part, ~line)
+
+
+def _parted(free: Openings, every: int, along: float, part: Bools, off_line: Bools) -> Parted:
+    """A part and what is not the line around it, on every so manieth sample, (h, w) both, on all."""
+    away, shape = _away(off_line) / np.float32(free.pitch / every), free.numbers.shape
+    return Parted(along, enlarged(part, every, shape), enlarged(away, every, shape))
 
 
 def _pieces_and_lines(rest: Bools, inside: Bools, least: float) -> Iterator[tuple[Bools, Bools]]:

@@ -14,8 +14,7 @@ from contour.geometry.rings import densified
 from contour.geometry.segments import BoxTree, distances_to_ring, distances_to_tree
 from contour.image.opencv import fewer_vertices
 from contour.material.closed_cells import MaterialEdge, closed_along
-from contour.tracing.edge_kind import side_px, sure_ends
-from contour.walls.wall_ends import ring_tips
+from contour.tracing.edge_kind import border_tips, side_px, sure_ends
 from contour.walls.wall_evidence import BlockEvidence
 
 # Ends of walls and corners of cells lie within this of the line they were cut along, and nothing stands out of it.
@@ -43,8 +42,8 @@ _DIFFER_PX, _OPENING_PX, _ALONG_PX = 3.0, 1.0, 0.5
 _FEWEST_OPENINGS, _FEWEST_GROWING, _STEADY = 4, 5, 0.25
 # Closed cells that touch the line have walls as thick as each other there, within 1.2 px (of 23 rows with openings as
 # deep as a cut's), whatever their openings are like; a saw leaves less and less of them, or little of one and much of
-# the next. What touches it over a pixel or two is no wall's side, nor is a wall's end
-# at a corner, which another cut left.
+# the next. What touches it over a pixel or two is no wall's side, nor is a wall's end at a corner, which another cut
+# left.
 _FEWEST_WALLS, _THICKER, _THICKER_PX, _GROWING, _GROWING_PX = 3, 0.5, 2.0, 0.2, 0.75
 _THICKEST, _WALL_PX, _SIDE, _DEEP_THIN = 0.5, 3.0, 0.35, 0.33
 # A closed sheet has no openings along its edges (none of 80), so that two tell of a cut, also of a short one.
@@ -78,7 +77,7 @@ def with_cuts(material: MaterialEdge, seen: BlockEvidence, touched: list[Float64
 
 def _to_walls(cuts: Float64s, material: MaterialEdge, seen: BlockEvidence) -> Float64s:
     """Cuts, (N, 2, 2), and from the ends of walls that stop short of them, as blur moves ends, to them, (M, 2, 2)."""
-    tips = np.concatenate([ring_tips(ring, seen.pitch_px, seen.wall_px) for ring in material.border])
+    tips = border_tips(material, seen)
     short = []
     for start, end in cuts:
         step = end - start
@@ -99,9 +98,7 @@ def touched_cuts(
     They need no ends of walls: where walls meet a saw at a slant, none is seen to end. A closed border that runs along
     rows of cells is touched as often, but its openings are alike; along other directions it is touched more seldom.
     """
-    near = _NEAR_PX + _NEAR_PITCHES * pitch_px
-    border = np.concatenate([densified(ring, 0.5) for ring in material.border])
-    corners = _hull(border, near)
+    border, corners, near = _border(material, pitch_px)
     least = near + _OPENING_PX if alike else max(_OPENING * pitch_px, near + _OPENING_PX)
     cuts = []
     for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
@@ -201,9 +198,7 @@ def straight_cuts(
     normals: unit vectors outwards at each end, (N, 2). A line that material stands out of is no cut, and a cut ends
     where nothing touches it for `open_px` pixels.
     """
-    border = np.concatenate([densified(ring, 0.5) for ring in material.border])
-    near = _NEAR_PX + _NEAR_PITCHES * pitch_px
-    corners = _hull(border, near)
+    border, corners, near = _border(material, pitch_px)
     lines: list[Float64s] = []
     while len(ends) >= (_FEWEST_MORE if lines else _FEWEST_ENDS):
         line = _line(ends, normals, near, _LEAST_APART_PITCHES * pitch_px)
@@ -251,9 +246,13 @@ def _line(ends: Float64s, normals: Float64s, near: float, apart: float) -> _Line
     return _Line(middle, along, outwards * out, on_it)
 
 
-def _hull(border: Float64s, near: float) -> Float64s:
-    """Corners of the convex hull of a border, (N, 2), but for those within `near` of straight, (M, 2)."""
-    return fewer_vertices(cv2.convexHull(border.astype(np.float32))[:, 0].astype(np.float64), near)
+def _border(material: MaterialEdge, pitch_px: float) -> tuple[Float64s, Float64s, float]:
+    """Material's border, half a pixel apart, (N, 2), corners of its convex hull, (M, 2), and how near to a line is on
+    it, which corners stand out farther than; pixels.
+    """
+    near = _NEAR_PX + _NEAR_PITCHES * pitch_px
+    border = np.concatenate([densified(ring, 0.5) for ring in material.border])
+    return border, fewer_vertices(cv2.convexHull(border.astype(np.float32))[:, 0].astype(np.float64), near), near
 
 
 def _along_hull(corners: Float64s, ends: Float64s, line: _Line, near: float) -> _Line:

@@ -71,13 +71,18 @@ def edge_kind(material: MaterialEdge, seen: BlockEvidence, cuts: Sequence[Float6
 
 def sure_ends(material: MaterialEdge, ring: RingEvidence, seen: BlockEvidence) -> Bools:
     """Which witnesses of a ring are ends of walls at the edge of material, too, shape (N,)."""
-    tips = np.concatenate([ring_tips(one, seen.pitch_px, seen.wall_px) for one in material.border])
+    tips = border_tips(material, seen)
     if _triangular(seen) or seen.pitch_px < FINE_PITCH_PX:
         radii = _THIN_RADII if _triangular(seen) else _THIN_FINE_RADII
         tips = tips[thin(material.apart.region, tips, seen.wall_px, radii)]
     if not len(tips):
         return np.zeros(len(ring.points), np.bool_)
     return (ring.kind <= WitnessKind.BLUNT) & (nearest(ring.points, tips) < _SAME_PITCHES * seen.pitch_px)
+
+
+def border_tips(material: MaterialEdge, seen: BlockEvidence) -> Float64s:
+    """The ends of walls that stand out of material, pixels, (N, 2)."""
+    return np.concatenate([ring_tips(ring, seen.pitch_px, seen.wall_px) for ring in material.border])
 
 
 def side_px(seen: BlockEvidence) -> float:

@@ -12,7 +12,7 @@ from contour.geometry.rings import Contour
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
 from service.reasons import Reason
-from tests.support.scenes.lattices import Border, Cells, lattice
+from tests.support.scenes.lattices import Border, Cells, Lattice, lattice
 
 TABLE, SHEET = 60, 200
 PITCH, RADIUS = 30, 8
@@ -33,6 +33,14 @@ def dotted(dot: int, *, square: bool = False) -> Bytes:
     return np.clip(cv2.GaussianBlur(picture, (0, 0), 0.8) + noise, 0, 255).astype(np.uint8)
 
 
+def assert_traced(one: Lattice, edge: str, *, within: float) -> None:
+    """It is accepted, its border told, and its outline nowhere off by so many pitches."""
+    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
+    assert (found.reasons, found.edge) == ((), edge)
+    assert found.pixels is not None
+    assert agreement(found.pixels, one.outline).hausdorff_px < within * one.pitch_px
+
+
 def test_a_sheet_whose_round_holes_show_the_table_is_traced() -> None:
     found = Measurer(None).measure(dotted(TABLE - 10), PlainRecipe(), 0.0)
     assert (found.reasons, found.edge) == ((), "cells")
@@ -43,11 +51,7 @@ def test_a_sheet_whose_round_holes_show_the_table_is_traced() -> None:
 
 @pytest.mark.parametrize("seed", [1222006, 1222045])
 def test_a_dozen_large_holes_in_a_wide_rim_make_a_sheet(seed: int) -> None:
-    one = lattice(seed, "round", "closed")
-    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
-    assert (found.reasons, found.edge) == ((), "cells")
-    assert found.pixels is not None
-    assert agreement(found.pixels, one.outline).hausdorff_px < 0.15 * one.pitch_px
+    assert_traced(lattice(seed, "round", "closed"), "cells", within=0.15)
 
 
 @pytest.mark.parametrize("seed", [1224003, 1240010], ids=["material left out", "beside its edge"])
@@ -106,20 +110,12 @@ def test_a_sheet_that_was_cut_through_its_holes_is_traced_along_that(seed: int, 
 
 @pytest.mark.parametrize("seed", [1051403, 1092044, 1092049], ids=["many", "two holes", "slivers of three"])
 def test_a_cut_that_opens_holes_by_little_is_seen_by_what_touches_its_line(seed: int) -> None:
-    one = lattice(seed, "round", "mixed")
-    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
-    assert (found.reasons, found.edge) == ((), "mixed")
-    assert found.pixels is not None
-    assert agreement(found.pixels, one.outline).hausdorff_px < 0.15 * one.pitch_px
+    assert_traced(lattice(seed, "round", "mixed"), "mixed", within=0.15)
 
 
 @pytest.mark.parametrize("seed", [1051003, 1051005, 1051006])
 def test_webs_that_do_not_end_as_walls_do_are_no_closed_border(seed: int) -> None:
-    one = lattice(seed, "round", "mixed")
-    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
-    assert (found.reasons, found.edge) == ((), "mixed")
-    assert found.pixels is not None
-    assert agreement(found.pixels, one.outline).hausdorff_px < 0.3 * one.pitch_px
+    assert_traced(lattice(seed, "round", "mixed"), "mixed", within=0.3)
 
 
 @pytest.mark.parametrize(
@@ -133,8 +129,4 @@ def test_cells_are_no_round_holes(seed: int, cells: Cells) -> None:
 
 
 def test_ends_of_walls_are_asked_where_holes_are_too_small_to_tell() -> None:
-    one = lattice(1051303, "hexagonal", "mixed")
-    found = Measurer(None).measure(one.picture, PlainRecipe(), 0.0)
-    assert (found.reasons, found.edge) == ((), "mixed")
-    assert found.pixels is not None
-    assert agreement(found.pixels, one.outline).hausdorff_px < 0.3 * one.pitch_px
+    assert_traced(lattice(1051303, "hexagonal", "mixed"), "mixed", within=0.3)

@@ -187,5 +187,5 @@ class CommissionEndpoints:
                 await asyncio.to_thread(self._bench.session.save)
         except StepRefused as refused:
             faults[action.step] = str(refused)
-        self._running, self._bench.progress = None, ""
         await self._commands.note_result(note, result)
+        self._running, self._bench.progress = None, ""

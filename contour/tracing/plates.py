@@ -16,7 +16,7 @@ from contour.image.opencv import closed_by_disc, median_where, pieces_and_middle
 from contour.material.closed_cells import MaterialEdge, closed_along
 from contour.tracing.cut_lines import straight_cuts, touched_cuts
 from contour.tracing.trace import Edge
-from contour.walls.comb_likeness import FINE_PITCH_PX, WIDER_PX, WIDEST_FINE, Comb
+from contour.walls.comb_likeness import FINE_PITCH_PX, WIDER_PX, WIDEST_FINE, Comb, circled
 
 # Webs of a sheet are wider than most walls; its holes are orderly.
 _LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID = 0.2, 0.4, 0.93
@@ -26,6 +26,8 @@ _NARROW_WEB, _FEW_ORDER = 0.12, 0.2
 # And round: of the circle around it a hole of a dozen pixels and more fills 0.88 at least, a hexagon 0.86 at most. Of
 # smaller ones that cannot be told; squares and drawn-out cells fill 0.72 at most, round ones 0.8 at least.
 _ROUND, _MAYBE_ROUND, _FINE_HOLE_PX = 0.87, 0.76, 12.0
+# Those among which the scale was read, as they are, may fill less by this; of combs there the most is 0.85.
+_AS_SCALE_READS = 0.015
 # Of what the sheet differs from the table by, what its holes do: they are in shadow. Ink differs from most tables.
 _LIKE_TABLE = 0.45
 # A disc of so many pitches' radius does not get into a hole that was cut open by less than most of it.
@@ -55,8 +57,10 @@ def like_plate(comb: Comb | None) -> tuple[bool, bool]:
     # Webs of fine cells are not told from walls, which look wider than they are, unless no wall is as wide.
     web = (comb.wall_px - WIDER_PX) / comb.pitch_px
     wide = web > (_LEAST_WEB if comb.pitch_px > FINE_PITCH_PX else WIDEST_FINE) and comb.order > _LEAST_ORDER
-    seen_round = comb.pitch_px - comb.wall_px > _FINE_HOLE_PX
-    return wide or (seen_round and web > _NARROW_WEB and comb.order > _FEW_ORDER), wide
+    large = comb.pitch_px - comb.wall_px > _FINE_HOLE_PX
+    if comb.circled < (_ROUND if large else _MAYBE_ROUND) - _AS_SCALE_READS:
+        return False, wide
+    return wide or (large and web > _NARROW_WEB and comb.order > _FEW_ORDER), wide
 
 
 def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | None, Edge] | None:
@@ -128,15 +132,13 @@ def _holes(material: MaterialEdge) -> _Holes | None:
         left, top, wide, high, size = stats[number].tolist()
         one = labels[top : top + high, left : left + wide] == number
         outline, _ = cv2.findContours(one.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        _, radius = cv2.minEnclosingCircle(outline[0])
         shade = quantile(apart.difference[top : top + high, left : left + wide][one], 0.3)
-        # The circle runs through the centres of the outermost pixels.
-        figures.append((size / (np.pi * (radius + 0.5) ** 2), shade))
+        figures.append((circled(size, outline[0]), shade))
     sheet = 2.0 * median_where(apart.level, (apart.region > 0) & (holes == 0))
     away = np.hypot(*(middles[sampled, None] - middles[large]).T)
     pitch_px = median(np.sort(away, axis=0)[1])
-    circled, shade = medians(np.array(figures), axis=0).tolist()
-    return _Holes(pitch_px, diameter_px, circled, shade / max(sheet, 1.0))
+    filled, shade = medians(np.array(figures), axis=0).tolist()
+    return _Holes(pitch_px, diameter_px, filled, shade / max(sheet, 1.0))
 
 
 def _outermost(material: MaterialEdge, corners: Float64s, normals: Float64s, radius: float) -> Float64s:

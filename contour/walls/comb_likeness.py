@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Float64s, Indices, Int32s, median
+from contour.geometry.arrays import Bools, Float64s, Indices, Int32s, medians
 
 # Walls look wider by about this, and, where blur is wider than that, by it: its full width at half maximum over its
 # standard deviation.
@@ -43,9 +43,9 @@ class Comb:
     """Cells as they were seen: pitch and wall width in pixels, whether walls are bright, the cells counted in the part
     that was looked at, how good a comb they make (0 to 1), and the share that is regular and fills its place (0 to 1).
 
-    order: share of the cells with neighbours all around, a pitch away. solid: share of its convex hull that a cell
-    fills, the median. triangular: whether its neighbours are those of triangles. plate: whether holes were seen that
-    show the table.
+    order: share of the cells with neighbours all around, a pitch away. solid, circled: shares of its convex hull and of
+    the circle around it that a cell fills, the medians. triangular: whether its neighbours are those of triangles.
+    plate: whether holes were seen that show the table.
     """
 
     pitch_px: float
@@ -56,6 +56,7 @@ class Comb:
     regular: float
     order: float = 1.0
     solid: float = 1.0
+    circled: float = 1.0
     triangular: bool = False
     plate: bool = False
 
@@ -143,8 +144,8 @@ def _among_triangles(square: Float64s) -> Bools:
     return np.asarray(even & (far[:, 0] > _EVEN * near[:, -1]))
 
 
-def solidity(labels: Int32s, numbers: Indices, stats: Int32s) -> float:
-    """Median share of their convex hull that the pieces of these numbers fill, 0 to 1."""
+def filled_shares(labels: Int32s, numbers: Indices, stats: Int32s) -> tuple[float, float]:
+    """Median shares of their convex hull and of the circle around them that pieces fill, by their numbers, 0 to 1."""
     shares = []
     for number in numbers[_spread(len(numbers))]:
         left, top, wide, high, area = stats[number].tolist()
@@ -152,8 +153,17 @@ def solidity(labels: Int32s, numbers: Indices, stats: Int32s) -> float:
         outlines, _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
         hull = cv2.convexHull(outlines[0])
         # Pixels have an area, the polygon through their centres lacks half of its boundary and one more.
-        shares.append(area / (cv2.contourArea(hull) + 0.5 * cv2.arcLength(hull, True) + 1.0))
-    return median(np.array(shares))
+        convex = cv2.contourArea(hull) + 0.5 * cv2.arcLength(hull, True) + 1.0
+        shares.append((area / convex, circled(area, hull)))
+    solid, round_ = medians(np.array(shares), axis=0).tolist()
+    return solid, round_
+
+
+def circled(area: float, outline: Int32s) -> float:
+    """The share of the circle around a piece of so many pixels that it fills; outline: as OpenCV finds contours."""
+    _, radius = cv2.minEnclosingCircle(outline)
+    # It runs through the centres of the outermost pixels.
+    return float(area / (np.pi * (radius + 0.5) ** 2))
 
 
 def _spread(count: int) -> Indices:

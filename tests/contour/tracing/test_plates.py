@@ -9,6 +9,7 @@ import pytest
 from contour.geometry.agreement import agreement
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour
+from contour.tracing import wall_tips
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
 from service.reasons import Reason
@@ -116,6 +117,15 @@ def test_a_cut_that_opens_holes_by_little_is_seen_by_what_touches_its_line(seed:
 @pytest.mark.parametrize("seed", [1051003, 1051005, 1051006])
 def test_webs_that_do_not_end_as_walls_do_are_no_closed_border(seed: int) -> None:
     assert_traced(lattice(seed, "round", "mixed"), "mixed", within=0.3)
+
+
+@pytest.mark.parametrize("cells", ["hexagonal", "flex"])
+def test_the_material_of_cells_large_enough_to_be_seen_is_not_looked_at(
+    cells: Cells, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It takes as long as all else of a trace."""
+    monkeypatch.setattr(wall_tips, "material_edge", lambda *_: pytest.fail("looked at"))
+    assert not Measurer(None).measure(lattice(1411000, cells, "cut").picture, PlainRecipe(), 0.0).reasons
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from contour.errors import NoBlockFound
 from contour.polygon.polygon import cutting_polygon
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
-from contour.walls.comb_likeness import Comb, lattice_order, solidity, surely_comb, unlike_comb
+from contour.walls.comb_likeness import Comb, filled_shares, lattice_order, surely_comb, unlike_comb
 from tests.support.pictures.small_scenes import block
 
 
@@ -113,9 +113,9 @@ def honeycomb(pitch: float, count: int) -> NDArray[np.float64]:
     return np.column_stack(((column + 0.5 * (row % 2)) * pitch, row * pitch * np.sqrt(3) / 2))
 
 
-def shares(picture: NDArray[np.uint8]) -> float:
+def shares(picture: NDArray[np.uint8]) -> tuple[float, float]:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(picture, connectivity=4, ltype=cv2.CV_32S)
-    return solidity(np.asarray(labels, np.int32), np.arange(1, len(stats)), np.asarray(stats, np.int32))
+    return filled_shares(np.asarray(labels, np.int32), np.arange(1, len(stats)), np.asarray(stats, np.int32))
 
 
 def test_a_honeycombs_inner_cells_have_neighbours_all_around() -> None:
@@ -143,17 +143,30 @@ def test_order_does_not_depend_on_how_many_pieces_the_comb_lies_in() -> None:
     assert lattice_order(two, 20.0)[0] == pytest.approx(lattice_order(one, 20.0)[0], abs=0.1)
 
 
-def test_hexagons_are_solid_and_letters_are_not() -> None:
-    picture = np.zeros((300, 300), np.uint8)
-    for x, y in honeycomb(40.0, 6) + 40.0:
-        cv2.circle(picture, (round(x), round(y)), 15, 255, -1)
+def test_discs_are_solid_and_letters_are_not() -> None:
     letters = np.zeros((300, 600), np.uint8)
     cv2.putText(letters, "CEKSFLTX", (10, 100), cv2.FONT_HERSHEY_DUPLEX, 2.0, 255, 8)
-    assert shares(picture) > 0.93
-    assert shares(letters) < 0.85
+    assert shares(drawn(120))[0] > 0.93
+    assert shares(letters)[0] < 0.85
+
+
+def test_discs_fill_the_circle_around_them_and_hexagons_do_not() -> None:
+    assert shares(drawn(120))[1] > 0.92
+    assert shares(drawn(6))[1] < 0.85
+    assert shares(drawn(4))[1] < 0.72
+
+
+def drawn(corners: int) -> NDArray[np.uint8]:
+    """Polygons where a honeycomb's cells are."""
+    picture = np.zeros((300, 300), np.uint8)
+    angle = np.arange(corners) * 2.0 * np.pi / corners
+    for place in honeycomb(40.0, 6) + 40.0:
+        ring = np.round(place + 15.0 * np.column_stack((np.cos(angle), np.sin(angle))))
+        cv2.fillPoly(picture, [ring.astype(np.int32)], (255,))
+    return picture
 
 
 def test_a_single_pixel_is_solid() -> None:
     picture = np.zeros((9, 9), np.uint8)
     picture[4, 4] = 255
-    assert shares(picture) == pytest.approx(1.0)
+    assert shares(picture)[0] == pytest.approx(1.0)

@@ -34,7 +34,13 @@ from contour.tracing.edge_kind import (
     may_be_closed,
     tooth_px,
 )
-from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_reached, check_unseen
+from contour.tracing.evidence_check import (
+    check_against_evidence,
+    check_against_relief,
+    check_own_ends,
+    check_reached,
+    check_unseen,
+)
 from contour.tracing.plates import check_sheet, like_plate, plate_edge
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
@@ -226,6 +232,7 @@ def _cut(
     if all(stretch.state == "seen" for stretch in evidence):
         for one in visible:
             check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
+            check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     untold = next(((float(x), float(y)) for one in rings for x, y in one.untold), None)
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
 from contour.geometry.rings import densified
+from contour.outline.fit import FittedRing
 from contour.relief.relief import Displacement, Relief
-from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_unseen
+from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_own_ends, check_unseen
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
-from tests.support.pictures.outline_scenes import PITCH, rectangle, witnesses
+from tests.support.pictures.outline_scenes import PITCH, along, rectangle, witnesses
 
 BLOCK = rectangle(900.0, 600.0)
 
@@ -132,6 +133,29 @@ def test_an_outline_far_over_the_table_and_far_from_all_it_was_laid_through_is_r
             check_unseen(seen, BLOCK, on_line, PITCH, None)
     else:
         check_unseen(seen, BLOCK, on_line, PITCH, None)
+
+
+@pytest.mark.parametrize(("own", "refused"), [(0, True), (1, True), (2, False)])
+def test_a_short_edge_that_passes_an_end_inside_needs_more_of_its_own(own: int, refused: bool) -> None:
+    """Between the ends of two others: it goes through these whatever lies between."""
+    ring = rectangle(900.0, 4.0 * PITCH)
+    length = 900.0 + np.array([0.0, 0.9, 1.7, 2.6, 4.0]) * PITCH
+    kept = [0, 4, *range(1, 1 + own)]
+    points, normal = along(ring, np.append(length[kept], 900.0 + 3.3 * PITCH))
+    points[-1] -= 0.3 * PITCH * normal[-1]
+    there = witnesses(ring, seed=3, gaps=((890.0, 910.0 + 4.0 * PITCH),))
+    others = np.flatnonzero((there.position < 890.0) | (there.position > 910.0 + 4.0 * PITCH))
+    seen = there.take(np.append(others, np.zeros(len(points), np.intp)))
+    seen.points[len(others) :] = points
+    seen.kind[len(others) :] = WitnessKind.CLEAN
+    residual = np.zeros(len(seen.points))
+    residual[-1] = -0.3 * PITCH
+    fitted = FittedRing(ring, residual == 0.0, residual, 0.2, 0.0, np.full(4, 0.1), 4, np.empty((0, 2)))
+    if refused:
+        with pytest.raises(NoBlockFound, match=f"with {own} of its own"):
+            check_own_ends(seen, fitted, PITCH, None)
+    else:
+        check_own_ends(seen, fitted, PITCH, None)
 
 
 @pytest.mark.parametrize(

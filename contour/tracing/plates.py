@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes, Float64s, median, medians, quantile
+from contour.geometry.arrays import Bools, Float64s, median, medians, quantile
 from contour.geometry.rings import Ring, densified
 from contour.geometry.segments import distances_to_ring
 from contour.geometry.signed_distance import depth_inside
 from contour.image.opencv import closed_by_disc, median_where, pieces_and_middles
 from contour.material.closed_cells import MaterialEdge, closed_along
-from contour.tracing.cut_lines import straight_cuts, touched_cuts
+from contour.tracing.cut_lines import straight_cuts
+from contour.tracing.touched_edges import touched_cuts
 from contour.tracing.trace import Edge
 from contour.walls.comb_likeness import FINE_PITCH_PX, WIDER_PX, WIDEST_FINE, Comb, circled
 
@@ -30,10 +31,12 @@ _ROUND, _MAYBE_ROUND, _FINE_HOLE_PX = 0.87, 0.76, 12.0
 _AS_SCALE_READS = 0.015
 # Of what the sheet differs from the table by, what its holes do: they are in shadow. Ink differs from most tables.
 _LIKE_TABLE = 0.45
-# A disc of so many pitches' radius does not get into a hole that was cut open by less than most of it.
-# It does not get into an inner corner, either, over 0.04 squares of the pitch.
-_BAY_PITCHES, _LEAST_BAY, _LARGE_BAY = 0.45, 0.06, 0.12
+# A disc of so many pitches' radius does not get into a hole that was cut open by less than most of it. It does not get
+# into an inner corner, either, over 0.04 squares of the pitch. Where holes are large enough, what was one is an arc, of
+# their radius within a quarter; of fine ones a single bay may be the rounded corner of a dent.
+_BAY_PITCHES, _LEAST_BAY, _LEAST_FINE_BAY, _LARGE_BAY = 0.45, 0.02, 0.06, 0.12
 _OF_ONE_BAY = 2
+_ARC_RADII, _ARC_OFF, _ARC_OFF_PX, _MOUTH, _MOUTH_PX, _FEWEST_ARC = 0.25, 0.04, 0.2, 0.1, 2.0, 8
 # Corners of webs are rounded: what stands out farthest of them within so many pitches lies on the cut.
 _ROUND_PITCHES = 0.2
 # Edges of webs run along the cut itself, so near and so straight.
@@ -74,10 +77,9 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
     if holes is None or not holes.round(wide=wide) or holes.shade > _LIKE_TABLE:
         return None
     pitch_px = holes.pitch_px
-    corners, normals = _bays(material.apart.region, _LEAST_BAY, pitch_px)
-    if len(corners) == _OF_ONE_BAY:
-        # It may be the rounded corner of a dent.
-        corners, normals = _bays(material.apart.region, _LARGE_BAY, pitch_px)
+    corners, normals = _bays(material, holes, _LEAST_FINE_BAY if holes.fine else _LEAST_BAY)
+    if len(corners) == _OF_ONE_BAY and holes.fine:
+        corners, normals = _bays(material, holes, _LARGE_BAY)
     if len(corners):
         corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
         lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
@@ -94,7 +96,7 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
         return elsewhere
     cuts = np.array([_along_webs(material.contour.rings, cut) for cut in lines[0]])
     closed = closed_along(material, cuts, pitch_px)
-    return elsewhere if len(_bays(closed.apart.region, _LARGE_BAY, pitch_px)[0]) else (closed, "mixed")
+    return elsewhere if len(_bays(closed, holes, _LARGE_BAY)[0]) else (closed, "mixed")
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,12 @@ class _Holes:
 
     def round(self, *, wide: bool) -> bool:
         """Whether they are round, or may be, as holes too small to tell between `wide` webs."""
-        return self.circled > (_MAYBE_ROUND if wide and self.diameter_px < _FINE_HOLE_PX else _ROUND)
+        return self.circled > (_MAYBE_ROUND if wide and self.fine else _ROUND)
+
+    @property
+    def fine(self) -> bool:
+        """Whether they are too small for their form to be told."""
+        return self.diameter_px < _FINE_HOLE_PX
 
 
 def _holes(material: MaterialEdge) -> _Holes | None:
@@ -184,18 +191,20 @@ def _along_webs(rings: tuple[Ring, ...], cut: Float64s) -> Float64s:
     return cut + np.outer(slope * ((cut - cut[0]) @ along) + offset, across)
 
 
-def _bays(region: Bytes, least: float, pitch_px: float) -> tuple[Float64s, Float64s]:
-    """Corners of the mouths of holes that are open to the table, of `least` squares of the pitch and more, (2 N, 2),
+def _bays(material: MaterialEdge, holes: _Holes, least: float) -> tuple[Float64s, Float64s]:
+    """Corners of the mouths of `holes` that are open to the table, of `least` squares of the pitch and more, (2 N, 2),
     pixels, and unit vectors out of them.
     """
+    pitch_px = holes.pitch_px
     radius = _BAY_PITCHES * pitch_px
     pad = int(radius) + 2
-    wide = np.pad(region, pad)
+    wide = np.pad(material.apart.region, pad)
     closed = closed_by_disc(wide, radius)
     bays = ((closed > 0) & (wide == 0)).astype(np.uint8)
     outside = ((closed == 0) & (wide == 0)).astype(np.uint8)
     by_outside = cv2.dilate(outside, np.ones((3, 3), np.uint8))
     _, labels, stats, middles = cv2.connectedComponentsWithStats(bays, connectivity=4)
+    border = densified(material.contour.exterior, 1.0)
     corners, normals = [], []
     for number in np.flatnonzero(stats[:, cv2.CC_STAT_AREA] > least * pitch_px * pitch_px)[1:]:
         left, top, across, high, _ = stats[number].tolist()
@@ -207,6 +216,31 @@ def _bays(region: Bytes, least: float, pitch_px: float) -> tuple[Float64s, Float
         axis = np.linalg.svd(mouth - mouth.mean(axis=0))[2][0]
         place = (mouth - mouth.mean(axis=0)) @ axis
         out = mouth.mean(axis=0) - middles[number]
-        corners += [mouth[np.argmin(place)] - pad, mouth[np.argmax(place)] - pad]
-        normals += [out / max(float(np.hypot(*out)), 1e-9)] * 2
+        ends = np.array([mouth[np.argmin(place)], mouth[np.argmax(place)]]) - pad
+        if holes.fine or _is_arc(_along(border, labels == number, pad), ends, 0.5 * holes.diameter_px):
+            corners += [*ends]
+            normals += [out / max(float(np.hypot(*out)), 1e-9)] * 2
     return np.array(corners).reshape(-1, 2), np.array(normals).reshape(-1, 2)
+
+
+def _along(border: Float64s, bay: Bools, pad: int) -> Float64s:
+    """The points of a border, (N, 2), that lie beside a bay, whose mask begins `pad` pixels before the picture."""
+    beside = cv2.dilate(bay.astype(np.uint8), np.ones((5, 5), np.uint8))
+    column, row = (np.rint(border) + pad).astype(int).T
+    return np.asarray(border[beside[row, column] > 0])
+
+
+def _is_arc(border: Float64s, mouth: Float64s, radius: float) -> bool:
+    """Whether a bay's border, (N, 2), pixels, is that of a hole of this radius between its mouth's corners, (2, 2)."""
+    off = np.hypot(*(border[:, None] - mouth).transpose(2, 0, 1)).min(axis=1, initial=np.inf)
+    inner = border[off > max(_MOUTH_PX, _MOUTH * radius)]
+    if len(inner) < _FEWEST_ARC:
+        return False
+    from_middle = inner - inner.mean(axis=0)
+    terms = np.column_stack((2.0 * from_middle, np.ones(len(inner))))
+    x, y, rest = np.linalg.lstsq(terms, (from_middle**2).sum(axis=1))[0].tolist()
+    apart = np.hypot(*(from_middle - (x, y)).T)
+    around = float(np.sqrt(max(rest + x * x + y * y, 0.0)))
+    return abs(around - radius) < _ARC_RADII * radius and bool(
+        np.sqrt(np.mean((apart - around) ** 2)) < _ARC_OFF * radius + _ARC_OFF_PX
+    )

@@ -14,7 +14,7 @@ from contour.edge.open_cells import without_open_cells
 from contour.edge.table_look import TableLook, table_look
 from contour.edge.visible_edge import doubtful, visible_rings
 from contour.errors import NoBlockFound, ParameterError
-from contour.geometry.arrays import Bytes
+from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.material.closed_cells import MaterialEdge, material_edge
@@ -24,7 +24,7 @@ from contour.relief.reach import reach
 from contour.relief.relief import Relief
 from contour.seams.seam import parted_by_seam
 from contour.seams.splice import spliced
-from contour.tracing.cut_lines import touched_cuts, with_cuts
+from contour.tracing.cut_lines import stub_cuts, with_cuts
 from contour.tracing.edge_kind import (
     FINE_PITCH_PX,
     check_closed,
@@ -42,6 +42,7 @@ from contour.tracing.evidence_check import (
     check_unseen,
 )
 from contour.tracing.plates import check_sheet, like_plate, plate_edge
+from contour.tracing.touched_edges import touched_cuts
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
@@ -377,7 +378,7 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
         # Webs of a sheet do not end as walls do.
         (found, kind), comb = sheet, replace(comb, plate=True)
     else:
-        touched = [] if kind == "cut" else touched_cuts(material, seen.pitch_px, tooth_px=tooth_px(seen))
+        touched = [] if kind == "cut" else _touched(solid, material, seen)
         kind = "mixed" if touched else kind
         cut = with_cuts(material, seen, touched) if kind == "mixed" else None
         found = material if kind == "cells" else cut
@@ -385,6 +386,13 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
             # It may be cut on all sides, and what few ends are sure lie on others than are touched.
             kind = edge_kind(material, seen, touched)
     return None if found is None else replace(solid.around(found), comb=comb, edge=kind), kind
+
+
+def _touched(solid: _Solid, material: MaterialEdge, seen: BlockEvidence) -> list[Float64s]:
+    """Straight cuts along edges that material touches, or through what is left of walls of a single cell."""
+    teeth = tooth_px(seen)
+    found = touched_cuts(material, seen.pitch_px, tooth_px=teeth, walls=solid.walls, wall_px=seen.wall_px)
+    return found or stub_cuts(material, seen)
 
 
 def _plate(solid: _Solid, seen: BlockEvidence) -> Trace | BlockEvidence | None:

@@ -10,7 +10,8 @@ import numpy as np
 from contour.geometry.arrays import Float64s
 from contour.geometry.rings import Contour
 from contour.material.closed_cells import Apart, MaterialEdge
-from contour.tracing.cut_lines import straight_cuts, touched_cuts
+from contour.tracing.cut_lines import straight_cuts
+from contour.tracing.touched_edges import touched_cuts
 
 PITCH = 60.0
 
@@ -54,6 +55,23 @@ def test_walls_of_different_thickness_were_cut_and_as_thick_ones_were_not() -> N
             difference[y : y + 30, x - 6 : x + 6] = 0
         apart = replace(block.apart, difference=difference, level=np.full_like(difference, 5))
         assert len(touched_cuts(replace(block, apart=apart), PITCH)) == told
+
+
+def test_an_edge_of_cells_floors_was_cut_where_no_wall_runs_along_it() -> None:
+    block = material(np.zeros(8))
+    across, along = np.zeros_like(block.apart.region), np.zeros_like(block.apart.region)
+    across[100:400, 50 :: round(PITCH)] = 255
+    across[100:400, 51 :: round(PITCH)] = 255
+    along[100:106, 50:-50] = 255
+    (cut,) = (
+        cut
+        for cut in touched_cuts(block, PITCH, walls=across, wall_px=5.0)
+        if np.allclose(cut[0, :, 1], 100.0, atol=1.0)
+    )
+    assert abs(cut[0, 1, 0] - cut[0, 0, 0]) > 7.9 * PITCH
+    edges = touched_cuts(block, PITCH, walls=along | across, wall_px=5.0)
+    assert not any(np.allclose(cut[0, :, 1], 100.0, atol=1.0) for cut in edges)
+    assert touched_cuts(block, PITCH) == []
 
 
 def test_a_cut_runs_along_the_hull_that_its_few_ends_lie_on() -> None:

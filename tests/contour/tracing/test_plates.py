@@ -109,7 +109,11 @@ def test_a_sheet_that_was_cut_through_its_holes_is_traced_along_that(seed: int, 
     assert near.holds(found.uncertainty_px)
 
 
-@pytest.mark.parametrize("seed", [1051403, 1092044, 1092049], ids=["many", "two holes", "slivers of three"])
+@pytest.mark.parametrize(
+    "seed",
+    [1051403, 1092044, 1092049, 1400017, 1400043],
+    ids=["many", "two holes", "slivers of three", "one hole", "two small ones, and a dent"],
+)
 def test_a_cut_that_opens_holes_by_little_is_seen_by_what_touches_its_line(seed: int) -> None:
     assert_traced(lattice(seed, "round", "mixed"), "mixed", within=0.15)
 

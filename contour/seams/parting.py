@@ -141,7 +141,7 @@ def parted_by_row(free: Openings) -> Parted | None:
         on = (strip[:, one] == first) | (strip[:, one] == first + 1)
         lines.append(_line(free, place[on], normal[:, one]))
     share, start, stop = max(lines, key=lambda line: line[0])
-    return _beside(free, share, start, stop) if share > _ALONG_SHORT else None
+    return beside(free, share, start, stop) if share > _ALONG_SHORT else None
 
 
 def _line(free: Openings, place: Float64s, normal: Float64s) -> tuple[float, Float64s, Float64s]:
@@ -163,7 +163,7 @@ def _line(free: Openings, place: Float64s, normal: Float64s) -> tuple[float, Flo
     return max(stretches, key=lambda one: one[0], default=(0.0, line[0], line[0]))
 
 
-def _beside(free: Openings, share: float, start: Float64s, stop: Float64s) -> Parted | None:
+def beside(free: Openings, share: float, start: Float64s, stop: Float64s) -> Parted | None:
     """What a line from start to stop, pitches, parts from the rest of the block; None where that is nothing, as between
     a hole and the edge.
     """

@@ -4,7 +4,7 @@ Each has cells of its own, and both were cut, so few walls lead from one to the 
 into each other. Where the blocks do not touch, what is free of walls makes one opening from outline to outline; where
 they do, many short ones in a row, or none: then the order of cells alone tells them apart. Walls that are lost in one
 block leave openings, too, but faint ones lead across, and its cells go on in the same order beyond. Adhesive in a
-splice, compound or ink leave some in which light is not as in comb.
+splice, compound or ink leave some in which light is not as in comb. Where all that is alike, floors of cells may step.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from contour.geometry.arrays import Bools, Bytes
 from contour.image.pixel_grid import averaged, pixels_of
 from contour.seams.both_sides import cell_order, comb_along
+from contour.seams.floors import parted_by_floors
 from contour.seams.openings import Openings, openings
 from contour.seams.parting import (
     LONG,
@@ -49,26 +50,27 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
     coarse = _STEP if seen.wall_px >= 2 * _STEP * walls.scale else 1
     for step in sorted({coarse, 1}, reverse=True):
         free = openings(walls, seen, seen.mask, step)
-        strip = parted_strip(free)
-        if strip is not None and parted_strip(_with_faint(walls, seen, step)) is not None:
-            # Ink hides walls along a line, too; but cells go on in the same order beyond.
-            order = cell_order(free, strip)
-            if order.other or not order.known:
-                return _smaller(free, strip.part, walls.scale)
-        found = parted(free)
-        if found is not None and _comb(walls, seen, free, found) and _two(walls, seen, free, found):
+        found = _other_block(walls, seen, free)
+        if found is not None:
             return _smaller(free, found.part, walls.scale)
-        for one in _in_another_order(free):
-            if _comb(walls, seen, free, one):
-                return _smaller(free, one.part, walls.scale)
         if free.long.max(initial=0.0) < LONG:
             return None
     return None
 
 
-def _comb(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:
-    """Whether light along a line is that of comb."""
-    return comb_along(_light(walls, seen, free), free, found)
+def _other_block(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Parted | None:
+    """The part that is another block, by its openings."""
+    strip = parted_strip(free)
+    if strip is not None and parted_strip(_with_faint(walls, seen, free.step)) is not None:
+        # Ink hides walls along a line, too; but cells go on in the same order beyond.
+        order = cell_order(free, strip)
+        if order.other or not order.known:
+            return strip
+    found, light = parted(free), _light(walls, seen, free)
+    if found is not None and comb_along(light, free, found) and _two(walls, seen, free, found):
+        return found
+    others = (one for one in _in_another_order(free) if comb_along(light, free, one))
+    return next(others, None) or parted_by_floors(light, free)
 
 
 def _in_another_order(free: Openings) -> Iterator[Parted]:

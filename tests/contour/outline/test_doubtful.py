@@ -22,6 +22,15 @@ def test_a_curve_is_told_where_two_lines_would_do_and_lie_elsewhere(seed: int, p
     assert np.hypot(*np.subtract(traced.untold_px, place)) < 2.0 * traced.pitch_px
 
 
+def test_an_arc_whose_ends_a_line_explains_nearly_as_well_and_leads_elsewhere_is_told() -> None:
+    """Along a side of an L that moved, 0.8 of a cell off at its inner corner."""
+    rendered = render(shop_floor_scene("motion", 1_420_045).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+    assert traced.untold_px is not None
+    assert np.hypot(*np.subtract(traced.untold_px, (480.0, 490.0))) < 2.0 * rendered.pitch_px
+
+
 def test_a_curve_is_one_where_two_lines_hardly_turn() -> None:
     assert trace(render(random_scene(1_058_142).scene).picture, TraceSettings()).untold_px is None
 

@@ -23,6 +23,7 @@ from contour.walls.lightness import wall_light
 from contour.walls.pieces import Piece
 from contour.walls.see_block import see_walls
 from tests.support.scenes.edge_scenes import BLOCK, CELLS, LONG, PLAIN, WIDE, at, patch
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"
 
@@ -60,6 +61,15 @@ def test_a_small_block_against_the_edge_of_a_large_one_is_the_part(gap: float) -
     part = seam_in(two(large, small))
     assert part is not None
     assert part.area_px2 == pytest.approx(abs(area(small)) / 0.25, rel=0.2)
+
+
+def test_a_block_whose_floors_are_lighter_is_another_one() -> None:
+    """Neither openings nor the order of cells tell of it."""
+    assert seam_in(shop_floor_scene("pushed_together", 1_420_099).scene) is not None
+
+
+def test_compound_in_some_cells_beside_a_line_makes_no_other_block() -> None:
+    assert seam_in(shop_floor_scene("compound", 1_470_013).scene) is None
 
 
 def test_two_halves_that_lie_as_they_were_cut_are_two() -> None:

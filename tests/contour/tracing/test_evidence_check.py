@@ -58,6 +58,17 @@ def test_four_ends_in_a_row_far_off_on_either_side_are_refused_with_their_place(
         check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
 
 
+@pytest.mark.parametrize(("share", "refused"), [(0.5, True), (0.7, False)])
+def test_an_outline_that_half_of_the_ends_lie_on_is_refused(share: float, refused: bool) -> None:
+    evidence = witnesses(BLOCK, seed=2)
+    on_line = np.random.default_rng(1).permutation(len(evidence.points)) < share * len(evidence.points)
+    if refused:
+        with pytest.raises(NoBlockFound, match=r"ends of walls around \(700, 500\) px only"):
+            check_against_evidence(evidence, BLOCK, on_line, PITCH, None)
+    else:
+        check_against_evidence(evidence, BLOCK, on_line, PITCH, None)
+
+
 def test_three_ends_in_a_row_are_missing_cells() -> None:
     evidence = witnesses(BLOCK, seed=2)
     off = np.isin(np.arange(len(evidence.points)), np.arange(10, 13))

@@ -9,7 +9,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Float64s, median, medians, quantile
-from contour.geometry.rings import Ring, densified
+from contour.geometry.rings import Contour, Ring, densified
 from contour.geometry.segments import distances_to_ring
 from contour.geometry.signed_distance import depth_inside
 from contour.image.opencv import closed_by_disc, median_where, pieces_and_middles
@@ -26,7 +26,7 @@ _LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID = 0.2, 0.4, 0.93
 _NARROW_WEB, _FEW_ORDER = 0.12, 0.2
 # And round: of the circle around it a hole of a dozen pixels and more fills 0.88 at least, a hexagon 0.86 at most. Of
 # smaller ones that cannot be told; squares and drawn-out cells fill 0.72 at most, round ones 0.8 at least.
-_ROUND, _MAYBE_ROUND, _FINE_HOLE_PX = 0.87, 0.76, 12.0
+_ROUND, _MAYBE_ROUND, _FINE_HOLE_PX = 0.866, 0.76, 12.0
 # Those among which the scale was read, as they are, may fill less by this; of combs there the most is 0.85.
 _AS_SCALE_READS = 0.015
 # Of what the sheet differs from the table by, what its holes do: they are in shadow. Ink differs from most tables.
@@ -80,10 +80,13 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
     corners, normals = _bays(material, holes, _LEAST_FINE_BAY if holes.fine else _LEAST_BAY)
     if len(corners) == _OF_ONE_BAY and holes.fine:
         corners, normals = _bays(material, holes, _LARGE_BAY)
+    lines: list[Float64s] = []
     if len(corners):
         corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
         lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
-    else:
+    if len(corners) == _OF_ONE_BAY and lines and not _goes_on(lines[0], corners, pitch_px):
+        corners = corners[:0]
+    if not len(corners):
         # Holes that were opened by less; a closed sheet has no openings.
         lines = touched_cuts(material, pitch_px, alike=True)
         if not lines:
@@ -97,6 +100,14 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
     cuts = np.array([_along_webs(material.contour.rings, cut) for cut in lines[0]])
     closed = closed_along(material, cuts, pitch_px)
     return elsewhere if len(_bays(closed, holes, _LARGE_BAY)[0]) else (closed, "mixed")
+
+
+def _goes_on(cuts: Float64s, mouth: Float64s, pitch_px: float) -> bool:
+    """Whether cuts, (N, 2, 2), go on along the sheet beside the mouth of a bay, by its corners, (2, 2), pixels; through
+    those of a dent's corner they do not.
+    """
+    longest = float(np.hypot(*(cuts[:, 1] - cuts[:, 0]).T).max())
+    return longest > float(np.hypot(*(mouth[1] - mouth[0]))) + pitch_px
 
 
 @dataclass(frozen=True)
@@ -159,15 +170,16 @@ def _outermost(material: MaterialEdge, corners: Float64s, normals: Float64s, rad
     return moved
 
 
-def check_sheet(material: MaterialEdge, outline: Ring, pitch_px: float) -> None:
+def check_sheet(material: MaterialEdge, outline: Contour, pitch_px: float) -> None:
     """Raise NoBlockFound where an outline, pixels, of a sheet that was cut on several sides leaves material out, or an
     edge that material touches at every hole: a sheet shows where it ends between these.
     """
+    border = np.concatenate(material.border)
     cuts = touched_cuts(material, pitch_px, alike=True)
     edges = [densified(edge, pitch_px) for edge in np.concatenate(cuts)] if cuts else []
-    left_out = depth_inside(outline, np.concatenate(material.border)) < -_LEFT_OUT * pitch_px
-    beside = distances_to_ring(np.concatenate(edges), outline) > _BESIDE * pitch_px if edges else np.empty(0)
-    if left_out.any() or beside.any():
+    left_out = [depth_inside(outline.exterior, border), *(-depth_inside(hole, border) for hole in outline.holes)]
+    beside = distances_to_ring(np.concatenate(edges), outline.exterior) > _BESIDE * pitch_px if edges else np.empty(0)
+    if min(depth.min() for depth in left_out) < -_LEFT_OUT * pitch_px or beside.any():
         raise NoBlockFound(
             "no block found: the outline that fits most ends of webs leaves the sheet's edge between them. Check that "
             "nothing lies against the sheet, and the light"

@@ -25,7 +25,7 @@ _FEWEST_OPENINGS, _FEWEST_GROWING, _STEADY = 4, 5, 0.25
 # deep as a cut's), whatever their openings are like; a saw leaves less and less of them, or little of one and much of
 # the next. What touches it over a pixel or two is no wall's side, nor is a wall's end at a corner, which another cut
 # left.
-_FEWEST_WALLS, _THICKER, _THICKER_PX, _GROWING, _GROWING_PX = 3, 0.5, 2.0, 0.2, 0.75
+_FEWEST_WALLS, _THICKER, _THICKER_PX, _GROWING, _GROWING_PX = 3, 0.5, 2.0, 0.2, 1.25
 _THICKEST, _WALL_PX, _SIDE, _DEEP_THIN = 0.5, 3.0, 0.35, 0.33
 # A closed sheet has no openings along its edges (none of 80), so that two tell of a cut, also of a short one.
 _LEAST_LONG_ALIKE, _FEWEST_ALIKE = 2.0, 2
@@ -116,8 +116,9 @@ def _thinned(walls: Float64s) -> bool:
     if len(walls) < _FEWEST_WALLS:
         return False
     place, thick = walls.T
-    usual = median(thick)
-    spread, growth = float(np.ptp(thick)), _growth(place, thick)
+    usual, growth = median(thick), _growth(place, thick)
+    # At a corner another wall runs inwards behind the last one.
+    spread = float(np.ptp(np.append(thick[1:-1], np.minimum(thick[[0, -1]], usual))))
     return spread > max(_THICKER_PX, _THICKER * usual) or growth > max(_GROWING_PX, _GROWING * usual)
 
 

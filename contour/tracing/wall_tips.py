@@ -120,7 +120,7 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
             check_promise(promise, kind, traced=closed is not None)
             found = closed or found
         if plate is not None:
-            check_sheet(solid.edge, found.contour.exterior, seen.pitch_px)
+            check_sheet(solid.edge, found.contour, seen.pitch_px)
         if promise == "auto" and plate is None and kind is None:
             solid.check_fine(seen, found.contour)
         return replace(found, parted=parted_by_seam(walls, seen))

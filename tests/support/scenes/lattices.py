@@ -182,10 +182,11 @@ def _at(field: NDArray[Any], centre: tuple[Floats, Floats]) -> NDArray[Any]:
 def _whole_cells(
     outline: NDArray[np.bool_], number: NDArray[np.int64], centre: tuple[Floats, Floats], wall: float
 ) -> NDArray[np.bool_]:
-    """The cells whose centres lie inside, with the walls around them."""
+    """The cells whose centres lie inside, with the walls around them, and one that these close all around."""
     cells = _at(outline, centre)[number]
     away = cv2.distanceTransform(1 - cells.astype(np.uint8), cv2.DIST_L2, 5) / _FINER
-    return np.asarray(away < 0.5 * wall)
+    body = away < 0.5 * wall
+    return body | _of_a_cell(~body, number)
 
 
 def _half_plane(rng: np.random.Generator, x: Floats, y: Floats) -> NDArray[np.bool_]:
@@ -200,12 +201,17 @@ def _cut_along(body: NDArray[np.bool_], kept: NDArray[np.bool_], number: NDArray
 
     What hangs on by a thread alone falls off.
     """
-    _, labels, stats, _ = cv2.connectedComponentsWithStats((kept & ~body).astype(np.uint8), connectivity=4)
-    bays = stats[:, cv2.CC_STAT_AREA] <= np.bincount(number.ravel()).max()
-    bays[0] = False
-    body = (body & kept) | bays[labels]
+    body = (body & kept) | _of_a_cell(kept & ~body, number)
     threads = cv2.morphologyEx(body.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2 * _FINER, 2 * _FINER), np.uint8)) > 0
     return np.asarray(body & (cv2.dilate(_largest(threads).astype(np.uint8), np.ones((7, 7), np.uint8)) > 0))
+
+
+def _of_a_cell(free: NDArray[np.bool_], number: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """The pieces of what is free that are no larger than a cell."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(free.astype(np.uint8), connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] <= np.bincount(number.ravel()).max()
+    small[0] = False
+    return np.asarray(small[labels])
 
 
 def _largest(body: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -57,6 +57,16 @@ def test_walls_of_different_thickness_were_cut_and_as_thick_ones_were_not() -> N
         assert len(touched_cuts(replace(block, apart=apart), PITCH)) == told
 
 
+def test_the_last_wall_of_a_row_looks_thicker_at_a_corner() -> None:
+    block = material(np.full(6, 28.0))
+    difference = np.full_like(block.apart.region, 9)
+    for number, wall in enumerate((8.0, 8.0, 8.0, 8.0, 20.0)):
+        x, y = round(PITCH * (number + 1)) + 50, round(100.0 + wall)
+        difference[y : y + 30, x - 6 : x + 6] = 0
+    apart = replace(block.apart, difference=difference, level=np.full_like(difference, 5))
+    assert touched_cuts(replace(block, apart=apart), PITCH) == []
+
+
 def test_an_edge_of_cells_floors_was_cut_where_no_wall_runs_along_it() -> None:
     block = material(np.zeros(8))
     across, along = np.zeros_like(block.apart.region), np.zeros_like(block.apart.region)

@@ -118,6 +118,19 @@ def test_a_cut_that_opens_holes_by_little_is_seen_by_what_touches_its_line(seed:
     assert_traced(lattice(seed, "round", "mixed"), "mixed", within=0.15)
 
 
+@pytest.mark.parametrize("seed", [1440004, 1440031], ids=["small holes", "large ones"])
+def test_a_dents_rounded_corner_is_no_hole_that_was_opened(seed: int) -> None:
+    assert_traced(lattice(seed, "round", "closed"), "cells", within=0.15)
+
+
+def test_a_cut_out_of_a_sheet_is_held_against_its_material() -> None:
+    """Drawn through ends of webs farther out, 0.6 of a pitch."""
+    assert (
+        Reason.NO_BLOCK_FOUND
+        in Measurer(None).measure(lattice(1440042, "round", "cut").picture, PlainRecipe(), 0.0).reasons
+    )
+
+
 @pytest.mark.parametrize("seed", [1051003, 1051005, 1051006])
 def test_webs_that_do_not_end_as_walls_do_are_no_closed_border(seed: int) -> None:
     assert_traced(lattice(seed, "round", "mixed"), "mixed", within=0.3)

@@ -130,7 +130,8 @@ def _pattern(
         # Three families of lines, one apart; a triangle is the place between them.
         a, b, c = v / _ROW, (0.5 * v + _ROW * u) / _ROW, (0.5 * v - _ROW * u) / _ROW
         gap = np.minimum.reduce([np.abs(k - np.rint(k)) for k in (a, b, c)]) * _ROW
-        i, j = np.floor(a) * 4096 + np.floor(b), np.floor(c)
+        a, b, c = (np.floor(k) for k in (a, b, c))
+        i, j = (a - a.min()) * (b.max() - b.min() + 1.0) + b, c
     else:
         i, j, du, dv = _nearest_hex(u, v)
         if cells == "round":
@@ -139,7 +140,7 @@ def _pattern(
             across = [np.abs(du * nx + dv * ny) for nx, ny in ((1.0, 0.0), (0.5, _ROW), (-0.5, _ROW))]
             gap = 0.5 - np.maximum.reduce(across)
     into = 0.5 * wall - np.asarray(gap, np.float32) * pitch
-    number = (np.rint(i) * 8192 + np.rint(j)).astype(np.int64)
+    number = ((np.rint(i) - i.min()) * np.rint(j.max() - j.min() + 2.0) + np.rint(j)).astype(np.int64)
     index = _ranked(number)
     count = np.maximum(np.bincount(index.ravel()), 1)
     centre_x = (np.bincount(index.ravel(), x.ravel()) / count).astype(np.float32)

@@ -52,11 +52,13 @@ def parted_by_floors(light: Bytes, free: Openings) -> Parted | None:
     cells = free.cells.copy()
     cells[0] = False
     place, floor = free.centre[cells] / free.pitch, _floors(light, free)[cells]
-    line = _best_line(place, floor)
+    line = _best_line(place, floor) if len(place) >= 2 * _FEWEST_CELLS else None
     if line is None:
         return None
     away, at = place @ line.normal - line.distance, place @ line.along
     before, after = _beside(-away), _beside(away)
+    if min(np.count_nonzero(before), np.count_nonzero(after)) < _FEWEST_CELLS:
+        return None
     inner = free.depth > NEAR_OUTLINE
     contrast = quantile(light[(free.numbers == 0) & inner], _WALL) - median(floor)
     if abs(line.step) < _STEP * contrast or not _is_step(floor, before, after, at):

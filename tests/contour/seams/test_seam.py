@@ -14,6 +14,8 @@ from contour.acceptance.findings import Limits, Refusal
 from contour.acceptance.trace_check import check_trace
 from contour.geometry.rings import Contour, area
 from contour.polygon.polygon import Polygon
+from contour.seams.floors import parted_by_floors
+from contour.seams.openings import Openings
 from contour.seams.seam import parted_by_seam
 from contour.synthetic import CellGeometry, Fade, Filling, Ink, Scene, Slip, Strip, polygon, render, thick_line
 from contour.tracing.trace import TraceSettings
@@ -66,6 +68,14 @@ def test_a_small_block_against_the_edge_of_a_large_one_is_the_part(gap: float) -
 def test_a_block_whose_floors_are_lighter_is_another_one() -> None:
     """Neither openings nor the order of cells tell of it."""
     assert seam_in(shop_floor_scene("pushed_together", 1_420_099).scene) is not None
+
+
+def test_a_block_without_whole_cells_has_no_floors() -> None:
+    none = np.zeros((40, 40), np.int32)
+    free = Openings(
+        1, (0, 0), 10.0, none.astype(np.float32), none, np.zeros(1), np.zeros(1, np.int32), np.zeros((1, 2))
+    )
+    assert parted_by_floors(none.astype(np.uint8), free) is None
 
 
 def test_compound_in_some_cells_beside_a_line_makes_no_other_block() -> None:

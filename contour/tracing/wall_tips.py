@@ -385,6 +385,7 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
         if touched:
             # It may be cut on all sides, and what few ends are sure lie on others than are touched.
             kind = edge_kind(material, seen, touched)
+            found = None if kind == "cut" else found
     return None if found is None else replace(solid.around(found), comb=comb, edge=kind), kind
 
 

@@ -175,6 +175,14 @@ def test_corners_of_fine_closed_cells_are_no_ends_of_walls() -> None:
     assert wall_tips(smaller(lattice(1211009, "square", "cut"), 8.0), TraceSettings()).edge == "cut"
 
 
+def test_a_border_cut_on_all_sides_is_traced_by_its_ends_whatever_touches_some_of_them() -> None:
+    """Of floors that differ little from the table two cells were bays, 0.6 of a pitch deep."""
+    one = lattice(1492010, "triangular", "cut")
+    found = traced(one)
+    assert found.edge == "cut"
+    assert agreement(found.contour, one.outline).hausdorff_px < 0.1 * one.pitch_px
+
+
 def test_fine_teeth_that_blur_rounds_are_no_cut() -> None:
     assert traced(lattice(1205017, "triangular", "closed")).edge == "cells"
 

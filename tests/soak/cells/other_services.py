@@ -181,10 +181,10 @@ class TwinCell(FaultedCell):
             copy_journal(journal, copy)
         put_back(copy, self.folder / "twin" / "journal.sqlite")
         self._in_flight_at_the_twins_address()
-        before = dict(self.measured)
         if together:
             await self.in_the_midst_of_a_transfer()
         await self.end_service()
+        before = dict(self.measured)
         first = self._twin(self.folder, "127.0.0.1")
         self.parts, self.running = first.parts, first.running
         if not together:

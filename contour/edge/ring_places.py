@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contour.geometry.arrays import Bools, Float64s, Indices
-from contour.geometry.rectifier import Rectifier
+from contour.geometry.rectifier import Rectifier, rectified
 from contour.geometry.rings import Ring
 
 
@@ -32,7 +32,7 @@ def places_along(ring: Ring, spacing: float, rectifier: Rectifier | None) -> Pla
     share = np.concatenate([np.arange(count) / count for count in parts])
     owner = np.repeat(np.arange(len(ring)), parts)
     start = np.concatenate([[0.0], np.cumsum(length)])
-    a, b = (ring, following) if rectifier is None else (rectifier.rectify(ring), rectifier.rectify(following))
+    a, b = rectified(ring, rectifier), rectified(following, rectifier)
     points = a[owner] + share[:, None] * (b - a)[owner]
     if rectifier is not None:
         points = rectifier.unrectify(points)

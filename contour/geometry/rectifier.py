@@ -19,6 +19,11 @@ class Rectifier(Protocol):
     def unrectify(self, points: Float64s) -> Float64s: ...
 
 
+def rectified(points_px: Float64s, rectifier: Rectifier | None) -> Float64s:
+    """Points, (N, 2), in the rectified plane; as they are without a rectifier."""
+    return points_px if rectifier is None else rectifier.rectify(points_px)
+
+
 @dataclass(frozen=True, eq=False)
 class CroppedRectifier:
     """A rectifier for the pixels of a part of the picture, whose first one is `first` (x, y) of the whole."""

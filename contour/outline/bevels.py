@@ -135,7 +135,7 @@ def _around(near: complex, far: complex, points: Complexes) -> Complexes:
 
 def _between(segments: Segments, inlier: Bools, before: int, after: int) -> Indices:
     """Witnesses after the last inlier of one segment and before the first of the next; none where either has none."""
-    of_before, of_after = ((segments.first[k] + np.arange(segments.length[k])) % len(inlier) for k in (before, after))
+    of_before, of_after = (segments.members(k, len(inlier)) for k in (before, after))
     if not inlier[of_before].any() or not inlier[of_after].any():
         return np.zeros(0, dtype=np.intp)
     ending = int(np.flatnonzero(inlier[of_before])[-1]) + 1

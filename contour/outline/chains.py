@@ -72,7 +72,7 @@ def _as_curve(
     witnesses: Witnesses, segments: Segments, members: list[int], closed: bool, signed: Float64s
 ) -> Chain | None:
     """The members as one curve, or None where lines and arcs are the shorter description."""
-    index = np.concatenate([(segments.first[k] + np.arange(segments.length[k])) % len(witnesses) for k in members])
+    index = np.concatenate([segments.members(k, len(witnesses)) for k in members])
     if len(index) < 8:
         return None
     guide = _guide(witnesses, segments, members, index, closed)

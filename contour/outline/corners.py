@@ -39,7 +39,7 @@ def ends(witnesses: Witnesses, segments: Segments, inlier: Bools, *, but: int = 
     count = len(witnesses)
     places_first, places_last = segments.first.copy(), segments.first + segments.length - 1
     for k in range(len(segments)):
-        inside = np.flatnonzero(inlier[(segments.first[k] + np.arange(segments.length[k])) % count])
+        inside = np.flatnonzero(inlier[segments.members(k, count)])
         if len(inside):
             skipped = min(but, (len(inside) - 1) // 2)
             places_first[k] = segments.first[k] + inside[skipped]

@@ -41,7 +41,7 @@ def untold(
     alike[np.ix_(bend, bend)] = np.abs(curvature[bend] / curvature[bend, None] - 1.0) < _ALIKE
     arcs = np.setdiff1d(bend, [k for chain in chains for k in chain.segments])
     lone = arcs[np.count_nonzero(alike[np.ix_(arcs, arcs)], axis=1) == 1]
-    curves = [((segments.first[k] + np.arange(segments.length[k])) % len(witnesses), PRICE_ARC) for k in lone]
+    curves = [(segments.members(k, len(witnesses)), PRICE_ARC) for k in lone.tolist()]
     for chain in chains:
         others = np.setdiff1d(bend, chain.segments)
         if not chain.curve.closed and not alike[np.ix_(np.array(chain.segments), others)].any():
@@ -65,8 +65,8 @@ def _may_be_a_corner(witnesses: Witnesses, index: Indices, residual: Float64s, p
     if not len(first):
         return False
     points = witnesses.points[index] - witnesses.points[index].mean()
-    lying = np.abs(residual) < 3.0 * witnesses.outer[index]
-    weight = np.where(lying, witnesses.outer[index] ** -2.0, _LEAST_WEIGHT)
+    lying = _lying(witnesses, index, residual)
+    weight = _weights(witnesses, index, lying)
     before = _lines(points, weight).take(first - 1)
     after = _lines(points[::-1], weight[::-1]).take(count - first - 1)
     after = Models(after.origin, -after.tangent, after.curvature)
@@ -94,19 +94,28 @@ def _bent_lines(
     """Middles of those arcs whose witnesses a line explains as well, which meets what is beside them elsewhere."""
     begin = rolled(found.begin, 1)
     places = []
-    for k in arcs if len(segments) > 1 else ():
-        index = (segments.first[k] + np.arange(segments.length[k])) % len(witnesses)
-        points, ends = witnesses.points[index], np.array([begin[k], found.end[k]])
-        weight = np.where(np.abs(residual[index]) < 3.0 * witnesses.outer[index], witnesses.outer[index] ** -2.0, 0.0)
-        for weights in (weight, np.ones(len(index))):
-            line = _lines(points, np.maximum(weights, _LEAST_WEIGHT)).take([-1])
+    for k in arcs.tolist() if len(segments) > 1 else ():
+        index = segments.members(k, len(witnesses))
+        points, off, ends = witnesses.points[index], residual[index], np.array([begin[k], found.end[k]])
+        most = cost(witnesses, off, index).sum() + PRICE_ARC + _HARDLY_BENT
+        for weight in (_weights(witnesses, index, _lying(witnesses, index, off)), np.ones(len(index))):
+            line = _lines(points, weight).take([-1])
             nats = cost(witnesses, distance(line.take((slice(None), None)), points), index).sum() + PRICE_LINE
             apart = np.abs(((ends - line.origin) * line.tangent.conjugate()).imag).max()
-            as_well = nats < cost(witnesses, residual[index], index).sum() + PRICE_ARC + _HARDLY_BENT
-            if as_well and apart > _APART * witnesses.pitch_px:
+            if nats < most and apart > _APART * witnesses.pitch_px:
                 places.append(ends.mean())
                 break
     return places
+
+
+def _lying(witnesses: Witnesses, index: Indices, residual: Float64s) -> Bools:
+    """Which witnesses at `index` lie on what they have these distances from."""
+    return np.asarray(np.abs(residual) < 3.0 * witnesses.outer[index])
+
+
+def _weights(witnesses: Witnesses, index: Indices, lying: Bools) -> Float64s:
+    """What each of the witnesses at `index` says of where a line runs."""
+    return np.where(lying, witnesses.outer[index] ** -2.0, _LEAST_WEIGHT)
 
 
 def _lines(points: Complexes, weight: Float64s) -> Models:

@@ -8,7 +8,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, distinct, median, rolled
-from contour.geometry.rectifier import Rectifier
+from contour.geometry.rectifier import Rectifier, rectified
 from contour.geometry.rings import Ring
 from contour.outline.bevels import bevelled
 from contour.outline.chains import Chain, free_curves
@@ -71,8 +71,7 @@ def fit_ring(evidence: RingEvidence, *, pitch_px: float, wall_px: float, rectifi
     walls = material[: len(evidence.walls.points)]
 
     def left_outside(ring: Ring) -> tuple[Indices, float]:
-        flat = ring if rectifier is None else rectifier.rectify(ring)
-        return overlooked(walls, flat, pitch_px, is_hole=evidence.is_hole)
+        return overlooked(walls, rectified(ring, rectifier), pitch_px, is_hole=evidence.is_hole)
 
     fitted = _fitted(evidence, material, pitch_px=pitch_px, wall_px=wall_px, rectifier=rectifier)
     bounds, left_out = left_outside(fitted.ring)
@@ -141,8 +140,7 @@ def _given_leverage(segments: Segments, inlier: Bools, arcs: Bools, chains: list
 
 def _material(evidence: RingEvidence, rectifier: Rectifier | None) -> Float64s:
     """Points of walls, and behind them of what else may be material, in the fitting plane, shape (K, 2)."""
-    points = np.concatenate([evidence.walls.points, evidence.beside])
-    return points if rectifier is None else rectifier.rectify(points)
+    return rectified(np.concatenate([evidence.walls.points, evidence.beside]), rectifier)
 
 
 def segmented(witnesses: Witnesses) -> tuple[Witnesses, Segments]:
@@ -238,8 +236,7 @@ def _members(chain: Chain, count: int) -> Indices:
 
 def _run(witnesses: Witnesses, segments: Segments, k: int) -> float:
     """Length of segment k along the coarse ring."""
-    inner = (segments.first[k] + np.arange(segments.length[k])) % len(witnesses)
-    return float(witnesses.gap[inner].sum())
+    return float(witnesses.gap[segments.members(k, len(witnesses))].sum())
 
 
 def _alone(witnesses: Witnesses, segments: Segments) -> Vertices:

@@ -31,6 +31,10 @@ class Segments:
     def __len__(self) -> int:
         return len(self.first)
 
+    def members(self, k: int, count: int) -> Indices:
+        """The witnesses of segment k, in order, of `count` around the ring."""
+        return np.asarray((self.first[k] + np.arange(self.length[k])) % count, np.intp)
+
     def owner(self, count: int) -> Indices:
         """Segment of each of the `count` witnesses, shape (N,)."""
         owner = np.repeat(np.arange(len(self)), self.length)

@@ -8,7 +8,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Float64s, Indices, median, rolled
-from contour.geometry.rectifier import Rectifier
+from contour.geometry.rectifier import Rectifier, rectified
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside, nearest
@@ -91,18 +91,15 @@ def check_unseen(
 
     For rings of which nothing is hidden.
     """
-
-    def flat(points: Float64s) -> Float64s:
-        return points if rectifier is None else rectifier.rectify(points)
-
-    ring, coarse = flat(ring), flat(evidence.coarse)
+    ring, coarse = rectified(ring, rectifier), rectified(evidence.coarse, rectifier)
     inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, coarse)
     deep = np.flatnonzero(inside > _DEEP_PITCHES * pitch_px)
     if not len(deep):
         return
     lengths = RingLengths.of(ring)
     feet = lengths.feet(coarse[deep])
-    points, material = flat(evidence.points[inlier]), flat(np.concatenate([evidence.walls.points, evidence.beside]))
+    points = rectified(evidence.points[inlier], rectifier)
+    material = rectified(np.concatenate([evidence.walls.points, evidence.beside]), rectifier)
     near = material[np.abs(depth_inside(ring, material)) < _NEAR_PITCHES * pitch_px] if len(material) else material
     corners = lengths.starts[np.abs(lengths.turns(lengths.starts, _TURN_PITCHES * pitch_px)) > _CORNER]
     known = np.concatenate([lengths.feet(np.concatenate([points, near])), corners])
@@ -123,9 +120,7 @@ def check_own_ends(evidence: RingEvidence, fitted: FittedRing, pitch_px: float, 
 
     For rings of which nothing is hidden.
     """
-    ring, points = fitted.ring, evidence.points
-    if rectifier is not None:
-        ring, points = rectifier.rectify(ring), rectifier.rectify(points)
+    ring, points = rectified(fitted.ring, rectifier), rectified(evidence.points, rectifier)
     lengths = RingLengths.of(ring)
     edge, _ = lengths.places(lengths.feet(points))
     ends = evidence.kind != WitnessKind.OUTERMOST

@@ -49,9 +49,7 @@ def parted_by_floors(light: Bytes, free: Openings) -> Parted | None:
     """The part of a block whose cells' floors are lighter or darker than the others' from a straight line on; None
     without any. light: bright where walls are, (h, w), on the openings' grid.
     """
-    cells = free.cells.copy()
-    cells[0] = False
-    place, floor = free.centre[cells] / free.pitch, _floors(light, free)[cells]
+    place, floor = free.centre[free.cells] / free.pitch, _floors(light, free)[free.cells]
     line = _best_line(place, floor) if len(place) >= 2 * _FEWEST_CELLS else None
     if line is None:
         return None
@@ -59,15 +57,20 @@ def parted_by_floors(light: Bytes, free: Openings) -> Parted | None:
     before, after = _beside(-away), _beside(away)
     if min(np.count_nonzero(before), np.count_nonzero(after)) < _FEWEST_CELLS:
         return None
-    inner = free.depth > NEAR_OUTLINE
-    contrast = quantile(light[(free.numbers == 0) & inner], _WALL) - median(floor)
-    if abs(line.step) < _STEP * contrast or not _is_step(floor, before, after, at):
+    row, column = np.nonzero((free.numbers == 0) & (free.depth > NEAR_OUTLINE))
+    walls = light[row, column]
+    if abs(line.step) < _STEP * (quantile(walls, _WALL) - median(floor)):
         return None
     start, stop = max(at[before].min(), at[after].min()), min(at[before].max(), at[after].max())
-    ends = line.at(np.array([start - _BAND, stop + _BAND]))
-    if stop - start < max(_LEAST_LONG, _OF_CHORD * _chord(free, line)):
+    part = np.floor((at - start) / max(stop - start, 1e-9) * _PARTS)
+    if not _is_step(floor, before, after, part) or stop - start < max(_LEAST_LONG, _OF_CHORD * _chord(free, line)):
         return None
-    return None if _walls_step(light, free, line, before, after, floor) else beside(free, 0.0, ends[0], ends[1])
+    off = (column * line.normal[0] + row * line.normal[1]) / free.pitch - line.distance
+    of_walls = _share(*(quantile(walls[_beside(side)], _WALL) for side in (-off, off)))
+    of_floors = _share(median(floor[before]), median(floor[after]))
+    if of_walls * math.copysign(1.0, of_floors) > _OF_WALLS * abs(of_floors):  # a shadow begins
+        return None
+    return beside(free, 0.0, *line.at(np.array([start - _BAND, stop + _BAND])))
 
 
 def _chord(free: Openings, line: _Line) -> float:
@@ -79,14 +82,13 @@ def _chord(free: Openings, line: _Line) -> float:
 
 def _floors(light: Bytes, free: Openings) -> Float64s:
     """The light of each opening's darker half, (N,)."""
-    numbers, count = free.numbers.ravel(), len(free.area)
-    levels = light.ravel().astype(np.float64)
-    mean = np.bincount(numbers, levels, count) / np.maximum(np.bincount(numbers, minlength=count), 1)
-    dark = levels <= mean[numbers]
-    numbers = numbers[dark]
-    return np.asarray(
-        np.bincount(numbers, levels[dark], count) / np.maximum(np.bincount(numbers, minlength=count), 1), np.float64
-    )
+    numbers, levels = free.numbers.ravel(), light.ravel().astype(np.float64)
+
+    def means(some: Bools | slice) -> Float64s:
+        total, count = (np.bincount(numbers[some], of, len(free.area)) for of in (levels[some], None))
+        return np.asarray(total / np.maximum(count, 1), np.float64)
+
+    return means(levels <= means(slice(None))[numbers])
 
 
 def _best_line(place: Float64s, floor: Float64s) -> _Line | None:
@@ -117,16 +119,14 @@ def _beside(away: Float64s) -> Bools:
     return np.asarray((away > _NEAR) & (away < _NEAR + _BAND))
 
 
-def _is_step(floor: Float64s, before: Bools, after: Bools, at: Float64s) -> bool:
-    """Whether floors step all along a line, by more than they differ on each side of it; at: places along it."""
+def _is_step(floor: Float64s, before: Bools, after: Bools, part: Float64s) -> bool:
+    """Whether floors step all along a line, by more than they differ on each side of it; part: which each lies in."""
     low, high = median(floor[before]), median(floor[after])
     spread = median(np.abs(np.concatenate([floor[before] - low, floor[after] - high]))) * 1.4826 + _LEAST_SPREAD
     like_other = np.abs(floor - np.where(after, high, low)) > np.abs(floor - np.where(after, low, high))
     alike = max(np.mean(like_other[before]), np.mean(like_other[after]))
     if abs(high - low) < _SPREADS * spread or alike > _LIKE_OTHER:
         return False
-    ends = max(at[before].min(), at[after].min()), min(at[before].max(), at[after].max())
-    part = np.floor((at - ends[0]) / max(ends[1] - ends[0], 1e-9) * _PARTS)
     seen = 0
     for number in range(_PARTS):
         one, other = floor[before & (part == number)], floor[after & (part == number)]
@@ -135,16 +135,6 @@ def _is_step(floor: Float64s, before: Bools, after: Bools, at: Float64s) -> bool
             if (median(other) - median(one)) / (high - low) < _IN_EACH_PART:
                 return False
     return seen >= _FEWEST_PARTS
-
-
-def _walls_step(light: Bytes, free: Openings, line: _Line, before: Bools, after: Bools, floor: Float64s) -> bool:
-    """Whether walls beside a line become darker or lighter with the floors, as where a shadow begins."""
-    row, column = np.nonzero((free.numbers == 0) & (free.depth > NEAR_OUTLINE))
-    away = (column * line.normal[0] + row * line.normal[1]) / free.pitch - line.distance
-    walls = light[row, column]
-    of_walls = _share(*(quantile(walls[_beside(side)], _WALL) for side in (-away, away)))
-    of_floors = _share(median(floor[before]), median(floor[after]))
-    return of_walls * math.copysign(1.0, of_floors) > _OF_WALLS * abs(of_floors)
 
 
 def _share(one: float, other: float) -> float:

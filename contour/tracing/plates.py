@@ -77,16 +77,8 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
     if holes is None or not holes.round(wide=wide) or holes.shade > _LIKE_TABLE:
         return None
     pitch_px = holes.pitch_px
-    corners, normals = _bays(material, holes, _LEAST_FINE_BAY if holes.fine else _LEAST_BAY)
-    if len(corners) == _OF_ONE_BAY and holes.fine:
-        corners, normals = _bays(material, holes, _LARGE_BAY)
-    lines: list[Float64s] = []
-    if len(corners):
-        corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
-        lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
-    if len(corners) == _OF_ONE_BAY and lines and not _goes_on(lines[0], corners, pitch_px):
-        corners = corners[:0]
-    if not len(corners):
+    lines = _through_bays(material, holes)
+    if lines is None:
         # Holes that were opened by less; a closed sheet has no openings.
         lines = touched_cuts(material, pitch_px, alike=True)
         if not lines:
@@ -100,6 +92,20 @@ def plate_edge(material: MaterialEdge, *, wide: bool) -> tuple[MaterialEdge | No
     cuts = np.array([_along_webs(material.contour.rings, cut) for cut in lines[0]])
     closed = closed_along(material, cuts, pitch_px)
     return elsewhere if len(_bays(closed, holes, _LARGE_BAY)[0]) else (closed, "mixed")
+
+
+def _through_bays(material: MaterialEdge, holes: _Holes) -> list[Float64s] | None:
+    """Straight cuts through the mouths of holes that are wide open, as `straight_cuts`; None where none is."""
+    pitch_px = holes.pitch_px
+    corners, normals = _bays(material, holes, _LEAST_FINE_BAY if holes.fine else _LEAST_BAY)
+    if len(corners) == _OF_ONE_BAY and holes.fine:
+        corners, normals = _bays(material, holes, _LARGE_BAY)
+    if not len(corners):
+        return None
+    corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
+    lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
+    dent = len(corners) == _OF_ONE_BAY and lines and not _goes_on(lines[0], corners, pitch_px)
+    return None if dent else lines
 
 
 def _goes_on(cuts: Float64s, mouth: Float64s, pitch_px: float) -> bool:
@@ -229,17 +235,21 @@ def _bays(material: MaterialEdge, holes: _Holes, least: float) -> tuple[Float64s
         place = (mouth - mouth.mean(axis=0)) @ axis
         out = mouth.mean(axis=0) - middles[number]
         ends = np.array([mouth[np.argmin(place)], mouth[np.argmax(place)]]) - pad
-        if holes.fine or _is_arc(_along(border, labels == number, pad), ends, 0.5 * holes.diameter_px):
+        around = np.s_[top - 2 : top + high + 2, left - 2 : left + across + 2]
+        beside = _along(border, labels[around] == number, (left - 2 - pad, top - 2 - pad))
+        if holes.fine or _is_arc(beside, ends, 0.5 * holes.diameter_px):
             corners += [*ends]
             normals += [out / max(float(np.hypot(*out)), 1e-9)] * 2
     return np.array(corners).reshape(-1, 2), np.array(normals).reshape(-1, 2)
 
 
-def _along(border: Float64s, bay: Bools, pad: int) -> Float64s:
-    """The points of a border, (N, 2), that lie beside a bay, whose mask begins `pad` pixels before the picture."""
+def _along(border: Float64s, bay: Bools, first: tuple[int, int]) -> Float64s:
+    """The points of a border, (N, 2), that lie beside a bay; its mask, with two pixels around it, begins at `first`."""
     beside = cv2.dilate(bay.astype(np.uint8), np.ones((5, 5), np.uint8))
-    column, row = (np.rint(border) + pad).astype(int).T
-    return np.asarray(border[beside[row, column] > 0])
+    column, row = (np.rint(border).astype(int) - first).T
+    near = (row >= 0) & (row < beside.shape[0]) & (column >= 0) & (column < beside.shape[1])
+    near[near] = beside[row[near], column[near]] > 0
+    return np.asarray(border[near])
 
 
 def _is_arc(border: Float64s, mouth: Float64s, radius: float) -> bool:

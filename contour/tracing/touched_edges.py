@@ -66,10 +66,10 @@ def touched_cuts(
         line = Line(start, along, out * np.sign(out @ (start - corners.mean(axis=0))), np.zeros(0, np.bool_))
         long = length > (_LEAST_LONG_ALIKE if alike else _LEAST_LONG) * pitch_px
         openings, thick = _openings(material, line, length, near, pitch_px) if long else _NOTHING
-        bare = (
-            walls is not None and length > _LONG_BARE * pitch_px and _bare(material, walls, line, length, near, wall_px)
-        )
-        if bare or _opened(openings[openings[:, 1] > least], thick, pitch_px, tooth_px, alike=alike):
+        opened = _opened(openings[openings[:, 1] > least], thick, pitch_px, tooth_px, alike=alike)
+        if not opened and walls is not None and length > _LONG_BARE * pitch_px:
+            opened = _bare(material, walls, line, length, near, wall_px)
+        if opened:
             cuts.append(from_corner_to_corner(border, np.empty((0, 2)), line, near, OPEN_PITCHES * pitch_px))
     return [cut for cut in cuts if len(cut)]
 

@@ -379,13 +379,12 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
         (found, kind), comb = sheet, replace(comb, plate=True)
     else:
         touched = [] if kind == "cut" else _touched(solid, material, seen)
-        kind = "mixed" if touched else kind
-        cut = with_cuts(material, seen, touched) if kind == "mixed" else None
-        found = material if kind == "cells" else cut
+        closed = kind == "cells" and not touched
         if touched:
             # It may be cut on all sides, and what few ends are sure lie on others than are touched.
             kind = edge_kind(material, seen, touched)
-            found = None if kind == "cut" else found
+        cut = None if closed or kind == "cut" else with_cuts(material, seen, touched)
+        found = material if closed else cut
     return None if found is None else replace(solid.around(found), comb=comb, edge=kind), kind
 
 

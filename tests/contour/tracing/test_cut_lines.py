@@ -45,26 +45,23 @@ def test_openings_that_grow_steadily_were_cut_open_and_those_that_only_vary_were
     assert touched_cuts(material(np.roll(growing, 3)[[0, 4, 1, 5, 2, 6, 3, 7]]), PITCH) == []
 
 
+def walled(*thick_px: float) -> MaterialEdge:
+    """A block with openings that are alike, and behind what touches its upper edge cells, so far behind it."""
+    block = material(np.full(len(thick_px) + 1, 28.0))
+    difference = np.full_like(block.apart.region, 9)
+    for number, wall in enumerate(thick_px):
+        x, y = round(PITCH * (number + 1)) + 50, round(100.0 + wall)
+        difference[y : y + 30, x - 6 : x + 6] = 0
+    return replace(block, apart=replace(block.apart, difference=difference, level=np.full_like(difference, 5)))
+
+
 def test_walls_of_different_thickness_were_cut_and_as_thick_ones_were_not() -> None:
-    """Openings are alike, and behind what touches the line lie cells, nearer and nearer to it or not."""
-    for thick, told in ((np.array([10.0, 8.5, 7.0, 5.5, 4.0, 10.0]), 1), (np.full(6, 8.0), 0)):
-        block = material(np.full(6, 28.0))
-        difference = np.full_like(block.apart.region, 9)
-        for number, wall in enumerate(thick[:-1]):
-            x, y = round(PITCH * (number + 1)) + 50, round(100.0 + wall)
-            difference[y : y + 30, x - 6 : x + 6] = 0
-        apart = replace(block.apart, difference=difference, level=np.full_like(difference, 5))
-        assert len(touched_cuts(replace(block, apart=apart), PITCH)) == told
+    assert len(touched_cuts(walled(10.0, 8.5, 7.0, 5.5, 4.0), PITCH)) == 1
+    assert touched_cuts(walled(8.0, 8.0, 8.0, 8.0, 8.0), PITCH) == []
 
 
 def test_the_last_wall_of_a_row_looks_thicker_at_a_corner() -> None:
-    block = material(np.full(6, 28.0))
-    difference = np.full_like(block.apart.region, 9)
-    for number, wall in enumerate((8.0, 8.0, 8.0, 8.0, 20.0)):
-        x, y = round(PITCH * (number + 1)) + 50, round(100.0 + wall)
-        difference[y : y + 30, x - 6 : x + 6] = 0
-    apart = replace(block.apart, difference=difference, level=np.full_like(difference, 5))
-    assert touched_cuts(replace(block, apart=apart), PITCH) == []
+    assert touched_cuts(walled(8.0, 8.0, 8.0, 8.0, 20.0), PITCH) == []
 
 
 def test_an_edge_of_cells_floors_was_cut_where_no_wall_runs_along_it() -> None:

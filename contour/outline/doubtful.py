@@ -8,10 +8,10 @@ from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, rolled
 from contour.outline.chains import Chain
 from contour.outline.corners import Joints
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE
-from contour.outline.lines_and_arcs import Models, distance, feet
+from contour.outline.lines_and_arcs import Models, distance, feet, through_triples
 from contour.outline.roundings import LEAST_TURN, MOST_TURN
-from contour.outline.runs import Segments
-from contour.outline.witnesses import Witnesses, cost
+from contour.outline.runs import Segments, fitted
+from contour.outline.witnesses import Witnesses, cost, window_cost
 
 # An arc told from the corner that it passes by fewer witnesses than that, ends of walls counted twice, so deep in it,
 # pitches, and of a radius that no other arc has, may as well be that corner; it matters where the two are so far apart.
@@ -22,6 +22,11 @@ _AS_WELL, _FAR, _OF_A_LINE = 8.0, 0.4, 2
 # Motion moves ends of neighbouring walls alike: of 215 right outlines the least is 17 nats for a line for an arc
 # whose ends it misses by so much; of two that were off by 0.8 and 1.2 cells it was 15 and 9.
 _HARDLY_BENT = 16.0
+# Where two arcs meet so far from what was seen of either, pitches, and so deep in the material, one arc through so many
+# witnesses of both may run there; and where nothing was seen for longer, a corner so far aside is a guess. Of 150 right
+# outlines none has either.
+_NOTCH_LONG, _NOTCH_DEEP, _NOTCH_AS_WELL, _OF_EITHER = 1.5, 0.3, 12.0, 3
+_UNSEEN_LONG, _ASIDE = 3.0, 0.5
 # So is a line across a corner no longer than that, by so few witnesses, if less than a cell would be lost in it: of 135
 # blocks none has one, and one whose last walls are inked has.
 _BEVEL_LONG, _LOST = 2.0, 1.0
@@ -53,6 +58,7 @@ def untold(
     ]
     places += _hardly_seen(witnesses, segments, lone, found, inlier)
     places += _bent_lines(witnesses, segments, lone, found, residual)
+    places += _unseen_corners(witnesses, segments, found, inlier, residual, chains)
     return np.array(places + _lone_bevels(witnesses, segments, found, inlier), np.complex128)
 
 
@@ -106,6 +112,47 @@ def _bent_lines(
                 places.append(ends.mean())
                 break
     return places
+
+
+def _unseen_corners(
+    witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools, residual: Float64s, chains: list[Chain]
+) -> list[np.complex128]:
+    """Where two arcs meet in no curve, and too little was seen for it to be told that they do."""
+    joined = {k for chain in chains for k in chain.segments[:-1]}
+    if any(chain.curve.closed for chain in chains):
+        return []
+    places = []
+    for k in np.flatnonzero(segments.bend & rolled(segments.bend, -1)).tolist():
+        if k in joined or len(segments) < 2:
+            continue
+        before, after = (segments.members(one, len(witnesses)) for one in (k, (k + 1) % len(segments)))
+        last, first = np.flatnonzero(inlier[before])[-_OF_EITHER:], np.flatnonzero(inlier[after])[:_OF_EITHER]
+        if min(len(last), len(first)) < _OF_A_LINE:
+            continue
+        ends = witnesses.points[[before[last[0]], before[last[-1]], after[first[0]], after[first[-1]]]]
+        corner, chord = 0.5 * (found.end[k] + found.begin[k]), ends[2] - ends[1]
+        long = abs(chord) / witnesses.pitch_px
+        deep = ((corner - ends[1]) * chord.conjugate()).imag / max(abs(chord), 1e-9) / witnesses.pitch_px
+        index = np.concatenate([before[last[0] :], after[: first[-1] + 1]])
+        notch = long > _NOTCH_LONG and deep > _NOTCH_DEEP
+        guess = long > _UNSEEN_LONG and abs(deep) > _ASIDE
+        if guess or (notch and _may_be_one_arc(witnesses, index, residual[index], ends, corner)):
+            places.append(np.complex128(corner))
+    return places
+
+
+def _may_be_one_arc(
+    witnesses: Witnesses, index: Indices, residual: Float64s, ends: Complexes, corner: np.complex128
+) -> bool:
+    """Whether one arc explains the witnesses at `index` nearly as well as two that they have these distances from, and
+    passes the corner of these far off. ends: the outermost witnesses of either that lie on it, (4,).
+    """
+    triples = ends[np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])].T
+    each = np.tile(index, (4, 1))
+    arcs = fitted(witnesses, through_triples(*triples), np.ones(4, np.bool_), each, np.ones(each.shape))
+    as_well = window_cost(witnesses, arcs, each).sum(axis=1) < cost(witnesses, residual, index).sum() + _NOTCH_AS_WELL
+    apart = np.abs(distance(arcs, np.full(4, corner))) > _NOTCH_DEEP * witnesses.pitch_px
+    return bool((as_well & apart).any())
 
 
 def _lying(witnesses: Witnesses, index: Indices, residual: Float64s) -> Bools:

@@ -64,10 +64,10 @@ def stretch(count: int, first: Indices, length: Indices) -> tuple[Indices, Float
 def refitted(witnesses: Witnesses, segments: Segments) -> Segments:
     """The segments, their models fitted robustly to their own witnesses."""
     index, multiplicity = stretch(len(witnesses), segments.first, segments.length)
-    return replace(segments, models=_fitted(witnesses, segments.models, segments.bend, index, multiplicity))
+    return replace(segments, models=fitted(witnesses, segments.models, segments.bend, index, multiplicity))
 
 
-def _fitted(witnesses: Witnesses, models: Models, bend: Bools, index: Indices, multiplicity: Float64s) -> Models:
+def fitted(witnesses: Witnesses, models: Models, bend: Bools, index: Indices, multiplicity: Float64s) -> Models:
     """Models fitted robustly to the stretches of witnesses at `index`, as `stretch` tells them."""
     points = witnesses.points[index]
     for _ in range(_STEPS):
@@ -87,7 +87,7 @@ def around(witnesses: Witnesses, segments: Segments) -> Proposals:
     first = np.tile(segments.first, 2 * len(span))
     free = np.tile(np.repeat([False, True], total), len(span))
     index, multiplicity = stretch(count, first, length)
-    models = _fitted(witnesses, _starts(witnesses, segments, last), free, index, multiplicity)
+    models = fitted(witnesses, _starts(witnesses, segments, last), free, index, multiplicity)
     # Over calling all of them outliers.
     saved = (witnesses.cap_inside[index] - window_cost(witnesses, models, index)) * multiplicity
     gain = np.where(gentle(witnesses, models), saved.sum(axis=1) - np.where(free, PRICE_ARC, PRICE_LINE), -1.0)

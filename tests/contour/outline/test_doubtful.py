@@ -22,13 +22,23 @@ def test_a_curve_is_told_where_two_lines_would_do_and_lie_elsewhere(seed: int, p
     assert np.hypot(*np.subtract(traced.untold_px, place)) < 2.0 * traced.pitch_px
 
 
-def test_an_arc_whose_ends_a_line_explains_nearly_as_well_and_leads_elsewhere_is_told() -> None:
-    """Along a side of an L that moved, 0.8 of a cell off at its inner corner."""
-    rendered = render(shop_floor_scene("motion", 1_420_045).scene)
+@pytest.mark.parametrize(
+    ("kind", "seed", "place"),
+    [
+        # Along a side of an L that moved, 0.8 of a cell off at its inner corner.
+        ("motion", 1_420_045, (480.0, 490.0)),
+        # A notch in a curve, at the end of a dark splice, 0.6 of a cell deep.
+        ("splice", 1_480_021, (773.0, 205.0)),
+        # A chord and a step under glare, 0.7 of a cell off.
+        ("glare", 1_480_017, (598.0, 509.0)),
+    ],
+)
+def test_an_arc_whose_ends_may_as_well_be_others_is_told(kind: str, seed: int, place: tuple[float, float]) -> None:
+    rendered = render(shop_floor_scene(kind, seed, alone=True).scene)
     rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
     traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
     assert traced.untold_px is not None
-    assert np.hypot(*np.subtract(traced.untold_px, (480.0, 490.0))) < 2.0 * rendered.pitch_px
+    assert np.hypot(*np.subtract(traced.untold_px, place)) < 3.0 * rendered.pitch_px
 
 
 def test_a_curve_is_one_where_two_lines_hardly_turn() -> None:

@@ -24,6 +24,9 @@ _LEAST_WEB, _LEAST_ORDER, _LEAST_SOLID = 0.2, 0.4, 0.93
 # Those of large holes in a wide rim look narrower, and of a dozen holes few have neighbours all around: where holes are
 # large enough to be seen round, that is asked.
 _NARROW_WEB, _FEW_ORDER = 0.12, 0.2
+# Of fewer neither their order nor their form tells anything: with webs as wide as holes some run into each other, and
+# the sheet's own holes are asked.
+_FEWEST_TOLD = 12
 # And round: of the circle around it a hole of a dozen pixels and more fills 0.88 at least, a hexagon 0.86 at most. Of
 # smaller ones that cannot be told; squares and drawn-out cells fill 0.72 at most, round ones 0.8 at least.
 _ROUND, _MAYBE_ROUND, _FINE_HOLE_PX = 0.866, 0.76, 12.0
@@ -57,6 +60,8 @@ def like_plate(comb: Comb | None) -> tuple[bool, bool]:
     """
     if comb is None or comb.solid <= _LEAST_SOLID:
         return False, False
+    if comb.count < _FEWEST_TOLD:
+        return True, False
     # Webs of fine cells are not told from walls, which look wider than they are, unless no wall is as wide.
     web = (comb.wall_px - WIDER_PX) / comb.pitch_px
     wide = web > (_LEAST_WEB if comb.pitch_px > FINE_PITCH_PX else WIDEST_FINE) and comb.order > _LEAST_ORDER
@@ -104,8 +109,11 @@ def _through_bays(material: MaterialEdge, holes: _Holes) -> list[Float64s] | Non
         return None
     corners = _outermost(material, corners, normals, _ROUND_PITCHES * pitch_px)
     lines = straight_cuts(material, corners, normals, pitch_px, open_px=_OPEN_PITCHES * pitch_px)
-    dent = len(corners) == _OF_ONE_BAY and lines and not _goes_on(lines[0], corners, pitch_px)
-    return None if dent else lines
+    if len(corners) == _OF_ONE_BAY:
+        # Nothing else is cut open: it is one if a cut goes on beside it, or it is most of a hole.
+        cut = _goes_on(lines[0], corners, pitch_px) if lines else len(_bays(material, holes, _LARGE_BAY)[0]) > 0
+        return lines if cut else None
+    return lines
 
 
 def _goes_on(cuts: Float64s, mouth: Float64s, pitch_px: float) -> bool:

@@ -55,6 +55,11 @@ def test_a_dozen_large_holes_in_a_wide_rim_make_a_sheet(seed: int) -> None:
     assert_traced(lattice(seed, "round", "closed"), "cells", within=0.15)
 
 
+def test_holes_of_which_few_were_counted_are_asked_whatever_these_look_like() -> None:
+    """Webs are as wide as they: those at the cut run into the table where the scale is read."""
+    assert_traced(lattice(1500104, "round", "mixed"), "mixed", within=0.15)
+
+
 @pytest.mark.parametrize("seed", [1224003, 1240010], ids=["material left out", "beside its edge"])
 def test_an_outline_that_leaves_the_edge_of_a_cut_sheet_is_refused(seed: int) -> None:
     found = Measurer(None).measure(lattice(seed, "round", "cut").picture, PlainRecipe(), 0.0)
@@ -118,7 +123,7 @@ def test_a_cut_that_opens_holes_by_little_is_seen_by_what_touches_its_line(seed:
     assert_traced(lattice(seed, "round", "mixed"), "mixed", within=0.15)
 
 
-@pytest.mark.parametrize("seed", [1440004, 1440031], ids=["small holes", "large ones"])
+@pytest.mark.parametrize("seed", [1440004, 1440031, 1502217], ids=["small holes", "large ones", "without a line"])
 def test_a_dents_rounded_corner_is_no_hole_that_was_opened(seed: int) -> None:
     assert_traced(lattice(seed, "round", "closed"), "cells", within=0.15)
 

@@ -82,13 +82,12 @@ def _chord(free: Openings, line: _Line) -> float:
 
 def _floors(light: Bytes, free: Openings) -> Float64s:
     """The light of each opening's darker half, (N,)."""
-    numbers, levels = free.numbers.ravel(), light.ravel().astype(np.float64)
-
-    def means(some: Bools | slice) -> Float64s:
-        total, count = (np.bincount(numbers[some], of, len(free.area)) for of in (levels[some], None))
-        return np.asarray(total / np.maximum(count, 1), np.float64)
-
-    return means(levels <= means(slice(None))[numbers])
+    inside = np.flatnonzero(free.numbers)
+    number, level = free.numbers.ravel()[inside], light.ravel()[inside]
+    mean = np.bincount(number, level, len(free.area)) / np.maximum(free.area, 1)
+    dark = level <= mean[number]
+    total, count = (np.bincount(number[dark], of, len(free.area)) for of in (level[dark], None))
+    return np.asarray(total / np.maximum(count, 1), np.float64)
 
 
 def _best_line(place: Float64s, floor: Float64s) -> _Line | None:

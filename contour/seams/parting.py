@@ -193,7 +193,9 @@ def _parts(free: Openings) -> Iterator[Parted]:
 
 
 def parted_by_order(free: Openings) -> Iterator[Parted]:
-    """Parts of the block that no cells in one order join, be there openings between them or none."""
+    """Parts of the block that no cells in one order join, be there openings between them or none; all but the largest,
+    which the others' lines part from them.
+    """
     every = max(1, int(free.pitch / _SAMPLES))
     depth, pitch = free.depth[::every, ::every], free.pitch / every
     inside = depth > NEAR_OUTLINE
@@ -201,7 +203,9 @@ def parted_by_order(free: Openings) -> Iterator[Parted]:
     middles = np.zeros(depth.shape, np.bool_)
     middles[np.minimum(row, depth.shape[0] - 1), np.minimum(column, depth.shape[1] - 1)] = True
     near = inside & (_away(~middles) < _IN_ORDER * pitch)
-    for part, line in _pieces_and_lines(_away(near) > _NECK * pitch, inside, _LEAST_IN_ORDER * pitch**2):
+    pieces = list(_pieces_and_lines(_away(near) > _NECK * pitch, inside, _LEAST_IN_ORDER * pitch**2))
+    pieces.sort(key=lambda piece: np.count_nonzero(piece[0]))
+    for part, line in pieces[:-1] or pieces:
         yield _parted(free, every, 0.0, part, ~line)
 
 

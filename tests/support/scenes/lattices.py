@@ -26,6 +26,8 @@ _FINER = 3
 _MARGIN_PX = 6.0
 _ROW = np.sqrt(3.0) / 2.0
 _PARTLY = 0.05
+# Pitches around a block's outline within which all of its cells lie, drawn out ones too.
+_BESIDE = 3.5
 
 Floats = NDArray[np.float32]
 
@@ -63,9 +65,13 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
     y, x = np.mgrid[0 : HEIGHT * _FINER, 0 : WIDTH * _FINER].astype(np.float32)
     x, y = (x + 0.5) / _FINER - 0.5, (y + 0.5) / _FINER - 0.5
     # A hole that a later cut opens is a bay with closed cells: nobody can tell where it was meant to end.
-    outline = _box(rng, x, y, pitch, holed=border != "mixed")
+    whole = _box(rng, x, y, pitch, holed=border != "mixed")
+    # All but the table lies there.
+    part = _around(whole, round(_BESIDE * pitch * _FINER))
+    outline, x, y = whole[part], x[part], y[part]
     angle = float(rng.uniform(0, np.pi))
     into_wall, number, centre = _pattern(rng, cells, (x, y), angle, pitch, wall)
+    centre = centre[0] - part[1].start / _FINER, centre[1] - part[0].start / _FINER
     body = outline
     if border != "cut" and cells != "round":
         body = _whole_cells(outline, number, centre, wall)
@@ -76,12 +82,30 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
         drilled = _at(_depth(outline), centre) > 0.62 * pitch
         into_wall = np.where(drilled[number], into_wall, np.float32(1.0))
     body = _largest(body)
-    material = body & (into_wall > 0)
+    opened = _opened(number, into_wall < 0, body)
+    body, material = (_placed(one, part, whole.shape) for one in (body, body & (into_wall > 0)))
     bright_table = bool(rng.random() < 0.5)
     picture = _rendered(rng, body, material, bright_table)
     ribbon_deg = (90.0 - float(np.degrees(angle))) % 180.0 if cells in ("over-expanded", "flex") else None
-    opened = _opened(number, into_wall < 0, body)
     return Lattice(picture, _contour(body), cells, border, bright_table, pitch, opened, ribbon_deg)
+
+
+def _around(body: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
+    """Rows and columns of a body and so many around it."""
+    rows, columns = (np.flatnonzero(body.any(axis=axis)) for axis in (1, 0))
+    return (
+        slice(max(0, int(rows[0]) - margin), int(rows[-1]) + margin + 1),
+        slice(max(0, int(columns[0]) - margin), int(columns[-1]) + margin + 1),
+    )
+
+
+def _placed(
+    body: NDArray[np.bool_], part: tuple[slice, slice], shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """A body of which a part of the picture was drawn, in all of it."""
+    drawn = np.zeros(shape, np.bool_)
+    drawn[part] = body
+    return drawn
 
 
 def _opened(number: NDArray[np.int64], inside: NDArray[np.bool_], body: NDArray[np.bool_]) -> int:

@@ -166,10 +166,16 @@ def _outlined(apart: Apart, cuts: Float64s = _NO_CUTS) -> MaterialEdge:
     chains, hierarchy = cv2.findContours(body, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     found = [
         (*_sub_pixel(difference, level, chain[:, 0, :].astype(np.float64), cuts), bool(node[3] >= 0))
-        for chain, node in zip(chains, hierarchy[0], strict=True)
+        for chain, node in zip(chains, () if hierarchy is None else hierarchy[0], strict=True)
         if len(chain) >= 8
     ]
-    exterior, widths, _ = max((one for one in found if not one[2]), key=lambda one: abs(signed_area(one[0])))
+    outer = [one for one in found if not one[2]]
+    if not outer:
+        raise NoBlockFound(
+            "no block found: all that differs from the table is threads a pixel or two wide. Check that a block lies in "
+            "view, the light and the focus"
+        )
+    exterior, widths, _ = max(outer, key=lambda one: abs(signed_area(one[0])))
     holes = [(_turned(ring, 1.0), wide) for ring, wide, hole in found if hole]
     widths = np.concatenate([widths, *(wide for _, wide in holes)])
     contour = Contour(_turned(exterior, -1.0), tuple(ring for ring, _ in holes))

@@ -6,10 +6,15 @@ import cv2
 import numpy as np
 import pytest
 
+from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import area
 from contour.material.closed_cells import closed_along, material_edge
+from contour.synthetic import render
 from contour.walls.wall_mask import wall_mask
+from service.config.plain_recipe import PlainRecipe
+from service.measuring.measure import Measurer
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 TABLE, FLOOR, WALL = 90, 76, 220
 PITCH, COLUMNS, ROWS, LEFT, TOP = 40, 8, 6, 60, 50
@@ -48,6 +53,19 @@ def test_what_touches_a_line_in_one_place_alone_is_no_cut() -> None:
     material = material_edge(picture, PITCH, wall_mask(picture, PITCH, bright=True).mask)
     touched = closed_along(material, np.full((1, 2, 2), [CUT_X, TOP + 3.0]), PITCH)
     assert area(touched.contour) == area(material.contour)
+
+
+def test_threads_alone_are_no_block() -> None:
+    picture = np.full((300, 400), TABLE, np.uint8)
+    cv2.line(picture, (60, 60), (330, 220), WALL, 1)
+    with pytest.raises(NoBlockFound, match="threads"):
+        material_edge(picture, PITCH, np.zeros_like(picture))
+
+
+def test_a_picture_whose_threads_touch_its_side_is_refused() -> None:
+    """Where nothing else is left of them but fewer pixels than make an outline."""
+    rendered = render(shop_floor_scene("blown_out", 1_560_082).scene)
+    assert Measurer(None).measure(rendered.picture, PlainRecipe(), 0.0).reasons
 
 
 @pytest.mark.parametrize(("wide", "high", "is_hole"), [(96, 96, True), (320, 22, False), (320, 26, True)])

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Float64s, Indices, rolled
+from contour.geometry.arrays import Bools, Float64s, Indices, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.segments import turns
@@ -18,8 +18,10 @@ from contour.narrow_features.feature import DEPTH, WIDTH, NarrowFeature
 # end fills half, and what stands farther out is an arm.
 _WIDE, _UPRIGHT, _HIGH = 10.0, 0.6, 4.5
 # Beside its foot the outline runs along it over so much, but for this angle; a corner between two such edges stands
-# out by half its width times the tangent. On a curve or a corner it turns out at both feet, by so much over a pitch.
-_BESIDE, _ANGLE_DEG, _OUT_DEG = 2.0, 22.0, 25.0
+# out by half its width times the tangent. On a curve or a corner it turns out at both feet, by so much over a pitch. A
+# dent turns in there; but with right angles, within so much, of its own sides and of the edges beside it, it is the
+# missing corner of an L.
+_BESIDE, _ANGLE_DEG, _OUT_DEG, _RIGHT_DEG = 2.0, 22.0, 25.0, 15.0
 _SLOPE = 0.5 * float(np.tan(np.radians(_ANGLE_DEG)))
 # What stands out by no more than this times what the edges on its two sides are apart is a step from one to the other.
 _STEP = 1.5
@@ -59,6 +61,10 @@ class _Beside:
         """Cosine of the angle to the foot, of the half that runs less along it."""
         return np.asarray(np.minimum((self.near * foot).sum(axis=1), (self.far * foot).sum(axis=1)), np.float64)
 
+    def across(self, other: _Beside) -> Bools:
+        """Whether the farther halves are at right angles."""
+        return np.asarray(np.abs((self.far * other.far).sum(axis=1)) < np.sin(np.radians(_RIGHT_DEG)))
+
     def apart(self, other: _Beside) -> Float64s:
         """How far apart the lines of the edge on both sides are."""
         mean, way = _unit(self.far + other.far), other.middle - self.middle
@@ -93,11 +99,10 @@ def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     side = np.where(np.minimum(one.along(along), other.along(along)) > aligned, 0.0, np.nan)
     turning = before.turning_to(after)
     turn = np.stack([turning[feet] for feet in (starts, ends[long, starts])])
-    side = np.where(
-        np.isnan(side) & (np.abs(turn).min(axis=0) > np.radians(_OUT_DEG)) & (turn[0] * turn[1] > 0.0),
-        np.sign(turn[0]),
-        side,
-    )
+    sides = after.take(starts), before.take(ends[long, starts])
+    inwards = (turn.max(axis=0) < -np.radians(_OUT_DEG)) & ~(one.across(other) & sides[0].across(sides[1]))
+    outwards = turn.min(axis=0) > np.radians(_OUT_DEG)
+    side = np.where(np.isnan(side) & (outwards | inwards), np.sign(turn[0]), side)
     chosen = np.flatnonzero((reach > least) & ~np.isnan(side))
     best: NarrowFeature | None = None
     for some in np.split(chosen, np.flatnonzero(np.diff(long[chosen])) + 1):

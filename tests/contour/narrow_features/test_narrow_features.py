@@ -248,6 +248,16 @@ def test_what_stands_out_of_a_corner_on_both_sides_is_found(turn_deg: float) -> 
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 50.0, 160.0])
+def test_the_missing_corner_of_an_l_is_no_dent_and_a_bevel_in_it_is(turn_deg: float) -> None:
+    block = pitches((0, 0), (9, 0), (9, -8), (0, -8))
+    missing = pitches((-1, 1), (3.4, 1), (3.4, -3.4), (-1, -3.4))
+    assert found(block - missing, turn_deg) is None
+    dent = found(block - missing - pitches((3.4, -1.2), (5, -3.4), (5, -5), (0, -3.4)), turn_deg)
+    assert dent is not None
+    assert not dent.outwards
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 50.0, 160.0])
 def test_a_horn_is_found_and_the_tips_of_a_crescent_are_none(turn_deg: float) -> None:
     disc = shapely.Point(-4.77 * PITCH, 1.36 * PITCH).buffer(4.9 * PITCH)
     one = found(disc | pitches((0, 0), (1.6, 4.7), (-0.2, 3.14), (-4, 1)), turn_deg)

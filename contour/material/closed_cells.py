@@ -172,8 +172,8 @@ def _outlined(apart: Apart, cuts: Float64s = _NO_CUTS) -> MaterialEdge:
     outer = [one for one in found if not one[2]]
     if not outer:
         raise NoBlockFound(
-            "no block found: all that differs from the table is threads a pixel or two wide. Check that a block lies in "
-            "view, the light and the focus"
+            "no block found: all that differs from the table is threads a pixel or two wide. Check that a block lies "
+            "in view, the light and the focus"
         )
     exterior, widths, _ = max(outer, key=lambda one: abs(signed_area(one[0])))
     holes = [(_turned(ring, 1.0), wide) for ring, wide, hole in found if hole]

@@ -75,10 +75,21 @@ def test_of_several_the_deepest_is_told() -> None:
     assert one.place_px[0] == pytest.approx(400, abs=1.5 * PITCH)
 
 
-@pytest.mark.parametrize(("width", "depth"), [(11.0, 2.0), (9.0, 6.0), (3.0, 0.4)])
+@pytest.mark.parametrize(("width", "depth"), [(11.0, 2.0), (9.0, 6.0), (3.0, 0.3)])
 def test_wider_and_shallower_ones_are_the_blocks_own(width: float, depth: float) -> None:
     assert found(BLOCK | chip(width, depth)) is None
     assert found(BLOCK - dent(width, depth)) is None
+
+
+@pytest.mark.parametrize(("width", "depth"), [(3.0, 0.5), (5.5, 0.6)])
+def test_low_ones_on_a_straight_edge_are_found_and_none_of_a_corner(width: float, depth: float) -> None:
+    for shape, outwards in ((BLOCK | chip(width, depth), True), (BLOCK - dent(width, depth), False)):
+        one = found(shape)
+        assert one is not None
+        assert one.outwards == outwards
+        assert one.depth_pitches == pytest.approx(depth, abs=0.1)
+    roof = shapely.Polygon([(100, 499), (700, 499), (400, 500 + 300 * math.tan(math.radians(10)))])
+    assert found(BLOCK | roof) is None
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 30.0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -67,6 +68,16 @@ def test_an_outline_that_half_of_the_ends_lie_on_is_refused(share: float, refuse
             check_against_evidence(evidence, BLOCK, on_line, PITCH, None)
     else:
         check_against_evidence(evidence, BLOCK, on_line, PITCH, None)
+
+
+@pytest.mark.parametrize(("every", "refused"), [(3, False), (10, True)])
+def test_a_hole_along_which_hardly_any_wall_ends_was_not_cut(every: int, refused: bool) -> None:
+    evidence = witnesses(BLOCK, seed=2)
+    count = len(evidence.points)
+    kind = np.where(np.arange(count) % every == 0, WitnessKind.CLEAN, WitnessKind.OUTERMOST)
+    hole, on_line = replace(evidence, kind=kind, is_hole=True), np.ones(count, np.bool_)
+    with pytest.raises(NoBlockFound, match="as if it was not cut") if refused else nullcontext():
+        check_against_evidence(hole, BLOCK, on_line, PITCH, None)
 
 
 def test_three_ends_in_a_row_are_missing_cells() -> None:

@@ -99,9 +99,7 @@ def _around(body: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
     )
 
 
-def _placed(
-    body: NDArray[np.bool_], part: tuple[slice, slice], shape: tuple[int, ...]
-) -> NDArray[np.bool_]:
+def _placed(body: NDArray[np.bool_], part: tuple[slice, slice], shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """A body of which a part of the picture was drawn, in all of it."""
     drawn = np.zeros(shape, np.bool_)
     drawn[part] = body

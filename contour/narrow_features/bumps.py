@@ -25,9 +25,9 @@ _BESIDE, _ANGLE_DEG, _OUT_DEG, _RIGHT_DEG = 2.0, 22.0, 25.0, 15.0
 _SLOPE = 0.5 * float(np.tan(np.radians(_ANGLE_DEG)))
 # What stands out by no more than this times what the edges on its two sides are apart is a step from one to the other.
 _STEP = 1.5
-# Where both sides run along the foot, a low bump tells as well, so wide and high at most, if it stands out by more than
-# they lean: of 380 right outlines none has one, and each of three wrong ones, along a splice, a slot and an old cut.
-_LOW, _LOW_WIDE, _LOW_HIGH, _OF_LEAN = 0.35, 6.0, 1.0, 0.6
+# Where both sides run along the foot, a low one tells as well, if it stands out by more than they lean over its width:
+# of 400 right outlines none has one; along a splice, over a slot and where a curve had a spike there was one.
+_LOW = 0.35
 _SPACING, _LONGEST = 0.25, 20.0
 # From foot to foot the narrowest is told: a wider one, farther out on the same edge, is no deeper by this.
 _DEEPER = 0.05
@@ -92,7 +92,7 @@ def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     width = np.hypot(foot_x, foot_y)
     # A path so long reaches no farther out of its foot than half of it would, bent in its middle.
     reach = 0.5 * np.sqrt(np.maximum((steps * spacing) ** 2 - width**2, 0.0))
-    low = (width < _LOW_WIDE * pitch_px) & (reach > _LOW * pitch_px)
+    low = (width < WIDTH * pitch_px) & (reach > _LOW * pitch_px)
     high = (width < _WIDE * pitch_px) & (reach > np.maximum(DEPTH * pitch_px, _SLOPE * width))
     long, starts = np.nonzero(low | high)
     feet = np.stack([foot_x[long, starts], foot_y[long, starts]], axis=1)
@@ -101,9 +101,9 @@ def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     along = feet / np.maximum(width, 1e-9)[:, None]
     leaning = np.minimum(one.along(along), other.along(along))
     least = np.maximum(DEPTH * pitch_px, _SLOPE * width)
-    low = (leaning > aligned) & (width < _LOW_WIDE * pitch_px)
     lean = np.tan(np.arccos(np.clip(leaning, aligned, 1.0)))
-    least = np.where(low, np.minimum(least, np.maximum(_LOW * pitch_px, _OF_LEAN * width * lean)), least)
+    low = (leaning > aligned) & (width < WIDTH * pitch_px)
+    least = np.where(low, np.minimum(least, np.maximum(_LOW * pitch_px, width * lean)), least)
     least = np.maximum(least, _STEP * one.apart(other))
     # Which way bumps may lie: 0 either, as seen along the outline 1 to the right and -1 to the left, nan none.
     side = np.where(leaning > aligned, 0.0, np.nan)
@@ -118,8 +118,7 @@ def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     for some in np.split(chosen, np.flatnonzero(np.diff(long[chosen])) + 1):
         if len(some):
             run = starts[some], int(steps[long[some[0]], 0])
-            foot = along[some], width[some], least[some], side[some], low[some]
-            best = _deeper(best, places, run, foot, pitch_px)
+            best = _deeper(best, places, run, (along[some], width[some], least[some], side[some]), pitch_px)
     return best
 
 
@@ -127,12 +126,12 @@ def _deeper(
     best: NarrowFeature | None,
     places: Float64s,
     run: tuple[Indices, int],
-    foot: tuple[Float64s, Float64s, Float64s, Float64s, Bools],
+    foot: tuple[Float64s, Float64s, Float64s, Float64s],
     pitch_px: float,
 ) -> NarrowFeature | None:
     """The deepest of those that begin at `run`'s places and are its steps long, or `best` where none is deeper."""
     starts, steps = run
-    along, width, least, side, low = foot
+    along, width, least, side = foot
     path = places[(starts[:, None] + np.arange(steps + 1)) % len(places)] - places[starts][:, None, :]
     off = path[:, :, 0] * along[:, 1:] - path[:, :, 1] * along[:, :1]
     farthest = np.abs(off).argmax(axis=1)
@@ -142,8 +141,7 @@ def _deeper(
     middle = off.mean(axis=1)
     out = middle < 0
     upright = out & (depth < _HIGH * pitch_px) & (np.abs(_areas(path)) > _UPRIGHT * width * depth)
-    narrow = (width < WIDTH * pitch_px) | (low & (depth < _LOW_HIGH * pitch_px))
-    depth = np.where((depth > least) & (side * middle <= 0.0) & (upright | narrow), depth, 0.0)
+    depth = np.where((depth > least) & (side * middle <= 0.0) & (upright | (width < WIDTH * pitch_px)), depth, 0.0)
     one = int(depth.argmax())
     if depth[one] <= ((best.depth_pitches + _DEEPER) * pitch_px if best else 0.0):
         return best

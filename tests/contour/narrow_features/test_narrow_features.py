@@ -81,7 +81,7 @@ def test_wider_and_shallower_ones_are_the_blocks_own(width: float, depth: float)
     assert found(BLOCK - dent(width, depth)) is None
 
 
-@pytest.mark.parametrize(("width", "depth"), [(3.0, 0.5), (5.5, 0.6)])
+@pytest.mark.parametrize(("width", "depth"), [(3.0, 0.5), (4.5, 0.6)])
 def test_low_ones_on_a_straight_edge_are_found_and_none_of_a_corner(width: float, depth: float) -> None:
     for shape, outwards in ((BLOCK | chip(width, depth), True), (BLOCK - dent(width, depth), False)):
         one = found(shape)

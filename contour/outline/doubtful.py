@@ -27,6 +27,9 @@ _HARDLY_BENT = 16.0
 # outlines none has either.
 _NOTCH_LONG, _NOTCH_DEEP, _NOTCH_AS_WELL, _OF_EITHER = 1.5, 0.3, 12.0, 3
 _UNSEEN_LONG, _ASIDE = 3.0, 0.5
+# A corner between lines in which so many clean ends lie so far inside of both, pitches, may as well be a bevel: of
+# 196 right outlines one has such a corner, off by a third of a cell, and one that was off by 0.9.
+_IN_CORNER, _DEEP_IN_CORNER = 2, 0.35
 # So is a line across a corner no longer than that, by so few witnesses, if less than a cell would be lost in it: of 135
 # blocks none has one, and one whose last walls are inked has.
 _BEVEL_LONG, _LOST = 2.0, 1.0
@@ -58,6 +61,7 @@ def untold(
     ]
     places += _hardly_seen(witnesses, segments, lone, found, inlier)
     places += _bent_lines(witnesses, segments, lone, found, residual)
+    places += _maybe_bevelled(witnesses, segments, found, inlier)
     places += _unseen_corners(witnesses, segments, found, inlier, residual, chains)
     return np.array(places + _lone_bevels(witnesses, segments, found, inlier), np.complex128)
 
@@ -111,6 +115,25 @@ def _bent_lines(
             if nats < most and apart > _APART * witnesses.pitch_px:
                 places.append(ends.mean())
                 break
+    return places
+
+
+def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools) -> list[np.complex128]:
+    """Corners between lines that clean ends lie in which neither explains."""
+    places = []
+    lines = ~segments.bend & ~rolled(segments.bend, -1)
+    for k in np.flatnonzero(lines).tolist() if len(segments) > 2 else ():
+        after = (k + 1) % len(segments)
+        own, others = (segments.members(one, len(witnesses)) for one in (k, after))
+        on_own, on_other = np.flatnonzero(inlier[own]), np.flatnonzero(inlier[others])
+        if not len(on_own) or not len(on_other):
+            continue
+        between = np.concatenate([own[on_own[-1] + 1 :], others[: on_other[0]]])
+        both = segments.models.take(np.array([[k], [after]]))
+        inside = -distance(both, witnesses.points[between]).max(axis=0)
+        deep = witnesses.clean[between] & (inside > _DEEP_IN_CORNER * witnesses.pitch_px)
+        if np.count_nonzero(deep) >= _IN_CORNER:
+            places.append(np.complex128(0.5 * (found.end[k] + found.begin[k])))
     return places
 
 

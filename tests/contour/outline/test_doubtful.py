@@ -45,6 +45,15 @@ def test_a_curve_is_one_where_two_lines_hardly_turn() -> None:
     assert trace(render(random_scene(1_058_142).scene).picture, TraceSettings()).untold_px is None
 
 
+def test_a_corner_in_which_two_clean_ends_lie_is_told() -> None:
+    """It is bevelled by a cell and a half, 0.9 of a cell off."""
+    rendered = render(shop_floor_scene("undisturbed", 1_564_084).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+    assert traced.untold_px is not None
+    assert np.hypot(*np.subtract(traced.untold_px, (1116.0, 387.0))) < 1.5 * rendered.pitch_px
+
+
 def test_a_line_that_two_ends_alone_put_across_a_corner_is_told() -> None:
     """The walls of the cell in it are inked as dark as the table, 0.7 of a cell of the block."""
     rendered = render(shop_floor_scene("writing", 1_310_004).scene)

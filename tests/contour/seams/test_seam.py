@@ -78,8 +78,9 @@ def test_a_block_without_whole_cells_has_no_floors() -> None:
     assert parted_by_floors(none.astype(np.uint8), free) is None
 
 
-def test_compound_in_some_cells_beside_a_line_makes_no_other_block() -> None:
-    assert seam_in(shop_floor_scene("compound", 1_470_013).scene) is None
+@pytest.mark.parametrize(("kind", "seed"), [("compound", 1_470_013), ("glare", 1_564_045)])
+def test_compound_in_some_cells_beside_a_line_and_glare_make_no_other_block(kind: str, seed: int) -> None:
+    assert seam_in(shop_floor_scene(kind, seed).scene) is None
 
 
 def test_two_halves_that_lie_as_they_were_cut_are_two() -> None:

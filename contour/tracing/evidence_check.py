@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Float64s, Indices, median, rolled
+from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, median, rolled
 from contour.geometry.rectifier import Rectifier, rectified
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
@@ -38,6 +39,9 @@ _LONG_AND_LIKE_WALLS = ((0.5, 0.75), (0.9, 0.4))
 # Of 160 right cut lattices and 180 blocks on the shop floor no edge between two corners passes ends so far inside and
 # has as few of its own, which lie no nearer to the edges beside it; but chords of curves do.
 _PASSED_PITCHES, _LONG_PITCHES, _SHARED_PITCHES, _SHARED_SPREADS = 0.25, 1.5, 0.06, 3.0
+# Where walls lie farthest out, light changes by 0.28 of what it does at their ends at least (60 right outlines, in deep
+# shadow, else 0.69) over three of them in a row; along glare that was taken for walls by 0.15.
+_FLAT, _FLAT_IN_A_ROW, _PATCH_PITCHES = 0.2, 4, 0.06
 # Neighbours on a wall's boundary are an eighth of a pitch apart, its two sides a wall's width.
 _ONE_WALL_PITCHES = 0.3
 
@@ -151,6 +155,32 @@ def check_own_ends(evidence: RingEvidence, fitted: FittedRing, pitch_px: float, 
                 f"no block found: the outline passes wall ends near ({x:.0f}, {y:.0f}) px inside, along an edge with "
                 f"{len(own)} of its own. Check that nothing lies against the block, and that its edge is in focus"
             )
+
+
+def check_on_walls(evidence: RingEvidence, inlier: Bools, light: Bytes, pitch_px: float) -> None:
+    """Raise NoBlockFound where a ring was laid through four places in a row at which no wall ends, nor light, (H, W),
+    changes as it does at walls: along glare.
+    """
+    on_it = np.flatnonzero(inlier)
+    ends = evidence.kind[on_it] != WitnessKind.OUTERMOST
+    if len(on_it) < _FLAT_IN_A_ROW or not ends.any():
+        return
+    smooth = cv2.GaussianBlur(light, (0, 0), 1.0)
+    half = max(1, round(_PATCH_PITCHES * pitch_px)) + 1
+    column, row = np.rint(evidence.points[on_it]).astype(np.intp).T
+    reach = np.arange(-half, half + 1)
+    rows, columns = (
+        np.clip(place[:, None] + reach, 0, size - 1) for place, size in zip((row, column), light.shape, strict=True)
+    )
+    span = np.ptp(smooth[rows[:, :, None], columns[:, None, :]], axis=(1, 2))
+    flat = ~ends & (span < _FLAT * median(span[ends].astype(np.float64)))
+    in_a_row = np.all([np.roll(flat, shift) for shift in range(_FLAT_IN_A_ROW)], axis=0)
+    if in_a_row.any():
+        x, y = evidence.points[on_it[np.argmax(in_a_row)]]
+        raise NoBlockFound(
+            f"no block found: near ({x:.0f}, {y:.0f}) px the outline follows light that changes too softly for walls. "
+            "Move the lamp or the block so that no glare lies at its edge"
+        )
 
 
 def check_against_relief(

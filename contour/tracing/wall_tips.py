@@ -37,6 +37,7 @@ from contour.tracing.edge_kind import (
 from contour.tracing.evidence_check import (
     check_against_evidence,
     check_against_relief,
+    check_on_walls,
     check_own_ends,
     check_reached,
     check_unseen,
@@ -203,7 +204,9 @@ def _cut(
     visible = visible_rings(picture, seen, look, rectifier)
     for one in visible:
         check_against_evidence(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
-        if relief is not None:
+        if relief is None:
+            check_on_walls(one.evidence, one.fitted.inlier, light, seen.pitch_px)
+        else:
             check_against_relief(one.evidence, one.fitted.ring, relief, seen.pitch_px, rectifier)
     rings = [one.fitted for one in visible]
     exterior = rings[0]

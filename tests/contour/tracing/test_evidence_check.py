@@ -13,9 +13,14 @@ from contour.errors import NoBlockFound
 from contour.geometry.rings import densified
 from contour.outline.fit import FittedRing
 from contour.relief.relief import Displacement, Relief
+from contour.synthetic import render
 from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_own_ends, check_unseen
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, along, rectangle, witnesses
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+from tests.support.scenes.trials import calibration_for
 
 BLOCK = rectangle(900.0, 600.0)
 
@@ -78,6 +83,13 @@ def test_a_hole_along_which_hardly_any_wall_ends_was_not_cut(every: int, refused
     hole, on_line = replace(evidence, kind=kind, is_hole=True), np.ones(count, np.bool_)
     with pytest.raises(NoBlockFound, match="as if it was not cut") if refused else nullcontext():
         check_against_evidence(hole, BLOCK, on_line, PITCH, None)
+
+
+def test_an_outline_along_glare_that_was_taken_for_walls_is_refused() -> None:
+    rendered = render(shop_floor_scene("dim", 1_420_000).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    with pytest.raises(NoBlockFound, match="changes too softly for walls"):
+        trace(rendered.picture, TraceSettings(), rectifier=rectifier)
 
 
 def test_three_ends_in_a_row_are_missing_cells() -> None:

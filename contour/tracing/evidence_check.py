@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
@@ -157,20 +156,19 @@ def check_own_ends(evidence: RingEvidence, fitted: FittedRing, pitch_px: float, 
             )
 
 
-def check_on_walls(evidence: RingEvidence, inlier: Bools, light: Bytes, pitch_px: float) -> None:
+def check_on_walls(evidence: RingEvidence, inlier: Bools, smooth: Bytes, pitch_px: float) -> None:
     """Raise NoBlockFound where a ring was laid through four places in a row at which no wall ends, nor light, (H, W),
-    changes as it does at walls: along glare.
+    lightly blurred, changes as it does at walls: along glare.
     """
     on_it = np.flatnonzero(inlier)
     ends = evidence.kind[on_it] != WitnessKind.OUTERMOST
     if len(on_it) < _FLAT_IN_A_ROW or not ends.any():
         return
-    smooth = cv2.GaussianBlur(light, (0, 0), 1.0)
     half = max(1, round(_PATCH_PITCHES * pitch_px)) + 1
     column, row = np.rint(evidence.points[on_it]).astype(np.intp).T
     reach = np.arange(-half, half + 1)
     rows, columns = (
-        np.clip(place[:, None] + reach, 0, size - 1) for place, size in zip((row, column), light.shape, strict=True)
+        np.clip(place[:, None] + reach, 0, size - 1) for place, size in zip((row, column), smooth.shape, strict=True)
     )
     span = np.ptp(smooth[rows[:, :, None], columns[:, None, :]], axis=(1, 2))
     flat = ~ends & (span < _FLAT * median(span[ends].astype(np.float64)))

@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import cv2
 import numpy as np
 
 from contour.edge.edge_evidence import ring_evidence
@@ -202,10 +203,11 @@ def _cut(
     """The line along which a block was cut, through the ends of its walls."""
     seen, look = looked
     visible = visible_rings(picture, seen, look, rectifier)
+    smooth = light if relief is not None else np.asarray(cv2.GaussianBlur(light, (0, 0), 1.0), np.uint8)
     for one in visible:
         check_against_evidence(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
         if relief is None:
-            check_on_walls(one.evidence, one.fitted.inlier, light, seen.pitch_px)
+            check_on_walls(one.evidence, one.fitted.inlier, smooth, seen.pitch_px)
         else:
             check_against_relief(one.evidence, one.fitted.ring, relief, seen.pitch_px, rectifier)
     rings = [one.fitted for one in visible]

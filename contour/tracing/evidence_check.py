@@ -50,8 +50,7 @@ def check_against_evidence(
 ) -> None:
     """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side, or leaves
     two in a row outside by more than a third, or a clean one by more than a sixth beside another one that it passes, or
-    one of those that it was laid through: `inlier`, shape (N,); where these are hardly more than the others; and where
-    hardly any wall ends along a hole.
+    one of those that it was laid through: `inlier`, shape (N,); and where these are hardly more than the others.
 
     A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
     picture a lens bends a long edge by more than a small cell.
@@ -63,13 +62,6 @@ def check_against_evidence(
             "outline that fits most of them. Check that nothing lies against the block, and that its edge is in focus"
         )
     ends, clean = evidence.kind != WitnessKind.OUTERMOST, evidence.kind == WitnessKind.CLEAN
-    if evidence.is_hole and ends.mean() < _LEAST_ENDS_OF_HOLE:
-        x, y = ring.mean(axis=0)
-        raise NoBlockFound(
-            f"no block found: of {len(ends)} places along the hole around ({x:.0f}, {y:.0f}) px walls end at "
-            f"{np.count_nonzero(ends)} only, as if it was not cut: something that looks like the table may fill cells. "
-            "Check the light, and that nothing lies on the block"
-        )
     into_ring = depth_inside(ring, evidence.points, rectifier)
     depth = -into_ring if evidence.is_hole else into_ring
     # Ends inside are passed rightly where outermost walls between them are met: foam has such inside.
@@ -157,9 +149,19 @@ def check_own_ends(evidence: RingEvidence, fitted: FittedRing, pitch_px: float, 
 
 
 def check_on_walls(evidence: RingEvidence, inlier: Bools, smooth: Bytes, pitch_px: float) -> None:
-    """Raise NoBlockFound where a ring was laid through four places in a row at which no wall ends, nor light, (H, W),
-    lightly blurred, changes as it does at walls: along glare.
+    """Raise NoBlockFound where hardly any wall ends along a hole, or a ring was laid through four places in a row at
+    which none does, nor light, (H, W), lightly blurred, changes as it does at walls: along glare.
+
+    For rings of which nothing is hidden.
     """
+    count = np.count_nonzero(evidence.kind != WitnessKind.OUTERMOST)
+    if evidence.is_hole and count < _LEAST_ENDS_OF_HOLE * len(evidence.points):
+        (x, y), places = evidence.points.mean(axis=0), len(evidence.points)
+        raise NoBlockFound(
+            f"no block found: of {places} places along the hole around ({x:.0f}, {y:.0f}) px walls end at {count}, "
+            "as if it was not cut: something that looks like the table may fill cells. Check the light, and that "
+            "nothing lies on the block"
+        )
     on_it = np.flatnonzero(inlier)
     ends = evidence.kind[on_it] != WitnessKind.OUTERMOST
     if len(on_it) < _FLAT_IN_A_ROW or not ends.any():

@@ -203,12 +203,9 @@ def _cut(
     """The line along which a block was cut, through the ends of its walls."""
     seen, look = looked
     visible = visible_rings(picture, seen, look, rectifier)
-    smooth = light if relief is not None else np.asarray(cv2.GaussianBlur(light, (0, 0), 1.0), np.uint8)
     for one in visible:
         check_against_evidence(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
-        if relief is None:
-            check_on_walls(one.evidence, one.fitted.inlier, smooth, seen.pitch_px)
-        else:
+        if relief is not None:
             check_against_relief(one.evidence, one.fitted.ring, relief, seen.pitch_px, rectifier)
     rings = [one.fitted for one in visible]
     exterior = rings[0]
@@ -236,7 +233,10 @@ def _cut(
         for stretch in ring_evidence(number, ring, one, look, rectifier, bounds[number])
     )
     if all(stretch.state == "seen" for stretch in evidence):
+        smooth = np.asarray(cv2.GaussianBlur(light, (0, 0), 1.0), np.uint8)
         for one in visible:
+            if relief is None:
+                check_on_walls(one.evidence, one.fitted.inlier, smooth, seen.pitch_px)
             check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
             check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)

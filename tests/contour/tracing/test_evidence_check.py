@@ -14,7 +14,13 @@ from contour.geometry.rings import densified
 from contour.outline.fit import FittedRing
 from contour.relief.relief import Displacement, Relief
 from contour.synthetic import render
-from contour.tracing.evidence_check import check_against_evidence, check_against_relief, check_own_ends, check_unseen
+from contour.tracing.evidence_check import (
+    check_against_evidence,
+    check_against_relief,
+    check_on_walls,
+    check_own_ends,
+    check_unseen,
+)
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
@@ -82,7 +88,7 @@ def test_a_hole_along_which_hardly_any_wall_ends_was_not_cut(every: int, refused
     kind = np.where(np.arange(count) % every == 0, WitnessKind.CLEAN, WitnessKind.OUTERMOST)
     hole, on_line = replace(evidence, kind=kind, is_hole=True), np.ones(count, np.bool_)
     with pytest.raises(NoBlockFound, match="as if it was not cut") if refused else nullcontext():
-        check_against_evidence(hole, BLOCK, on_line, PITCH, None)
+        check_on_walls(hole, on_line, np.zeros((1000, 1400), np.uint8), PITCH)
 
 
 def test_an_outline_along_glare_that_was_taken_for_walls_is_refused() -> None:

@@ -92,9 +92,8 @@ def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     width = np.hypot(foot_x, foot_y)
     # A path so long reaches no farther out of its foot than half of it would, bent in its middle.
     reach = 0.5 * np.sqrt(np.maximum((steps * spacing) ** 2 - width**2, 0.0))
-    low = (width < WIDTH * pitch_px) & (reach > _LOW * pitch_px)
-    high = (width < _WIDE * pitch_px) & (reach > np.maximum(DEPTH * pitch_px, _SLOPE * width))
-    long, starts = np.nonzero(low | high)
+    far = np.where(width < WIDTH * pitch_px, _LOW * pitch_px, np.maximum(DEPTH * pitch_px, _SLOPE * width))
+    long, starts = np.nonzero((width < _WIDE * pitch_px) & (reach > far))
     feet = np.stack([foot_x[long, starts], foot_y[long, starts]], axis=1)
     width, reach = width[long, starts], reach[long, starts]
     one, other = before.take(starts), after.take(ends[long, starts])
@@ -102,11 +101,12 @@ def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     leaning = np.minimum(one.along(along), other.along(along))
     least = np.maximum(DEPTH * pitch_px, _SLOPE * width)
     lean = np.tan(np.arccos(np.clip(leaning, aligned, 1.0)))
-    low = (leaning > aligned) & (width < WIDTH * pitch_px)
+    straight = leaning > aligned
+    low = straight & (width < WIDTH * pitch_px)
     least = np.where(low, np.minimum(least, np.maximum(_LOW * pitch_px, width * lean)), least)
     least = np.maximum(least, _STEP * one.apart(other))
     # Which way bumps may lie: 0 either, as seen along the outline 1 to the right and -1 to the left, nan none.
-    side = np.where(leaning > aligned, 0.0, np.nan)
+    side = np.where(straight, 0.0, np.nan)
     turning = before.turning_to(after)
     turn = np.stack([turning[at] for at in (starts, ends[long, starts])])
     sides = after.take(starts), before.take(ends[long, starts])

@@ -54,7 +54,7 @@ def bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bo
         corner, near, far = complex(found.end[k]), complex(last[k]), complex(first[after])
         if found.begin[k] != corner or abs(far - near) < 1e-9:
             continue
-        unseen = _unseen(witnesses, _between(segments, inlier, k, after), material, corner=corner, near=near, far=far)
+        unseen = _unseen(witnesses, between(segments, inlier, k, after), material, corner=corner, near=near, far=far)
         left_out = _left_out(unseen)
         if left_out <= 0.0:
             continue
@@ -133,7 +133,7 @@ def _around(near: complex, far: complex, points: Complexes) -> Complexes:
     return np.array(chain)
 
 
-def _between(segments: Segments, inlier: Bools, before: int, after: int) -> Indices:
+def between(segments: Segments, inlier: Bools, before: int, after: int) -> Indices:
     """Witnesses after the last inlier of one segment and before the first of the next; none where either has none."""
     of_before, of_after = (segments.members(k, len(inlier)) for k in (before, after))
     if not inlier[of_before].any() or not inlier[of_after].any():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, rolled
+from contour.outline.bevels import between
 from contour.outline.chains import Chain
 from contour.outline.corners import Joints
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE
@@ -40,7 +41,8 @@ _LEAST_WEIGHT = 1e-9
 def untold(
     witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools, residual: Float64s, chains: list[Chain]
 ) -> Complexes:
-    """Middles of arcs, free curves and short lines that may as well be corners, shape (K,), in the fitting plane.
+    """Middles of arcs, free curves and short lines that may as well be corners, and corners that may as well be none,
+    shape (K,), in the fitting plane.
 
     Roundings of one block mostly have one radius: two that are alike tell each other.
     """
@@ -124,14 +126,10 @@ def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inl
     lines = ~segments.bend & ~rolled(segments.bend, -1)
     for k in np.flatnonzero(lines).tolist() if len(segments) > 2 else ():
         after = (k + 1) % len(segments)
-        own, others = (segments.members(one, len(witnesses)) for one in (k, after))
-        on_own, on_other = np.flatnonzero(inlier[own]), np.flatnonzero(inlier[others])
-        if not len(on_own) or not len(on_other):
-            continue
-        between = np.concatenate([own[on_own[-1] + 1 :], others[: on_other[0]]])
+        index = between(segments, inlier, k, after)
         both = segments.models.take(np.array([[k], [after]]))
-        inside = -distance(both, witnesses.points[between]).max(axis=0)
-        deep = witnesses.clean[between] & (inside > _DEEP_IN_CORNER * witnesses.pitch_px)
+        inside = -distance(both, witnesses.points[index]).max(axis=0)
+        deep = witnesses.clean[index] & (inside > _DEEP_IN_CORNER * witnesses.pitch_px)
         if np.count_nonzero(deep) >= _IN_CORNER:
             places.append(np.complex128(0.5 * (found.end[k] + found.begin[k])))
     return places
@@ -142,11 +140,11 @@ def _unseen_corners(
 ) -> list[np.complex128]:
     """Where two arcs meet in no curve, and too little was seen for it to be told that they do."""
     joined = {k for chain in chains for k in chain.segments[:-1]}
-    if any(chain.curve.closed for chain in chains):
+    if len(segments) < 2 or any(chain.curve.closed for chain in chains):
         return []
     places = []
     for k in np.flatnonzero(segments.bend & rolled(segments.bend, -1)).tolist():
-        if k in joined or len(segments) < 2:
+        if k in joined:
             continue
         before, after = (segments.members(one, len(witnesses)) for one in (k, (k + 1) % len(segments)))
         last, first = np.flatnonzero(inlier[before])[-_OF_EITHER:], np.flatnonzero(inlier[after])[:_OF_EITHER]

@@ -66,9 +66,7 @@ def parted_by_floors(light: Bytes, free: Openings) -> Parted | None:
         return None
     start, stop = max(at[before].min(), at[after].min()), min(at[before].max(), at[after].max())
     part = np.floor((at - start) / max(stop - start, 1e-9) * _PARTS)
-    grows = _grows(floor, -away, before, after) or _grows(floor, away, after, before)
-    long = stop - start >= max(_LEAST_LONG, _OF_CHORD * _chord(free, line))
-    if grows or not long or not _is_step(floor, before, after, part):
+    if not _is_step(floor, away, part) or stop - start < max(_LEAST_LONG, _OF_CHORD * _chord(free, line)):
         return None
     off = (column * line.normal[0] + row * line.normal[1]) / free.pitch - line.distance
     of_walls = _share(*(quantile(walls[_beside(side)], _WALL) for side in (-off, off)))
@@ -123,23 +121,25 @@ def _beside(away: Float64s) -> Bools:
     return np.asarray((away > _NEAR) & (away < _NEAR + _BAND))
 
 
-def _grows(floor: Float64s, away: Float64s, side: Bools, other: Bools) -> bool:
-    """Whether floors on one side differ more from those on the other the farther out they lie."""
-    farther = away > _NEAR + 0.5 * _BAND
+def _grows(floor: Float64s, away: Float64s, step: float) -> bool:
+    """Whether floors beside a line differ by much of the step across it the farther out they lie."""
+    side, farther = _beside(away), away > _NEAR + 0.5 * _BAND
     near, far = floor[side & ~farther], floor[side & farther]
-    if min(len(near), len(far)) < _FEWEST_FARTHER:
-        return False
-    step = median(floor[side]) - median(floor[other])
-    return abs(median(far) - median(near)) > _GROWS * abs(step)
+    return min(len(near), len(far)) >= _FEWEST_FARTHER and abs(median(far) - median(near)) > _GROWS * abs(step)
 
 
-def _is_step(floor: Float64s, before: Bools, after: Bools, part: Float64s) -> bool:
-    """Whether floors step all along a line, by more than they differ on each side of it; part: which each lies in."""
+def _is_step(floor: Float64s, away: Float64s, part: Float64s) -> bool:
+    """Whether floors, so far beyond a line, step all along it, by more than they differ on each side of it; part: which
+    of the line's each lies in.
+    """
+    before, after = _beside(-away), _beside(away)
     low, high = median(floor[before]), median(floor[after])
     spread = median(np.abs(np.concatenate([floor[before] - low, floor[after] - high]))) * 1.4826 + _LEAST_SPREAD
     like_other = np.abs(floor - np.where(after, high, low)) > np.abs(floor - np.where(after, low, high))
     alike = max(np.mean(like_other[before]), np.mean(like_other[after]))
     if abs(high - low) < _SPREADS * spread or alike > _LIKE_OTHER:
+        return False
+    if _grows(floor, -away, high - low) or _grows(floor, away, high - low):
         return False
     seen = 0
     for number in range(_PARTS):

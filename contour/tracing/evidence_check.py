@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
@@ -40,7 +41,7 @@ _LONG_AND_LIKE_WALLS = ((0.5, 0.75), (0.9, 0.4))
 _PASSED_PITCHES, _LONG_PITCHES, _SHARED_PITCHES, _SHARED_SPREADS = 0.25, 1.5, 0.06, 3.0
 # Where walls lie farthest out, light changes by 0.28 of what it does at their ends at least (60 right outlines, in deep
 # shadow, else 0.69) over three of them in a row; along glare that was taken for walls by 0.15.
-_FLAT, _FLAT_IN_A_ROW, _PATCH_PITCHES = 0.2, 4, 0.06
+_FLAT, _FLAT_IN_A_ROW, _PATCH_PITCHES, _BLUR_PX, _BLUR_REACHES_PX = 0.2, 4, 0.06, 1.0, 3
 # Neighbours on a wall's boundary are an eighth of a pitch apart, its two sides a wall's width.
 _ONE_WALL_PITCHES = 0.3
 
@@ -79,7 +80,7 @@ def check_against_evidence(
     ):
         if not off.any():
             continue
-        in_a_row = np.all([np.roll(off, shift) for shift in range(most)], axis=0)
+        in_a_row = _ends_of_rows(off, most)
         if in_a_row.any():
             x, y = points[np.argmax(in_a_row)]
             raise NoBlockFound(
@@ -148,9 +149,9 @@ def check_own_ends(evidence: RingEvidence, fitted: FittedRing, pitch_px: float, 
             )
 
 
-def check_on_walls(evidence: RingEvidence, inlier: Bools, smooth: Bytes, pitch_px: float) -> None:
+def check_on_walls(evidence: RingEvidence, inlier: Bools, light: Bytes, pitch_px: float) -> None:
     """Raise NoBlockFound where hardly any wall ends along a hole, or a ring was laid through four places in a row at
-    which none does, nor light, (H, W), lightly blurred, changes as it does at walls: along glare.
+    which none does, nor light, (H, W), changes as it does at walls: along glare.
 
     For rings of which nothing is hidden.
     """
@@ -166,21 +167,33 @@ def check_on_walls(evidence: RingEvidence, inlier: Bools, smooth: Bytes, pitch_p
     ends = evidence.kind[on_it] != WitnessKind.OUTERMOST
     if len(on_it) < _FLAT_IN_A_ROW or not ends.any():
         return
-    half = max(1, round(_PATCH_PITCHES * pitch_px)) + 1
-    column, row = np.rint(evidence.points[on_it]).astype(np.intp).T
-    reach = np.arange(-half, half + 1)
-    rows, columns = (
-        np.clip(place[:, None] + reach, 0, size - 1) for place, size in zip((row, column), smooth.shape, strict=True)
-    )
-    span = np.ptp(smooth[rows[:, :, None], columns[:, None, :]], axis=(1, 2))
-    flat = ~ends & (span < _FLAT * median(span[ends].astype(np.float64)))
-    in_a_row = np.all([np.roll(flat, shift) for shift in range(_FLAT_IN_A_ROW)], axis=0)
+    span = _changes(light, evidence.points[on_it], max(1, round(_PATCH_PITCHES * pitch_px)) + 1)
+    in_a_row = _ends_of_rows(~ends & (span < _FLAT * median(span[ends])), _FLAT_IN_A_ROW)
     if in_a_row.any():
         x, y = evidence.points[on_it[np.argmax(in_a_row)]]
         raise NoBlockFound(
             f"no block found: near ({x:.0f}, {y:.0f}) px the outline follows light that changes too softly for walls. "
             "Move the lamp or the block so that no glare lies at its edge"
         )
+
+
+def _changes(light: Bytes, points: Float64s, half: int) -> Float64s:
+    """By how much light, lightly blurred, changes within so many pixels of points, (N, 2), both ways, shape (N,)."""
+    reach = np.arange(-half - _BLUR_REACHES_PX, half + _BLUR_REACHES_PX + 1)
+    columns, rows = (
+        np.clip(place[:, None] + reach, 0, size - 1)
+        for place, size in zip(np.rint(points).astype(np.intp).T, light.shape[::-1], strict=True)
+    )
+    # Patches below one another: only what is looked at is blurred, and nothing of one reaches the next.
+    patches = light[rows[:, :, None], columns[:, None, :]]
+    smooth = cv2.GaussianBlur(patches.reshape(-1, len(reach)), (2 * _BLUR_REACHES_PX + 1,) * 2, _BLUR_PX)
+    inner = slice(_BLUR_REACHES_PX, -_BLUR_REACHES_PX)
+    return np.asarray(np.ptp(smooth.reshape(patches.shape)[:, inner, inner], axis=(1, 2)), np.float64)
+
+
+def _ends_of_rows(flags: Bools, count: int) -> Bools:
+    """Where so many flags in a row around a ring end, shape (N,)."""
+    return np.asarray(np.all([np.roll(flags, shift) for shift in range(count)], axis=0))
 
 
 def check_against_relief(

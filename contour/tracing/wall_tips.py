@@ -6,7 +6,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import cv2
 import numpy as np
 
 from contour.edge.edge_evidence import ring_evidence
@@ -233,10 +232,9 @@ def _cut(
         for stretch in ring_evidence(number, ring, one, look, rectifier, bounds[number])
     )
     if all(stretch.state == "seen" for stretch in evidence):
-        smooth = np.asarray(cv2.GaussianBlur(light, (0, 0), 1.0), np.uint8)
         for one in visible:
             if relief is None:
-                check_on_walls(one.evidence, one.fitted.inlier, smooth, seen.pitch_px)
+                check_on_walls(one.evidence, one.fitted.inlier, light, seen.pitch_px)
             check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
             check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)

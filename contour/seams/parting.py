@@ -227,7 +227,8 @@ def _pieces(rest: Bools, least: float) -> Iterator[Bools]:
     """Each piece of the rest, (h, w), of more than `least` samples, with all that is nearer to it than to others; none
     where there is only one.
     """
-    _, pieces, stats, _ = cv2.connectedComponentsWithStats(rest.astype(np.uint8), connectivity=4)
+    # As nearest pieces are labelled: parts that touch at a corner are one.
+    _, pieces, stats, _ = cv2.connectedComponentsWithStats(rest.astype(np.uint8), connectivity=8)
     large = stats[:, cv2.CC_STAT_AREA] > least
     large[0] = False
     if np.count_nonzero(large) < 2:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from contour.seams.openings import Openings
-from contour.seams.parting import parted_by_row, parted_strip
+from contour.seams.parting import beside, parted_by_row, parted_strip
 
 PITCH = 10
 
@@ -45,6 +47,13 @@ def test_a_row_from_edge_to_edge_parts_a_block_there(column: int) -> None:
 
 def test_a_row_between_a_hole_and_the_edge_parts_nothing() -> None:
     assert parted_by_row(square_cells(11, hole=True)) is None
+
+
+def test_parts_that_touch_at_a_corner_are_one() -> None:
+    deep = np.zeros((20, 20), np.float32)
+    deep[:10, :10] = deep[10:, 10:] = 2.0
+    free = replace(numbered(np.zeros((20, 20), np.uint8), deep), pitch=1.0)
+    assert beside(free, 0.0, np.array([3.0, 16.0]), np.array([6.0, 16.0])) is None
 
 
 def with_opening(first: int, last: int, column: int = 3) -> Openings:

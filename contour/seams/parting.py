@@ -40,6 +40,8 @@ _ALONG, _ALONG_SHORT = 0.38, 0.6
 # directions, those on it lie; the best lines of all that are looked at; how long one is at the least, and how far one
 # is followed beyond the last place.
 _MERGED, _PLACES, _ON_LINE, _DIRECTIONS, _BEST, _LEAST_LINE, _BEYOND = 1.5, 3.0, 0.6, 60, 4, 4.0, 6.0
+# In a window of so many pitches both ways most cells decide.
+_MOST_OF_PITCHES = 1.2
 # Half a step of such a line is left over at each end.
 _END = 0.5
 
@@ -178,6 +180,23 @@ def beside(free: Openings, share: float, start: Float64s, stop: Float64s) -> Par
     return _parted(free, every, share, part, off_line)
 
 
+def parted_by_kind(free: Openings, kind: Bools) -> Parted | None:
+    """The part of the block in which most cells are of a kind, (N,), one flag a cell; None where that is nothing."""
+    every = max(1, int(free.pitch / _SAMPLES))
+    depth, pitch = free.depth[::every, ::every], free.pitch / every
+    column, row = np.minimum(
+        np.rint(free.centre[free.cells] / every).astype(np.intp), np.array(depth.shape[::-1]) - 1
+    ).T
+    apart = np.ones(depth.shape, np.uint8)
+    apart[row, column] = 0
+    _, nearest = cv2.distanceTransformWithLabels(apart, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    of_kind = np.zeros(int(nearest.max()) + 1, np.uint8)
+    of_kind[nearest[row, column]] = kind
+    part = cv2.medianBlur(of_kind[nearest], 2 * round(_MOST_OF_PITCHES * pitch) + 1) > 0
+    line = (depth > NEAR_OUTLINE) & _border(part)
+    return _parted(free, every, 0.0, part, ~line) if line.any() else None
+
+
 def _parts(free: Openings) -> Iterator[Parted]:
     """Parts of the block that openings part from the rest of it: long ones alone, and with shorter ones."""
     every = max(1, int(free.pitch / _SAMPLES))
@@ -218,7 +237,7 @@ def _parted(free: Openings, every: int, along: float, part: Bools, off_line: Boo
 def _pieces_and_lines(rest: Bools, inside: Bools, least: float) -> Iterator[tuple[Bools, Bools]]:
     """Pieces of the rest, as `_pieces`, and the lines around them."""
     for part in _pieces(rest, least):
-        line = inside & (cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((2, 2), np.uint8)) > 0)
+        line = inside & _border(part)
         if line.any():
             yield part, line
 
@@ -236,6 +255,11 @@ def _pieces(rest: Bools, least: float) -> Iterator[Bools]:
     none: Bytes = (~large[pieces]).astype(np.uint8)
     _, nearest = cv2.distanceTransformWithLabels(none, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
     yield from (nearest == number for number in range(1, int(nearest.max()) + 1))
+
+
+def _border(part: Bools) -> Bools:
+    """The samples on the border of a part, (h, w)."""
+    return np.asarray(cv2.morphologyEx(part.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((2, 2), np.uint8)) > 0)
 
 
 def _away(free: Bools) -> Float32s:

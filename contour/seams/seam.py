@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes
+from contour.image.opencv import grey
 from contour.image.pixel_grid import averaged, pixels_of
 from contour.seams.both_sides import cell_order, comb_along
 from contour.seams.floors import parted_by_floors
@@ -70,7 +71,7 @@ def _other_block(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Parte
     if found is not None and comb_along(light, free, found) and _two(walls, seen, free, found):
         return found
     others = (one for one in _in_another_order(free) if comb_along(light, free, one))
-    return next(others, None) or parted_by_floors(light, free)
+    return next(others, None) or parted_by_floors(_lit(walls, seen, free), free)
 
 
 def _in_another_order(free: Openings) -> Iterator[Parted]:
@@ -101,10 +102,22 @@ def _with_faint(walls: SeenWalls, seen: BlockEvidence, step: int) -> Openings:
 
 def _light(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Bytes:
     """The light that walls were seen in on the openings' grid, (h, w), bright where walls are."""
-    (left, top), (high, wide) = free.first, free.numbers.shape
-    part = walls.small[top : top + high * free.step, left : left + wide * free.step]
-    light = averaged(part, free.step, cv2.BORDER_REPLICATE)
+    light = _on_grid(walls.small, free)
     return light if seen.polarity == "bright" else np.asarray(cv2.bitwise_not(light), np.uint8)
+
+
+def _lit(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Bytes:
+    """As `_light`; on a known table, from which floors of cells do not differ, how they are lit."""
+    if walls.relief is None:
+        return _light(walls, seen, free)
+    return _on_grid(averaged(grey(walls.relief.lit), walls.scale, cv2.BORDER_REPLICATE), free)
+
+
+def _on_grid(small: Bytes, free: Openings) -> Bytes:
+    """Means on the openings' grid, (h, w)."""
+    (left, top), (high, wide) = free.first, free.numbers.shape
+    part = small[top : top + high * free.step, left : left + wide * free.step]
+    return averaged(part, free.step, cv2.BORDER_REPLICATE)
 
 
 def _smaller(free: Openings, part: Bools, scale: int) -> Piece:

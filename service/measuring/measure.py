@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,7 @@ from contour.image.picture_check import check_picture
 from contour.image.region import Region
 from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
+from contour.relief.plain_table import plain_table
 from contour.relief.relief import Displacement, Relief
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import TraceSettings
@@ -162,7 +164,8 @@ class Measurer:
         calibration = self._calibration
         if calibration is not None:
             calibration.check_fits(width, height)
-        picture, relief = without_line_noise(picture), None
+        picture = without_line_noise(picture)
+        outlined = partial(self._outlined, recipe=recipe, thickness_mm=thickness_mm, result=result, watch=watch)
         if self._table is not None:
             look = self._look_at_table(self._table, picture, camera)
             watch.lap("table")
@@ -170,7 +173,40 @@ class Measurer:
             if changes:
                 return replace(result, findings=rejections(changes))
             relief = self._relief(picture, look, recipe, thickness_mm)
-            picture = look.picture if relief is None else relief.apart
+            return outlined(look.picture if relief is None else relief.apart, relief)
+
+        def on_even_table() -> Measurement | None:
+            """What nothing speaks against, where the table need not be taught to be known; else None."""
+            look = plain_table(picture)
+            relief = None if look is None else self._relief(picture, look, recipe, thickness_mm)
+            watch.lap("table")
+            with contextlib.suppress(NoBlockFound, EdgeContradicted):
+                found = None if relief is None else outlined(relief.apart, relief)
+                return found if found is not None and not found.findings else None
+            return None
+
+        try:
+            found = outlined(picture, None)
+        except NoBlockFound:
+            again = on_even_table()
+            if again is None:
+                raise
+            return again
+        return (on_even_table() if found.findings else None) or found
+
+    def _outlined(
+        self,
+        picture: NDArray[np.uint8],
+        relief: Relief | None,
+        *,
+        recipe: AnyRecipe,
+        thickness_mm: float,
+        result: Measurement,
+        watch: _Stopwatch,
+    ) -> Measurement:
+        """The measurement of a picture, or of what differs in it from a known table."""
+        height, width = picture.shape[:2]
+        calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
         checked = _checked_trace(picture, recipe, region, rectifier, watch, relief)

@@ -17,9 +17,11 @@ from contour.edge.reflection import reflection
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, densified
+from contour.image.opencv import grey
 from contour.image.side_by_side import side_by_side
 from contour.narrow_features.feature import NarrowFeature
 from contour.narrow_features.narrow_feature import narrow_feature
+from contour.relief.relief import Relief
 from contour.tracing.trace import Trace
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
@@ -56,10 +58,12 @@ class CheckedTrace:
         return replace(self, trace=self.trace.moved(first), **moved)
 
 
-def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> CheckedTrace:
+def check_trace(
+    picture: Bytes, traced: Trace, rectifier: Rectifier | None, relief: Relief | None = None
+) -> CheckedTrace:
     """The trace with its quality and its disagreement with the picture, (H, W) grey or (H, W, 3) BGR, uint8.
 
-    `picture` and `rectifier` are those it was traced with.
+    All are those it was traced with.
     """
     quality = block_quality(picture, traced.light, traced.contour, traced.pitch_px)
     # What is at full scale beside dark walls is the table; their ends are seen all the better.
@@ -72,7 +76,7 @@ def check_trace(picture: Bytes, traced: Trace, rectifier: Rectifier | None) -> C
     loose = None if traced.look is None or traced.look.loose is None else traced.look.loose.astype(np.uint8)
     apart, edge = side_by_side(
         lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat, loose),
-        lambda: _checked_edge(picture, traced, pitch_px),
+        lambda: _checked_edge(picture, traced, pitch_px, relief),
     )
     return _without_image(CheckedTrace(traced, quality, apart, *edge), pitch_px)
 
@@ -92,10 +96,12 @@ def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:
 
 
 def _checked_edge(
-    picture: Bytes, traced: Trace, pitch_px: float
+    picture: Bytes, traced: Trace, pitch_px: float, relief: Relief | None
 ) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None, EdgePart | None, EdgePart | None]:
     """What is narrow, alike, bare, overrun and runs on of an edge; the last alone where closed cells are serrated."""
     runs_on = border_beyond(_planes(picture, traced.light), traced.contour, pitch_px)
+    if runs_on is None and relief is not None and relief.even:
+        runs_on = border_beyond(_planes(relief.lit, grey(relief.lit)), traced.contour, pitch_px, of_any_light=True)
     if traced.evidence is None:
         return None, None, None, None, runs_on
     return (

@@ -65,21 +65,24 @@ class _Rays:
         return np.asarray(self.origin.reshape(shape) + parts)
 
 
-def border_beyond(planes: Sequence[Bytes], contour: Contour, pitch_px: float) -> EdgePart | None:
+def border_beyond(
+    planes: Sequence[Bytes], contour: Contour, pitch_px: float, *, of_any_light: bool = False
+) -> EdgePart | None:
     """The clearest border in planes of light, (H, W) each, that goes on from an edge of the contour past its corner:
-    the length looked at, and the corner. None where there is none.
+    the length looked at, and the corner. None where there is none. of_any_light: even where light beyond is another
+    than along the edge, or a shadow's: on an even table nothing else has borders.
 
     The contour's holes run the other way around than its exterior.
     """
     side = float(np.sign(signed_area(contour.exterior)))
-    found = [one for ring in contour.rings for one in _borders(planes, ring, side, pitch_px)]
+    found = [one for ring in contour.rings for one in _borders(planes, ring, side, pitch_px, of_any_light)]
     if not found:
         return None
     return EdgePart(_SPACING * _PARTS * _OF_PART, max(found)[1])
 
 
 def _borders(
-    planes: Sequence[Bytes], ring: Ring, side: float, pitch_px: float
+    planes: Sequence[Bytes], ring: Ring, side: float, pitch_px: float, of_any_light: bool
 ) -> list[tuple[float, tuple[float, float]]]:
     """How far borders past corners of a ring stand out of the noise, and the corners."""
     rays = _rays(ring, side, pitch_px)
@@ -100,7 +103,9 @@ def _borders(
         over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
         if (over > 1.0).any():
             line = at[:, None] * pitch_px + turn[:, None] * ahead
-            chosen = _of_things(light, rays, over, (ahead, line), _usual_light(light, ring, side * pitch_px), pitch_px)
+            usual = _usual_light(light, ring, side * pitch_px)
+            of_things = _of_things(light, rays, over, (ahead, line), usual, pitch_px)
+            chosen = (over > 1.0) & (of_any_light | of_things)
             found += [(float(over[k]), rays.corner[k]) for k in np.flatnonzero(chosen).tolist()]
     return [(over, (float(x), float(y))) for over, (x, y) in found]
 

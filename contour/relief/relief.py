@@ -56,7 +56,7 @@ class Relief:
     apart: how much it differs from the table in its shade, (H, W), uint8, roots of grey levels, in the channel in which
     it does most. signed: channels less the table's in its shade, (H, W) each, float32, grey levels. lit: light now over
     light then, 120 where they are alike, in the picture's shape, uint8. displacement: that of walls' lower edges.
-    wall_px: how wide walls measure.
+    wall_px: how wide walls measure. even: whether the table is known from the picture alone, as one without a pattern.
     """
 
     apart: Bytes
@@ -64,6 +64,7 @@ class Relief:
     lit: Bytes
     displacement: Displacement
     wall_px: float
+    even: bool = False
 
     def height_at(self, points: Float64s) -> Float64s:
         """By how much walls at points (N, 2) of their boundary differ from the table, at most, grey levels, shape (N,):

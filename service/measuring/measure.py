@@ -181,7 +181,7 @@ class Measurer:
             relief = None if look is None else self._relief(picture, look, recipe, thickness_mm)
             watch.lap("table")
             with contextlib.suppress(NoBlockFound, EdgeContradicted):
-                found = None if relief is None else outlined(relief.apart, relief)
+                found = None if relief is None else outlined(relief.apart, replace(relief, even=True))
                 return found if found is not None and not found.findings else None
             return None
 
@@ -348,7 +348,7 @@ def _checked_trace(
     """The block traced in the region alone, and checked there, in pixels of the whole picture."""
     if region is None:
         traced = trace(picture, trace_settings(recipe), rectifier=rectifier, relief=relief, on_stage=watch.lap)
-        checked = check_trace(picture, traced, rectifier)
+        checked = check_trace(picture, traced, rectifier, relief)
         watch.lap("quality")
         return checked
     part, first = region.cut(picture)

@@ -263,7 +263,7 @@ class Measurer:
     def _relief(
         self, picture: NDArray[np.uint8], look: TableLook, recipe: AnyRecipe, thickness_mm: float
     ) -> Relief | None:
-        """How the picture stands out of a taught table as light as the walls; None of a darker one, and where nobody
+        """How the picture stands out of a known table as light as the walls; None of a darker one, and where nobody
         knows how far lower edges of walls seem displaced.
         """
         calibration = self._calibration

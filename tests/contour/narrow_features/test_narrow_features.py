@@ -280,6 +280,14 @@ def test_a_horn_is_found_and_the_tips_of_a_crescent_are_none(turn_deg: float) ->
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 50.0])
+def test_an_edge_drawn_past_a_curve_is_a_horn(turn_deg: float) -> None:
+    """As along glare: not so sharp, since one of its sides is the edge itself."""
+    one = found(pitches((0, -10), (10, -10), (10, 1.6), (8.4, 1.1), (6.4, 2.3), (4, 2.6), (1.5, 1.8), (0, 0)), turn_deg)
+    assert one is not None
+    assert one.depth_pitches == pytest.approx(1.7, abs=0.1)
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 50.0])
 def test_a_small_round_hole_is_no_dent(turn_deg: float) -> None:
     assert found(BLOCK - shapely.Point(300, 300).buffer(2.0 * PITCH), turn_deg) is None
 

@@ -41,12 +41,14 @@ def test_a_table_with_borders_of_its_own_is_not_told(kind: str) -> None:
     assert plain_table(render(replace(LIGHT, things=(Structure(kind, 60.0, 0.25, 30.0),))).picture) is None
 
 
-def test_of_a_picture_full_of_borders_or_without_any_no_table_is_made_up() -> None:
+def test_a_picture_full_of_borders_shows_no_table_and_one_without_any_no_block() -> None:
     noise = np.random.default_rng(1).integers(0, 255, (300, 400), dtype=np.uint8)
     assert plain_table(noise) is None
-    even = plain_table(np.full((300, 400), 80, np.uint8))
-    assert even is not None
-    assert np.ptp(even.known) == 0
+    assert plain_table(np.full((300, 400), 80, np.uint8)) is None
+
+
+def test_streaks_without_borders_make_no_even_table() -> None:
+    assert plain_table(render(shop_floor_scene("wood", 1_600_083).scene).picture) is None
 
 
 def test_a_block_on_an_even_table_as_light_as_its_walls_needs_no_taught_one() -> None:

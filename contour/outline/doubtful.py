@@ -8,6 +8,7 @@ from contour.geometry.arrays import Bools, Complexes, Float64s, Indices, rolled
 from contour.outline.bevels import between
 from contour.outline.chains import Chain
 from contour.outline.corners import Joints
+from contour.outline.corners import ends as outermost
 from contour.outline.labelling import PRICE_ARC, PRICE_LINE
 from contour.outline.lines_and_arcs import Models, distance, feet, through_triples
 from contour.outline.roundings import LEAST_TURN, MOST_TURN
@@ -31,6 +32,9 @@ _UNSEEN_LONG, _ASIDE = 3.0, 0.5
 # A corner between lines in which so many clean ends lie so far inside of both, pitches, may as well be a bevel: of
 # 196 right outlines one has such a corner, off by a third of a cell, and one that was off by 0.9.
 _IN_CORNER, _DEEP_IN_CORNER = 2, 0.35
+# So may one of which so many square pitches are unseen between the last ends on both: a bevel of three cells was drawn
+# halfway. Of 255 right outlines none has such a corner, of 139 cut lattices one.
+_UNSEEN = 2.6
 # So is a line across a corner no longer than that, by so few witnesses, if less than a cell would be lost in it: of 135
 # blocks none has one, and one whose last walls are inked has.
 _BEVEL_LONG, _LOST = 2.0, 1.0
@@ -121,17 +125,20 @@ def _bent_lines(
 
 
 def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools) -> list[np.complex128]:
-    """Corners between lines that clean ends lie in which neither explains."""
+    """Corners between lines that clean ends lie in which neither explains, or of which hardly anything was seen."""
     places = []
+    first, last = outermost(witnesses, segments, inlier)
     lines = ~segments.bend & ~rolled(segments.bend, -1)
     for k in np.flatnonzero(lines).tolist() if len(segments) > 2 else ():
         after = (k + 1) % len(segments)
         index = between(segments, inlier, k, after)
         both = segments.models.take(np.array([[k], [after]]))
-        inside = -distance(both, witnesses.points[index]).max(axis=0)
-        deep = witnesses.clean[index] & (inside > _DEEP_IN_CORNER * witnesses.pitch_px)
-        if np.count_nonzero(deep) >= _IN_CORNER:
-            places.append(np.complex128(0.5 * (found.end[k] + found.begin[k])))
+        inside = -distance(both, witnesses.points[index])[:, witnesses.clean[index]].max(axis=0) / witnesses.pitch_px
+        corner = np.complex128(0.5 * (found.end[k] + found.begin[k]))
+        sides = np.array([last[k], first[after]]) - corner
+        unseen = 0.5 * abs((sides[0] * sides[1].conjugate()).imag) / witnesses.pitch_px**2
+        if unseen > _UNSEEN or np.count_nonzero(inside > _DEEP_IN_CORNER) >= _IN_CORNER:
+            places.append(corner)
     return places
 
 

@@ -51,6 +51,11 @@ def test_a_corner_in_which_two_clean_ends_lie_is_told() -> None:
     assert_told(shop_floor_scene("undisturbed", 1_564_084), (1116.0, 387.0), within=1.5)
 
 
+def test_a_corner_of_which_hardly_anything_is_seen_is_told() -> None:
+    """It is bevelled by three cells, and was drawn halfway, 0.5 of a cell off."""
+    assert_told(shop_floor_scene("undisturbed", 1_621_213, alone=True), (160.0, 628.0), within=2.0)
+
+
 def test_a_line_that_two_ends_alone_put_across_a_corner_is_told() -> None:
     """The walls of the cell in it are inked as dark as the table, 0.7 of a cell of the block."""
     rendered = render(shop_floor_scene("writing", 1_310_004).scene)

@@ -103,9 +103,10 @@ def _borders(
         over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
         if (over > 1.0).any():
             line = at[:, None] * pitch_px + turn[:, None] * ahead
-            usual = _usual_light(light, ring, side * pitch_px)
-            of_things = _of_things(light, rays, over, (ahead, line), usual, pitch_px)
-            chosen = (over > 1.0) & (of_any_light | of_things)
+            chosen = over > 1.0
+            if not of_any_light:
+                usual = _usual_light(light, ring, side * pitch_px)
+                chosen = _of_things(light, rays, over, (ahead, line), usual, pitch_px)
             found += [(float(over[k]), rays.corner[k]) for k in np.flatnonzero(chosen).tolist()]
     return [(over, (float(x), float(y))) for over, (x, y) in found]
 

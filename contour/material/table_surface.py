@@ -46,7 +46,7 @@ def _surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
     height, width, channels = small.shape
     y, x = np.linspace(-1.0, 1.0, height), np.linspace(-1.0, 1.0, width)
     hop = max(1, round(np.sqrt(height * width / _SAMPLES)))
-    terms = _terms(x[::hop], y[::hop]).reshape(-1, 6)
+    terms = second_order(x[::hop], y[::hop]).reshape(-1, 6)
     values = small[::hop, ::hop].reshape(len(terms), -1)
     rim = np.maximum(np.abs(terms[:, 1]), np.abs(terms[:, 2])) > 1 - 2 * _BORDER_SHARE
     roughness = texture[::hop, ::hop].ravel()
@@ -66,10 +66,10 @@ def _surface(small: Float64s, texture: Bytes) -> tuple[Float64s, float]:
         off = np.abs(values - fitted).max(axis=1)
         near = smooth & (off < OUTLIER * spread)
         used = near if np.count_nonzero(near) > 0.3 * np.count_nonzero(rim) else rim
-    return (_terms(x, y) @ found).reshape(height, width, channels), spread
+    return (second_order(x, y) @ found).reshape(height, width, channels), spread
 
 
-def _terms(x: Float64s, y: Float64s) -> Float64s:
+def second_order(x: Float64s, y: Float64s) -> Float64s:
     """What a surface of second order is made of at each place of a grid, (h, w, 6)."""
     across, down = np.meshgrid(x, y)
     return np.stack([np.ones_like(across), across, down, across**2, across * down, down**2], axis=2)

@@ -17,7 +17,7 @@ from contour.narrow_features.feature import DEPTH, NarrowFeature
 _EVEN, _TURN_DEG, _TURNED_DEG, _STEP_HIGH, _STEP_LONG = 0.3, 45.0, 35.0, (0.75, 4.5), 10.0
 # A horn: a corner so sharp, its interior angle, and so near to one that turns out by so much, as a wire makes or a mark
 # on the table that leads away from the block, or glare. Of outlines followed so closely that no curve has such a
-# corner; of 1500 random ones and 360 lattices none has.
+# corner; of 1500 random ones and 120 cut lattices none has, only teeth of closed cells.
 _HORN_DEG, _HORN_LONG, _HORN_FOOT_DEG, _HORN_EVEN = 75.0, 5.0, 40.0, 0.1
 
 

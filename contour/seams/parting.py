@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Indices, median
 from contour.image.pixel_grid import averaged, enlarged
 from contour.seams.openings import NEAR_OUTLINE, OPENED, Openings
 
@@ -184,9 +184,7 @@ def parted_by_kind(free: Openings, kind: Bools) -> Parted | None:
     """The part of the block in which most cells are of a kind, (N,), one flag a cell; None where that is nothing."""
     every = max(1, int(free.pitch / _SAMPLES))
     depth, pitch = free.depth[::every, ::every], free.pitch / every
-    column, row = np.minimum(
-        np.rint(free.centre[free.cells] / every).astype(np.intp), np.array(depth.shape[::-1]) - 1
-    ).T
+    row, column = _samples(free.centre[free.cells], every, depth.shape)
     apart = np.ones(depth.shape, np.uint8)
     apart[row, column] = 0
     _, nearest = cv2.distanceTransformWithLabels(apart, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
@@ -218,9 +216,8 @@ def parted_by_order(free: Openings) -> Iterator[Parted]:
     every = max(1, int(free.pitch / _SAMPLES))
     depth, pitch = free.depth[::every, ::every], free.pitch / every
     inside = depth > NEAR_OUTLINE
-    column, row = np.rint(free.orderly / every).astype(np.intp).T
     middles = np.zeros(depth.shape, np.bool_)
-    middles[np.minimum(row, depth.shape[0] - 1), np.minimum(column, depth.shape[1] - 1)] = True
+    middles[_samples(free.orderly, every, depth.shape)] = True
     near = inside & (_away(~middles) < _IN_ORDER * pitch)
     pieces = list(_pieces_and_lines(_away(near) > _NECK * pitch, inside, _LEAST_IN_ORDER * pitch**2))
     pieces.sort(key=lambda piece: np.count_nonzero(piece[0]))
@@ -255,6 +252,12 @@ def _pieces(rest: Bools, least: float) -> Iterator[Bools]:
     none: Bytes = (~large[pieces]).astype(np.uint8)
     _, nearest = cv2.distanceTransformWithLabels(none, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP)
     yield from (nearest == number for number in range(1, int(nearest.max()) + 1))
+
+
+def _samples(places: Float64s, every: int, shape: tuple[int, ...]) -> tuple[Indices, Indices]:
+    """Rows and columns of places (N, 2) on every so manieth sample, (h, w), (N,) each."""
+    column, row = np.rint(places / every).astype(np.intp).T
+    return np.minimum(row, shape[0] - 1), np.minimum(column, shape[1] - 1)
 
 
 def _border(part: Bools) -> Bools:

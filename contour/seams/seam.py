@@ -71,7 +71,7 @@ def _other_block(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Parte
     if found is not None and comb_along(light, free, found) and _two(walls, seen, free, found):
         return found
     others = (one for one in _in_another_order(free) if comb_along(light, free, one))
-    return next(others, None) or parted_by_floors(_lit(walls, seen, free), free)
+    return next(others, None) or parted_by_floors(_lit(walls, free, light), free)
 
 
 def _in_another_order(free: Openings) -> Iterator[Parted]:
@@ -106,10 +106,12 @@ def _light(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Bytes:
     return light if seen.polarity == "bright" else np.asarray(cv2.bitwise_not(light), np.uint8)
 
 
-def _lit(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Bytes:
-    """As `_light`; on a known table, from which floors of cells do not differ, how they are lit."""
+def _lit(walls: SeenWalls, free: Openings, light: Bytes) -> Bytes:
+    """The light that floors of cells show in: `light`, but on a known table, from which they do not differ, how that is
+    lit.
+    """
     if walls.relief is None:
-        return _light(walls, seen, free)
+        return light
     return _on_grid(averaged(grey(walls.relief.lit), walls.scale, cv2.BORDER_REPLICATE), free)
 
 

@@ -167,8 +167,8 @@ def _no_surer_than_anywhere(found: Trace, times: float) -> Trace:
     evidence = tuple(replace(part, bound_px=times * part.bound_px) for part in found.evidence or ())
     worst = max((part.bound_px for part in evidence), default=0.0)
     unsure = worst > _GROSS_PITCHES * (found.pitch_px or 0.0)
-    whole = times * (found.uncertainty_px or 0.0)
-    return replace(found, uncertainty_px=max(worst, whole) if unsure else whole, evidence=evidence)
+    whole = None if found.uncertainty_px is None else times * found.uncertainty_px
+    return replace(found, uncertainty_px=max(worst, whole or 0.0) if unsure else whole, evidence=evidence)
 
 
 def _sure(found: Trace) -> bool:

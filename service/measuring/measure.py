@@ -29,8 +29,8 @@ from contour.image.line_noise import without_line_noise
 from contour.image.picture_check import check_picture
 from contour.image.region import Region
 from contour.image.taught_table import TableLimits, TableLook, look_at
+from contour.material.even_table import even_table
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
-from contour.relief.plain_table import plain_table
 from contour.relief.relief import Displacement, Relief
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import TraceSettings
@@ -172,17 +172,23 @@ class Measurer:
             changes = judge_table(look, TableLimits())
             if changes:
                 return replace(result, findings=rejections(changes))
-            relief = self._relief(picture, look, recipe, thickness_mm)
+            displacement = self._displacement(recipe, thickness_mm, (height, width))
+            relief = _relief(picture, look, recipe, displacement)
             return outlined(look.picture if relief is None else relief.apart, relief)
 
         def on_even_table() -> Measurement | None:
             """What nothing speaks against, where the table need not be taught to be known; else None."""
-            look = plain_table(picture)
-            relief = None if look is None else self._relief(picture, look, recipe, thickness_mm)
+            displacement = self._displacement(recipe, thickness_mm, (height, width))
+            look = None if displacement is None else even_table(picture)
+            relief = None if look is None else _relief(picture, look, recipe, displacement)
             watch.lap("table")
+            if relief is None:
+                return None
             with contextlib.suppress(NoBlockFound, EdgeContradicted):
-                found = None if relief is None else outlined(relief.apart, replace(relief, even=True))
-                return found if found is not None and not found.findings else None
+                found = outlined(relief.apart, replace(relief, even=True))
+                if not found.findings:
+                    return found
+            watch.lap("table")
             return None
 
         try:
@@ -260,23 +266,21 @@ class Measurer:
             )
         return look_at(picture, record.table)
 
-    def _relief(
-        self, picture: NDArray[np.uint8], look: TableLook, recipe: AnyRecipe, thickness_mm: float
-    ) -> Relief | None:
-        """How the picture stands out of a known table as light as the walls; None of a darker one, and where nobody
-        knows how far lower edges of walls seem displaced.
+    def _displacement(self, recipe: AnyRecipe, thickness_mm: float, shape: tuple[int, int]) -> Displacement | None:
+        """How far lower edges of walls seem displaced in a picture of that shape, (H, W); None where nobody knows, and
+        for methods that do not ask.
         """
         calibration = self._calibration
         if calibration is None or recipe.method != "wall-tips":
             return None
         if not (calibration.height_known(0.0) and calibration.height_known(thickness_mm)):
             return None
-        height, width = picture.shape[:2]
+        height, width = shape
         columns, rows = np.meshgrid((0.0, 0.5 * width, width - 1.0), (0.0, 0.5 * height, height - 1.0))
         points = np.column_stack((columns.ravel(), rows.ravel()))
-        with contextlib.suppress(NoBlockFound, CalibrationError):
+        with contextlib.suppress(CalibrationError):
             below = calibration.to_pixels(calibration.to_machine(calibration.to_work(points, thickness_mm)), 0.0)
-            return over_known_table(picture, look, recipe.polarity, Displacement.of(points, below))
+            return Displacement.of(points, below)
         return None
 
     def _polygon(self, contour: Contour, recipe: AnyRecipe, thickness_mm: float, watch: _Stopwatch) -> Polygon:
@@ -335,6 +339,17 @@ class Measurer:
             max_uncertainty_mm=recipe.max_uncertainty_mm or None,
             max_disagreement_pitches=recipe.max_disagreement_pitches or None,
         )
+
+
+def _relief(
+    picture: NDArray[np.uint8], look: TableLook, recipe: AnyRecipe, displacement: Displacement | None
+) -> Relief | None:
+    """How the picture stands out of a known table as light as the walls; None of a darker one, and where nobody knows
+    how far lower edges of walls seem displaced.
+    """
+    with contextlib.suppress(NoBlockFound, CalibrationError):
+        return None if displacement is None else over_known_table(picture, look, recipe.polarity, displacement)
+    return None
 
 
 def _checked_trace(

@@ -6,7 +6,10 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float32s, quantile
+from contour.image.channels import largest
+from contour.image.opencv import grown, pieces_and_areas, shrunk_to
 from contour.image.taught_table import TableLook
+from contour.material.table_surface import second_order
 
 _SAMPLES = 1.2e5
 # Light that changes by so many levels from sample to sample, or by this share of how much it does at most, has a border
@@ -22,30 +25,28 @@ _MOST, _PATTERN = 0.9, 0.12
 _ENOUGH = 0.12
 
 
-def plain_table(picture: Bytes) -> TableLook | None:
+def even_table(picture: Bytes) -> TableLook | None:
     """The picture, grey (H, W) or BGR (H, W, 3), uint8, beside its table as it would look empty; None where that has
     borders of its own, or too little of it shows.
     """
     height, width = picture.shape[:2]
     step = max(1.0, np.sqrt(height * width / _SAMPLES))
-    size = (round(width / step), round(height / step))
-    small = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+    small = shrunk_to(picture, (round(height / step), round(width / step)))
     table = _table(small)
     if table is None:
         return None
     # The block's own shade reaches far: what lies in it is darker than the table, never lighter.
     light = np.asarray(cv2.max(_filled(small, table), _even(small, table)), np.uint8)
-    off = cv2.absdiff(small, light).reshape(*table.shape, -1).max(axis=2)
+    off = largest(np.asarray(cv2.absdiff(small, light), np.uint8))
     if table.all() or quantile(off[table], _MOST) > _PATTERN * quantile(off[~table], _MOST):
         return None
-    known = np.asarray(cv2.resize(light, (width, height), interpolation=cv2.INTER_LINEAR), np.uint8)
-    return TableLook(picture, known, gain=1.0, shift_px=None, rim_share=1.0, changed_share=0.0)
+    return TableLook(picture, grown(light, (height, width)), gain=1.0, shift_px=None, rim_share=1.0, changed_share=0.0)
 
 
 def _table(small: Bytes) -> Bools | None:
     """Which samples show the table, (h, w), at some distance from the block; None where it is not even."""
     near = np.ones((3, 3), np.uint8)
-    change = cv2.subtract(cv2.dilate(small, near), cv2.erode(small, near)).reshape(*small.shape[:2], -1).max(axis=2)
+    change = largest(np.asarray(cv2.morphologyEx(small, cv2.MORPH_GRADIENT, near), np.uint8))
     border = (change > max(_LEAST_STEP, _OF_STEPS * quantile(change, _AT_MOST))).astype(np.uint8)
     window = (2 * round(_WINDOW * max(small.shape)) + 1,) * 2
     block = _largest(cv2.blur(border.astype(np.float32), window) > _BUSY)
@@ -57,15 +58,13 @@ def _table(small: Bytes) -> Bools | None:
 
 def _largest(mask: Bools) -> Bools:
     """The largest of a mask's pieces, (h, w); nothing where it is empty."""
-    _, pieces, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
-    return np.asarray(mask & (pieces == 1 + stats[1:, cv2.CC_STAT_AREA].argmax()) if len(stats) > 1 else mask)
+    pieces, area = pieces_and_areas(mask.astype(np.uint8), 4)
+    return np.asarray(mask & (pieces == area.argmax()))
 
 
 def _even(small: Bytes, table: Bools) -> Bytes:
     """The table's light everywhere in the shape of `small`, if it changes no more than by squares of x and y."""
-    x, y = (np.linspace(-1.0, 1.0, size) for size in small.shape[1::-1])
-    y = y[:, None]
-    terms = np.stack(np.broadcast_arrays(np.ones_like(x * y), x, y, x * x, x * y, y * y), axis=-1)
+    terms = second_order(*(np.linspace(-1.0, 1.0, size) for size in small.shape[1::-1]))
     weights, *_ = np.linalg.lstsq(terms[table], small[table].astype(np.float64), rcond=None)
     return np.asarray(np.clip(np.rint(terms @ weights), 0, 255), np.uint8)
 
@@ -92,6 +91,6 @@ def _blurred(samples: Float32s, sigma: float) -> Float32s:
     """Blurred by a Gaussian, a wide one in steps."""
     hop = max(1, int(0.25 * sigma))
     height, width = samples.shape[:2]
-    fewer = cv2.resize(samples, (max(2, width // hop), max(2, height // hop)), interpolation=cv2.INTER_AREA)
-    smooth = cv2.GaussianBlur(fewer, (0, 0), sigma / hop)
-    return np.asarray(cv2.resize(smooth, (width, height), interpolation=cv2.INTER_LINEAR), np.float32)
+    fewer = shrunk_to(samples, (max(2, height // hop), max(2, width // hop)))
+    smooth = np.asarray(cv2.GaussianBlur(fewer, (0, 0), sigma / hop), np.float32)
+    return grown(smooth, (height, width))

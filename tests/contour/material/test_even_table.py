@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contour.relief.plain_table import plain_table
+from contour.material.even_table import even_table
 from contour.synthetic import Scene, Structure, Table, render, render_empty_table
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
@@ -29,7 +29,7 @@ def test_it_is_as_light_as_it_would_be_without_the_block(colour: bool) -> None:
     picture, (empty, *_) = render(LIGHT).picture, render_empty_table(LIGHT, 1)
     if not colour:
         picture, empty = (np.ascontiguousarray(one[..., 1]) for one in (picture, empty))
-    look = plain_table(picture)
+    look = even_table(picture)
     assert look is not None
     assert look.known.shape == picture.shape
     off = np.abs(look.known.astype(float) - empty) / (empty + 1.0)
@@ -38,17 +38,17 @@ def test_it_is_as_light_as_it_would_be_without_the_block(colour: bool) -> None:
 
 @pytest.mark.parametrize("kind", ["wood", "brushed", "slots"])
 def test_a_table_with_borders_of_its_own_is_not_told(kind: str) -> None:
-    assert plain_table(render(replace(LIGHT, things=(Structure(kind, 60.0, 0.25, 30.0),))).picture) is None
+    assert even_table(render(replace(LIGHT, things=(Structure(kind, 60.0, 0.25, 30.0),))).picture) is None
 
 
 def test_a_picture_full_of_borders_shows_no_table_and_one_without_any_no_block() -> None:
     noise = np.random.default_rng(1).integers(0, 255, (300, 400), dtype=np.uint8)
-    assert plain_table(noise) is None
-    assert plain_table(np.full((300, 400), 80, np.uint8)) is None
+    assert even_table(noise) is None
+    assert even_table(np.full((300, 400), 80, np.uint8)) is None
 
 
 def test_streaks_without_borders_make_no_even_table() -> None:
-    assert plain_table(render(shop_floor_scene("wood", 1_600_083).scene).picture) is None
+    assert even_table(render(shop_floor_scene("wood", 1_600_083).scene).picture) is None
 
 
 def test_a_block_on_an_even_table_as_light_as_its_walls_needs_no_taught_one() -> None:

@@ -120,7 +120,8 @@ class Cycle:
         assert job.session is not None
         validity = self._validity(job.pages)
         lasts_s = validity.valid_for / 1000 or self._settings.lifetime_s
-        transfer = self._transfer(self._link, job, job.session, job.pages, self._lifetime(job, lasts_s))
+        lifetime = self._lifetime(job, lasts_s)
+        transfer = self._transfer(self._link, job, job.session, job.pages, lifetime)
         if job.withdraw_reason is not None:
             detail = "a withdrawal that the restart cut short" if job.pages else "whether it was sent is not known"
             settlement = await transfer.withdraw(job.withdraw_reason, detail)
@@ -129,6 +130,9 @@ class Cycle:
         elif not validity.valid_for:
             detail = "how old the contour is cannot be known after a restart, and the controller would not look"
             settlement = await transfer.withdraw(Reason.SERVICE_RESTARTED, detail)
+        elif lifetime.over:
+            detail = "the contour became too old while the service was away, or the machine's clock went back"
+            settlement = await transfer.withdraw(Reason.EXPIRED, detail)
         else:
             settlement = await transfer.run()
         return await self._settle(job, settlement, ongoing)

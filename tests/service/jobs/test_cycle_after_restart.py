@@ -133,16 +133,19 @@ async def test_a_sent_job_whose_pages_cannot_be_read_any_more_is_withdrawn_with_
         assert built.controller.link.last_result == Answer.WITHDRAWN
 
 
+@pytest.mark.parametrize("hours", [6, -6])
 async def test_a_job_taken_longer_ago_than_it_is_valid_is_taken_back_after_a_restart_not_sent_again(
-    tmp_path: Path,
+    tmp_path: Path, hours: int
 ) -> None:
-    """The controller may be a spare one by now, which never saw it, with the same session."""
+    """The controller may be a spare one by now, which never saw it, with the same session; it need not be there yet."""
     async with rig(tmp_path) as built:
 
         def prepare(job_id: int) -> None:
             built.journal.store_pages(job_id, 9, (page(job_id),))
-            six_hours_ago = (datetime.now(UTC) - timedelta(hours=6)).isoformat(timespec="milliseconds")
-            built.journal._file.db.execute("UPDATE jobs SET taken_at = ?", (six_hours_ago,))
+            then = (datetime.now(UTC) - timedelta(hours=hours)).isoformat(timespec="milliseconds")
+            built.journal._file.db.execute("UPDATE jobs SET taken_at = ?", (then,))
+            built.controller.reachable = False
+            asyncio.get_running_loop().call_later(0.2, lambda: setattr(built.controller, "reachable", True))
 
         job = await resumed(built, prepare)
         assert (job.outcome, job.reason) == (Outcome.FAILED, Reason.EXPIRED)

@@ -26,8 +26,9 @@ from contour.image.pixel_sampling import sample_at
 # Places along a ring, pitches apart; a corner is where it turns by more between its chords before and behind, degrees,
 # so many places long and away from it, and most among its neighbours, or less by so much, radians.
 _SPACING, _CHORD, _SKIP, _CORNER_DEG, _NEIGHBOURS, _ALIKE = 0.1, 20, 2, 25.0, 8, 1e-6
-# Pitches beyond the corner at which a ray begins, where the block's next edge is so far out of the way; its parts.
-_NEAREST, _FREE, _PARTS, _OF_PART = 0.6, 0.75, 5, 5
+# Pitches beyond the corner at which a ray begins, where the block's next edge is so far out of the way; its parts, and
+# how many places each has. A short one counts at both ends of an edge alone: what ends at the block hardly looks out.
+_NEAREST, _FREE, _PARTS, _OF_PART, _OF_SHORT_PART = 0.6, 0.75, 5, 5, 3
 # Pitches across the ray, and how far from each place its two sides are; so near to the ray a border is the edge's own,
 # so far from it another one; by how much it may turn from the edge.
 _ACROSS, _SIDES, _OWN, _ANOTHER = 0.05 * np.arange(-38, 39), (2, 8), 0.3, 0.7
@@ -65,6 +66,17 @@ class _Rays:
         return np.asarray(self.origin.reshape(shape) + parts)
 
 
+@dataclass(frozen=True, eq=False)
+class _Reach:
+    """How far rays go: places ahead, (R, T), the middles of their parts, (R, K), both in pixels, and whether each place
+    across is away from the block in each part, (R, O, K).
+    """
+
+    ahead: Float64s
+    middle: Float64s
+    clear: Bools
+
+
 def border_beyond(
     planes: Sequence[Bytes], contour: Contour, pitch_px: float, *, of_any_light: bool = False
 ) -> EdgePart | None:
@@ -92,31 +104,44 @@ def _borders(
     ahead, out = rays.begin[:, None] + part, _ACROSS * pitch_px
     shape = (len(rays.begin), len(out), len(part))
     places = rays.at(np.broadcast_to(ahead[:, None], shape), np.broadcast_to(out[:, None], shape))
-    middle = ahead.reshape(len(ahead), _PARTS, _OF_PART).mean(axis=2)
     hole = float(np.sign(signed_area(ring))) != side
-    clear = _clear(rays, ring, middle, pitch_px, inside=hole)
+    whole, short = (
+        _reach(rays, ring, ahead[:, : _PARTS * each], pitch_px, inside=hole) for each in (_OF_PART, _OF_SHORT_PART)
+    )
     found = []
     for light in planes:
-        parts = sample_at(light, places[..., 0], places[..., 1]).reshape(*shape[:2], _PARTS, _OF_PART).mean(axis=3)
-        step, at, turn, other = _clearest(parts, clear, middle / pitch_px)
-        noise = np.abs(np.diff(parts, axis=1)).mean(axis=(1, 2))
-        over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
-        if (over > 1.0).any():
-            line = at[:, None] * pitch_px + turn[:, None] * ahead
-            chosen = over > 1.0
-            if not of_any_light:
-                usual = _usual_light(light, ring, side * pitch_px)
-                chosen = _of_things(light, rays, over, (ahead, line), usual, pitch_px)
-            found += [(float(over[k]), rays.corner[k]) for k in np.flatnonzero(chosen).tolist()]
+        sampled = sample_at(light, places[..., 0], places[..., 1]).reshape(shape)
+        over, lines = _over(sampled, whole, pitch_px)
+        chosen = over > 1.0
+        if chosen.any() and not of_any_light:
+            usual = _usual_light(light, ring, side * pitch_px)
+            chosen = _of_things(light, rays, over, lines, usual, pitch_px)
+        shorter, lines = _over(sampled, short, pitch_px)
+        if (shorter > 1.0).any():
+            outer, inner = _both_sides(light, rays, lines, pitch_px)
+            chosen = chosen | _at_both_ends(rays, np.where(shorter > 1.0, np.sign(outer - inner), 0.0), pitch_px)
+            over = np.maximum(over, shorter)
+        found += [(float(over[k]), rays.corner[k]) for k in np.flatnonzero(chosen).tolist()]
     return [(over, (float(x), float(y))) for over, (x, y) in found]
+
+
+def _over(sampled: Float64s, reach: _Reach, pitch_px: float) -> tuple[Float64s, tuple[Float64s, Float64s]]:
+    """How many times the noise, or other borders, the clearest one near each ray is, (R,), with its places ahead and
+    out, pixels. sampled: light along the rays and farther on, (R, O, T).
+    """
+    count = reach.ahead.shape[1]
+    parts = sampled[..., :count].reshape(*sampled.shape[:2], _PARTS, count // _PARTS).mean(axis=3)
+    step, at, turn, other = _clearest(parts, reach.clear, reach.middle / pitch_px)
+    noise = np.abs(np.diff(parts, axis=1)).mean(axis=(1, 2))
+    over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
+    return over, (reach.ahead, at[:, None] * pitch_px + turn[:, None] * reach.ahead)
 
 
 def _of_things(
     light: Bytes, rays: _Rays, over: Float64s, lines: tuple[Float64s, Float64s], usual: float, pitch_px: float
 ) -> Bools:
     """Which rays' borders, `over` the noise so many times, (R,), are those of things. lines: places ahead and out."""
-    ahead, line = lines
-    outer, inner = (_mean_light(light, rays, ahead, line, sign * pitch_px) for sign in (1.0, -1.0))
+    outer, inner = _both_sides(light, rays, lines, pitch_px)
     edge = np.broadcast_to(_ALONG * pitch_px, (len(rays.begin), len(_ALONG)))
     own = _mean_light(light, rays, edge, np.zeros_like(edge), pitch_px)
     shadow = (inner < outer) & (np.abs(inner - usual) > np.abs(outer - usual))
@@ -125,6 +150,14 @@ def _of_things(
     sign = np.where(over > 1.0, np.sign(outer - inner), 0.0)
     twice = _at_both_ends(rays, np.where(over > _MORE, sign, 0.0), pitch_px) | _around_notch(rays, sign)
     return np.asarray(((over > 1.0) & alone) | twice)
+
+
+def _both_sides(
+    light: Bytes, rays: _Rays, lines: tuple[Float64s, Float64s], pitch_px: float
+) -> tuple[Float64s, Float64s]:
+    """Mean light beyond and within lines along the rays, (R,) each."""
+    outer, inner = (_mean_light(light, rays, *lines, sign * pitch_px) for sign in (1.0, -1.0))
+    return outer, inner
 
 
 def _at_both_ends(rays: _Rays, sign: Float64s, pitch_px: float) -> Bools:
@@ -186,14 +219,15 @@ def _pairs(places: Complexes) -> Float64s:
     return np.column_stack([places.real, places.imag])
 
 
-def _clear(rays: _Rays, ring: Ring, middle: Float64s, pitch_px: float, *, inside: bool) -> Bools:
-    """Whether each place across the rays (R, O) is away from the block in each part, (R, O, K)."""
+def _reach(rays: _Rays, ring: Ring, ahead: Float64s, pitch_px: float, *, inside: bool) -> _Reach:
+    """So many places ahead, (R, T), in parts. inside: whether the rays are in a hole."""
+    middle = ahead.reshape(len(ahead), _PARTS, -1).mean(axis=2)
     out = _ACROSS[::_EVERY] * pitch_px
     shape = (len(middle), len(out), _PARTS)
     places = rays.at(np.broadcast_to(middle[:, None], shape), np.broadcast_to(out[:, None], shape))
     depth = depth_inside(ring, places.reshape(-1, 2)).reshape(shape)
     clear = (depth if inside else -depth) > _CLEAR * pitch_px
-    return np.repeat(clear, _EVERY, axis=1)[:, : len(_ACROSS)]
+    return _Reach(ahead, middle, np.repeat(clear, _EVERY, axis=1)[:, : len(_ACROSS)])
 
 
 def _clearest(parts: Float64s, clear: Bools, middle: Float64s) -> tuple[Float64s, Float64s, Float64s, Float64s]:

@@ -32,12 +32,18 @@ _UNSEEN_LONG, _ASIDE = 3.0, 0.5
 # A corner between lines in which so many clean ends lie so far inside of both, pitches, may as well be a bevel: of
 # 196 right outlines one has such a corner, off by a third of a cell, and one that was off by 0.9.
 _IN_CORNER, _DEEP_IN_CORNER = 2, 0.35
+# So may one across which a clean end that deep and two more witnesses lie in one line, so long and so far off it,
+# pitches: the ends along a bevel of two cells, of which one was drawn off as a corner. Of 260 right outlines none has.
+_ACROSS_LONG, _IN_LINE = 1.0, 0.03
 # So may one of which so many square pitches are unseen between the last ends on both: a bevel of three cells was drawn
 # halfway. Of 255 right outlines none has such a corner, of 139 cut lattices one.
 _UNSEEN = 2.6
 # So is a line across a corner no longer than that, by so few witnesses, if less than a cell would be lost in it: of 135
 # blocks none has one, and one whose last walls are inked has.
 _BEVEL_LONG, _LOST = 2.0, 1.0
+# Another arc that lies so near to one that goes on over so much, radians, all around a hole or a disc, pitches, may as
+# well be a part of it along which walls are inked: of 260 right outlines none has one.
+_ROUND, _ASTRAY = np.radians(200.0), (0.25, 1.0)
 # An outlier has no say in where a line lies.
 _LEAST_WEIGHT = 1e-9
 
@@ -69,6 +75,7 @@ def untold(
     places += _bent_lines(witnesses, segments, lone, found, residual)
     places += _maybe_bevelled(witnesses, segments, found, inlier)
     places += _unseen_corners(witnesses, segments, found, inlier, residual, chains)
+    places += _astray(witnesses, segments, found)
     return np.array(places + _lone_bevels(witnesses, segments, found, inlier), np.complex128)
 
 
@@ -132,13 +139,46 @@ def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inl
     for k in np.flatnonzero(lines).tolist() if len(segments) > 2 else ():
         after = (k + 1) % len(segments)
         index = between(segments, inlier, k, after)
+        index = index[witnesses.clean[index]]
         both = segments.models.take(np.array([[k], [after]]))
-        inside = -distance(both, witnesses.points[index])[:, witnesses.clean[index]].max(axis=0) / witnesses.pitch_px
+        inside = -distance(both, witnesses.points[index]).max(axis=0) / witnesses.pitch_px
         corner = np.complex128(0.5 * (found.end[k] + found.begin[k]))
         sides = np.array([last[k], first[after]]) - corner
         unseen = 0.5 * abs((sides[0] * sides[1].conjugate()).imag) / witnesses.pitch_px**2
-        if unseen > _UNSEEN or np.count_nonzero(inside > _DEEP_IN_CORNER) >= _IN_CORNER:
+        row = np.concatenate([last[[k]], witnesses.points[index], first[[after]]])
+        across = _in_one_line(row, witnesses.pitch_px, np.pad(inside > _DEEP_IN_CORNER, 1))
+        if unseen > _UNSEEN or across or np.count_nonzero(inside > _DEEP_IN_CORNER) >= _IN_CORNER:
             places.append(corner)
+    return places
+
+
+def _in_one_line(points: Complexes, pitch_px: float, deep: Bools) -> bool:
+    """Whether three of the points (N,), in their order, one of them `deep`, (N,), lie in one line."""
+    for first, last in zip(*np.triu_indices(len(points), 2), strict=True):
+        way = points[last] - points[first]
+        if abs(way) > _ACROSS_LONG * pitch_px:
+            off = np.abs(((points[first : last + 1] - points[first]) * way.conjugate()).imag) / abs(way)
+            on = off < _IN_LINE * pitch_px
+            if np.count_nonzero(on) > _OF_A_LINE and deep[first : last + 1][on].any():
+                return True
+    return False
+
+
+def _astray(witnesses: Witnesses, segments: Segments, found: Joints) -> list[np.complex128]:
+    """Middles of arcs that leave one which goes on all around, by less than a cell."""
+    begin, places = rolled(found.begin, 1), []
+    for k in np.flatnonzero(segments.bend).tolist():
+        curvature = segments.models.curvature[k]
+        ends = np.array([begin[k], found.end[k]])
+        tangent = feet(segments.models.take(np.array([k, k])), ends)[1]
+        turn = np.angle(tangent[1] * tangent[0].conjugate()) * np.sign(curvature) % (2.0 * np.pi)
+        others = np.setdiff1d(np.flatnonzero(segments.bend), [k])
+        if turn < _ROUND or not len(others):
+            continue
+        joints = np.concatenate([found.end[others], begin[others]])
+        off = np.abs(distance(segments.models.take(np.full(len(joints), k)), joints)).max() / witnesses.pitch_px
+        if _ASTRAY[0] < off < _ASTRAY[1]:
+            places.append(joints.mean())
     return places
 
 

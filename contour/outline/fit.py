@@ -104,10 +104,14 @@ def _fitted(
     for chain in chains:
         residual[chain.witnesses] = chain.curve.signed
     inlier = _inlying(witnesses, residual)
-    doubtful = np.append(
-        untold(witnesses, segments, found, inlier, residual, chains), maybe_round(witnesses, segments, found, arcs)
-    )
+    doubtful = [
+        untold(witnesses, segments, found, inlier, residual, chains),
+        maybe_round(witnesses, segments, found, arcs),
+    ]
+    whole = found.end
     found = bevelled(witnesses, segments, found, inlier, material[:, 0] + 1j * material[:, 1])
+    # Cut or whole, such a corner is up to a cell off.
+    doubtful.append(whole[found.end != whole])
     vertices = _vertices(witnesses, segments, found, chains)
     if len(vertices.ring) < 3:
         raise NoBlockFound(
@@ -117,7 +121,7 @@ def _fitted(
     spread = _spread(residual[inlier], wall_px)
     given = _given_leverage(segments, inlier, arcs, chains)
     sigma = vertex_sigma(witnesses, segments, inlier, vertices, given=given, spread=spread)
-    ring, places = (_raw(points, rectifier) for points in (vertices.ring, doubtful))
+    ring, places = (_raw(points, rectifier) for points in (vertices.ring, np.concatenate(doubtful)))
     pieces = len(segments) - sum(len(chain.segments) - 1 for chain in chains)
     return FittedRing(ring, inlier, residual, spread, unseen_share(witnesses, inlier), sigma, pieces, places)
 

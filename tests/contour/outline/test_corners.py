@@ -12,7 +12,7 @@ from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.labelling import supports
 from contour.outline.witnesses import cost, prepare
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
-from tests.support.pictures.outline_scenes import PITCH, distances, errors, rectangle, witnesses
+from tests.support.pictures.outline_scenes import PITCH, circle, distances, errors, perimeter, rectangle, witnesses
 
 CORNER = np.array([300.0, 300.0])
 
@@ -60,6 +60,42 @@ def test_a_corner_that_walls_behind_it_speak_against_is_less_than_a_pitch_off_ei
         ring = fitted(beside_a_cell(seed)).ring
         assert errors(ring, cut_corner(2.0 * PITCH)).max() < 0.8 * PITCH, seed
         assert distances(CORNER[None], ring)[0] < PITCH, seed
+
+
+def test_a_corner_that_is_cut_part_of_the_way_is_told_to_be_unsure() -> None:
+    for seed in range(4):
+        assert len(fitted(beside_a_cell(seed)).untold) > 0, seed
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_corner_across_which_ends_lie_in_one_line_is_told_to_be_unsure(seed: int) -> None:
+    """It is cut off at two pitches, where the last ends on both edges lie, with one end between them."""
+    truth = cut_corner(2.0 * PITCH)
+    evidence = witnesses(truth, seed=seed, sigma=0.15)
+    away = np.abs(evidence.points - CORNER).sum(axis=1) > 2.6 * PITCH
+    across = CORNER + PITCH * np.array([[0.0, 2.0], [1.1, 0.9], [2.0, 0.0]])
+    outwards = np.array([[-1.0, 0.0], [-np.sqrt(0.5), -np.sqrt(0.5)], [0.0, -1.0]])
+    begun = float(evidence.position[away].max())
+    told = RingEvidence(
+        points=np.vstack([evidence.points[away], across]),
+        coarse=evidence.coarse,
+        position=np.append(evidence.position[away], begun + PITCH * np.array([0.4, 1.8, 3.0])),
+        normal=np.vstack([evidence.normal[away], outwards]),
+        sigma=np.append(evidence.sigma[away], np.full(3, evidence.sigma[0])),
+        kind=np.append(evidence.kind[away], np.full(3, WitnessKind.CLEAN)).astype(np.int8),
+        is_hole=False,
+    )
+    assert len(fitted(told).untold) > 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_arc_that_leaves_a_round_hole_by_less_than_a_cell_is_told_to_be_unsure(seed: int) -> None:
+    truth = circle(4.5 * PITCH)
+    evidence = witnesses(truth, seed=seed, sigma=0.3, hole=True)
+    assert len(fitted(evidence).untold) == 0
+    inked = np.abs(evidence.position - 0.5 * perimeter(truth)) < 2.6 * PITCH
+    depth = np.where(inked, 0.65 * PITCH, 0.0)
+    assert len(fitted(replace(evidence, points=evidence.points - depth[:, None] * evidence.normal)).untold) > 0
 
 
 def test_a_corner_behind_which_nothing_is_seen_is_where_its_edges_meet() -> None:

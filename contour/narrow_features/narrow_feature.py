@@ -6,7 +6,7 @@ from contour.geometry.rings import Contour, area
 from contour.narrow_features.arms import arms, slits
 from contour.narrow_features.bumps import deepest_bump
 from contour.narrow_features.feature import NarrowFeature
-from contour.narrow_features.steps import horns, steps
+from contour.narrow_features.steps import horns, jogs, steps
 
 # Blocks of few cells have arms and steps as narrow; but chips and strips are less than this share of a block.
 _LARGE = 1.0 / 7.0
@@ -21,5 +21,9 @@ def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
     found = [one for ring in contour.rings for one in [deepest_bump(ring, pitch_px)] if one is not None]
     large = _LARGE * area(contour) / pitch_px**2
     found += arms(contour, pitch_px, large) + slits(contour, pitch_px)
-    found += [one for ring in contour.rings for one in (*steps(ring, pitch_px, large), *horns(ring, pitch_px))]
+    found += [
+        one
+        for ring in contour.rings
+        for one in (*steps(ring, pitch_px, large), *jogs(ring, pitch_px), *horns(ring, pitch_px))
+    ]
     return max(found, key=lambda one: one.depth_pitches) if found else None

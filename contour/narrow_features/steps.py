@@ -1,4 +1,4 @@
-"""Low steps near a corner, as a strip of cells makes that lies against an edge; and horns."""
+"""Low steps near a corner, as a strip of cells makes that lies against an edge; jogs; and horns."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from contour.narrow_features.feature import DEPTH, NarrowFeature
 # A step: of outlines without what is smaller than this it turns in and out by so much, or the other way around, and
 # goes on as before but for that; so low, and a corner comes so soon behind it.
 _EVEN, _TURN_DEG, _TURNED_DEG, _STEP_HIGH, _STEP_LONG = 0.3, 45.0, 35.0, (0.75, 4.5), 10.0
+# A jog: an edge goes on as before, but for this angle, so far aside; it has so much of it on both sides, and what lies
+# between turns away and back by so much. Of 260 right outlines none has one, of wrong ones one along inked cells.
+_JOG_EVEN, _JOG_HIGH, _JOG_LONG, _JOG_ASIDE_DEG, _JOG_TURN_DEG = 0.12, (0.35, 0.95), 1.0, 20.0, 30.0
 # A horn: a corner so sharp, its interior angle, and so near to one that turns out by so much, as a wire makes or a mark
 # on the table that leads away from the block, or glare. Of outlines followed so closely that no curve has such a
 # corner; of 1500 random ones and 120 cut lattices none has, only teeth of closed cells.
@@ -52,6 +55,26 @@ def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
         if turned_by[end - 1] > least and wide < _STEP_LONG:
             x, y = corners[top[0]].tolist()
             found.append(NarrowFeature(float(high[foot]), float(wide), (x, y), True))
+    return found
+
+
+def jogs(ring: Ring, pitch_px: float) -> list[NarrowFeature]:
+    """Where an edge goes on less than a cell aside."""
+    corners = fewer_vertices(ring, _JOG_EVEN * pitch_px)
+    edges = rolled(corners, -1) - corners
+    long, heading = np.hypot(*edges.T) / pitch_px, edges[:, 0] + 1j * edges[:, 1]
+    turn_deg = np.degrees(np.angle(heading / rolled(heading, 1)))
+    after_deg = rolled(turn_deg, -1)
+    away = (np.minimum(np.abs(turn_deg), np.abs(after_deg)) > _JOG_TURN_DEG) & (turn_deg * after_deg < 0.0)
+    beside = np.minimum(rolled(long, 1), rolled(long, -1)) > _JOG_LONG
+    aside = long * np.abs(np.sin(np.radians(0.5 * (turn_deg - after_deg))))
+    chosen = away & beside & (np.abs(turn_deg + after_deg) < _JOG_ASIDE_DEG)
+    chosen &= (aside > _JOG_HIGH[0]) & (aside < _JOG_HIGH[1])
+    found = []
+    for foot in np.flatnonzero(chosen).tolist():
+        x, y = corners[foot].tolist()
+        wide = min(long[foot - 1], long[(foot + 1) % len(corners)])
+        found.append(NarrowFeature(float(aside[foot]), float(wide), (x, y), bool(turn_deg[foot] > 0.0)))
     return found
 
 

@@ -143,6 +143,17 @@ def test_a_step_is_none(depth: float, slant: float) -> None:
     assert found(shapely.Polygon(step), 25.0) is None
 
 
+@pytest.mark.parametrize("slant", [0.0, 0.4])
+@pytest.mark.parametrize("depth", [0.5, 0.8])
+def test_a_step_lower_than_a_cell_is_found(depth: float, slant: float) -> None:
+    """As the outline takes along cells whose walls are inked."""
+    out = depth * PITCH
+    step = [(0, 0), (600, 0), (600, 300), (300, 300), (300 - slant * out, 300 + out), (0, 300 + out)]
+    one = found(shapely.Polygon(step), 25.0)
+    assert one is not None
+    assert one.depth_pitches == pytest.approx(depth, abs=0.05)
+
+
 @pytest.mark.parametrize("long", [8.0, 25.0, 60.0])
 def test_a_thread_of_any_length_is_found_at_its_end(long: float) -> None:
     """As a cable makes that was taken for a wall; it leaves the block in a bend."""

@@ -131,6 +131,20 @@ def test_a_strip_of_swarf_is_taken_out_however_near_it_lies_and_the_block_stays(
     assert (found == alone).all()
 
 
+@pytest.mark.parametrize(("aside", "own"), [(0.0, True), (0.3, False)])
+def test_cells_that_go_on_in_the_blocks_rows_beyond_a_gap_are_its_own(aside: float, own: bool) -> None:
+    """As a felt-pen's line leaves them that is as dark as the table; a strip of swarf lies in no row."""
+    mask = empty()
+    comb(mask, 60, 30, 16, 16)
+    rows = np.flatnonzero(mask.any(axis=1))
+    line = int(rows[0] + 0.84 * (rows[-1] - rows[0]))
+    mask[line : line + round(0.7 * PITCH)] = 0
+    below = np.roll(mask[line:], round(aside * PITCH), axis=1)
+    parted = np.concatenate([mask[:line], below])
+    kept = without_loose_pieces(parted, PITCH, lambda: parted)[line:]
+    assert (np.count_nonzero(kept) > 0.5 * np.count_nonzero(below)) == own
+
+
 @pytest.mark.parametrize(
     ("columns", "rows", "gap_px"),
     [(8, 1, 0), (12, 4, 2), (1, 1, 2)],

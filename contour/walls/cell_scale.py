@@ -13,7 +13,7 @@ from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.opencv import inverted, pieces_and_areas, pieces_and_middles
 from contour.image.side_by_side import side_by_side
-from contour.walls.comb_likeness import Comb, filled_shares, lattice_order, surely_comb
+from contour.walls.comb_likeness import Comb, apart, filled_shares, lattice_order, surely_comb
 from contour.walls.wall_mask import FINE_PITCH, Smooth, wall_mask
 
 _TILE_PX = 512
@@ -41,8 +41,8 @@ class CellScale:
     the part of the tile they fill, the wall contrast in grey levels, the share of the
     walls that hang together, and the grey levels of walls and of cells' floors.
 
-    form: tells the share of the cells with neighbours all around, of those with a triangle's, and the shares of its
-    convex hull and of the circle around it that a cell fills; of most readings nobody asks."""
+    form: tells the share of the cells with neighbours all around, of those with a triangle's, the shares of its convex
+    hull and of the circle around it that a cell fills, and the share that stays apart; of most readings nobody asks."""
 
     pitch_px: float
     wall_px: float
@@ -54,7 +54,7 @@ class CellScale:
     connected: float
     level: float
     floor: float
-    form: Callable[[], tuple[float, float, float, float]]
+    form: Callable[[], tuple[float, float, float, float, float]]
 
     @property
     def score(self) -> float:
@@ -72,7 +72,7 @@ class CellScale:
     def comb(self) -> Comb:
         """What tells a comb from other things that have patches side by side."""
         regular = self.regularity * self.filled
-        order, triangles, solid, circled = self.form()
+        order, triangles, solid, circled, parted = self.form()
         return Comb(
             self.pitch_px,
             self.wall_px,
@@ -84,6 +84,7 @@ class CellScale:
             solid=solid,
             circled=circled,
             triangular=triangles > 0.5 * order,
+            apart=parted,
         )
 
 
@@ -242,6 +243,7 @@ def cells_of(
         lambda: (
             *lattice_order(places[regular], size),
             *filled_shares(labels, numbers[regular], stats),
+            apart(labels, numbers[regular], wall),
         ),
     )
 

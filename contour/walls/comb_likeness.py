@@ -20,6 +20,9 @@ FINE_PITCH_PX = 15.0
 # Of finer ones, of 5 to 12 px, none has more than 0.3; sheets whose holes are a few pixels have 0.4 and more.
 _WIDEST_WALL, WIDEST_FINE = 0.31, 0.35
 _REGULAR = 0.5
+# But a lattice may have webs as wide as that all around its cells, which stay apart where they are grown by a share of
+# a web: of 60 such lattices all do. Squares of a board meet at their corners.
+_GROWN, _APART, _IN_ORDER = 0.2, 0.8, 0.5
 _FEW_CELLS = 18
 _POOR_SCORE = 0.23
 # Cells of combs are convex: of 250 scenes none has less than 0.93. Foam has 0.82, letters, codes, weaves and noise 0.54
@@ -34,6 +37,9 @@ _SAMPLED = 64
 # Six neighbours of a honeycomb's cell are 1 pitch away, of an over-expanded one 0.8 to 1.2, the next ones 1.5.
 _NEIGHBOUR_PITCHES = (0.75, 1.35)
 _NEIGHBOURS = 4
+# However cells are stretched, the nearest neighbours of each lie opposite others, within a share of their distance; so
+# many of so many do.
+_NEAREST, _OPPOSITE, _OFF = 8, 7, 0.25
 # Distances that are one differ by less than this factor, of a triangle's three neighbours, and of the next six.
 _TRIANGLES, _EVEN = 9, 1.35
 
@@ -45,7 +51,8 @@ class Comb:
 
     order: share of the cells with neighbours all around, a pitch away. solid, circled: shares of its convex hull and of
     the circle around it that a cell fills, the medians. triangular: whether its neighbours are those of triangles.
-    plate: whether holes were seen that show the table.
+    apart: share of cells that stay apart where they are grown, 0 to 1. plate: whether holes were seen that show the
+    table.
     """
 
     pitch_px: float
@@ -58,12 +65,19 @@ class Comb:
     solid: float = 1.0
     circled: float = 1.0
     triangular: bool = False
+    apart: float = 0.0
     plate: bool = False
 
     @property
     def cellular(self) -> bool:
         """Whether patches are convex as cells, or lie as cells do."""
         return self.solid >= _CONVEX or self.order >= _LEAST_ORDER
+
+    @property
+    def lattice(self) -> bool:
+        """Whether cells are many, convex and in good order, and webs lie all around each, however wide."""
+        regular = self.order >= _IN_ORDER and self.solid >= _CONVEX
+        return regular and self.apart >= _APART and self.count >= _FEW_CELLS
 
     @property
     def scattered(self) -> bool:
@@ -88,7 +102,7 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
     # Foam has wide bright walls, and cells of all sizes between them; so has a sheet with letters, which closes them.
     even = not (cut and comb.bright) or comb.regular > _REGULAR
     widest = _WIDEST_WALL if comb.pitch_px > FINE_PITCH_PX else WIDEST_FINE
-    if share > widest and even and not comb.plate:
+    if share > widest and even and not (comb.plate or comb.lattice):
         return (
             f"what lies between patches {comb.pitch_px:.0f} px apart is {100 * share:.0f} % as wide as that, cell "
             f"walls are {100 * widest:g} % at most: a board, a print, a perforated plate, or foam whose cells "
@@ -118,7 +132,8 @@ def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
 
 def lattice_order(places: Float64s, pitch_px: float) -> tuple[float, float]:
     """Share of cells with neighbours all around, 0 to 1; centroids of cells (N, 2), pixels: four or more about a pitch
-    away, or three nearer ones and then six, as triangles have. And the share of those alone that are like triangles.
+    away, or three nearer ones and then six, as triangles have, or where none of that is so opposite each other. And the
+    share of those alone that are like triangles.
     """
     some = places[_spread(len(places))]
     distances = (some[:, :1] - places[:, 0]) ** 2 + (some[:, 1:] - places[:, 1]) ** 2
@@ -129,7 +144,22 @@ def lattice_order(places: Float64s, pitch_px: float) -> tuple[float, float]:
 
     around = between(*_NEIGHBOUR_PITCHES) >= _NEIGHBOURS
     triangles = float(np.mean(_among_triangles(distances)))
-    return max(float(np.mean(around)), triangles), triangles
+    order = max(float(np.mean(around)), triangles)
+    if order < _LEAST_ORDER:
+        order = max(order, float(np.mean(_opposite(some, places, distances))))
+    return order, triangles
+
+
+def _opposite(some: Float64s, places: Float64s, square: Float64s) -> Bools:
+    """Which cells (K, 2) have nearest neighbours opposite each other; centroids of all (N, 2), squared distances."""
+    if len(places) <= _NEAREST:
+        return np.zeros(len(some), np.bool_)
+    nearest = np.argsort(square, axis=1)[:, 1 : 1 + _NEAREST]
+    step = places[nearest] - some[:, None]
+    beyond = (some[:, None] - step)[:, :, None] - places
+    off = np.hypot(beyond[..., 0], beyond[..., 1]).min(axis=2)
+    met = off < _OFF * np.hypot(step[..., 0], step[..., 1])
+    return np.asarray(np.count_nonzero(met, axis=1) >= _OPPOSITE)
 
 
 def _among_triangles(square: Float64s) -> Bools:
@@ -142,6 +172,16 @@ def _among_triangles(square: Float64s) -> Bools:
     near, far = ordered[:, :3], ordered[:, 3:]
     even = (near[:, -1] < _EVEN * near[:, 0]) & (far[:, -1] < _EVEN * far[:, 0])
     return np.asarray(even & (far[:, 0] > _EVEN * near[:, -1]))
+
+
+def apart(labels: Int32s, numbers: Indices, wall_px: float) -> float:
+    """The share of pieces, by their numbers, that stay apart where each is grown by a share of the walls' width."""
+    chosen = np.zeros(int(labels.max()) + 1, np.uint8)
+    chosen[numbers] = 1
+    size = 2 * round(_GROWN * wall_px) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    count, _ = cv2.connectedComponents(cv2.dilate(chosen.take(labels), disc), connectivity=4)
+    return float(count - 1) / max(1, len(numbers))
 
 
 def filled_shares(labels: Int32s, numbers: Indices, stats: Int32s) -> tuple[float, float]:

@@ -92,6 +92,14 @@ def test_it_is_told_in_a_hole_too() -> None:
     assert np.hypot(*(turned(np.array([[LEFT + 90, TOP + 70]]), 20.0)[0] - found.place_px)) < 0.5 * PITCH_PX
 
 
+def test_a_short_border_is_told_at_both_ends_of_an_edge_alone() -> None:
+    """A sheet that ends two and a half cells beyond the block on both sides, or on one."""
+    beyond = 2.5 * PITCH_PX
+    for left, told in ((LEFT - beyond, True), (LEFT + 20, False)):
+        light, contour = block_on_table((box(left, TOP - 50, RIGHT + beyond, TOP), 12.0))
+        assert (border_beyond([light], contour, PITCH_PX) is not None) == told
+
+
 @pytest.mark.parametrize(
     "thing",
     [

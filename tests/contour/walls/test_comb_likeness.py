@@ -16,7 +16,7 @@ from contour.errors import NoBlockFound
 from contour.polygon.polygon import cutting_polygon
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
-from contour.walls.comb_likeness import Comb, filled_shares, lattice_order, surely_comb, unlike_comb
+from contour.walls.comb_likeness import Comb, apart, filled_shares, lattice_order, surely_comb, unlike_comb
 from tests.support.pictures.small_scenes import block
 
 
@@ -31,6 +31,7 @@ from tests.support.pictures.small_scenes import block
         Comb(17.0, 6.2, False, 300, 0.5, 0.5),  # dark walls under blur
         Comb(30.0, 7.8, True, 118, 0.3, 0.3, order=0.38, solid=0.82),  # foam
         Comb(31.0, 4.3, True, 37, 0.12, 0.18, order=0.22, solid=0.95),  # half of its walls broken
+        Comb(34.0, 20.0, True, 140, 0.7, 0.9, order=0.9, solid=0.96, apart=1.0),  # a lattice of wide webs
     ],
 )
 def test_combs_foams_and_plates_may_be_blocks(comb: Comb) -> None:
@@ -47,6 +48,7 @@ def test_blur_makes_walls_look_wider_and_is_taken_off() -> None:
     "comb",
     [
         Comb(86.0, 35.6, False, 42, 1.0, 1.0),  # a chessboard
+        Comb(80.0, 29.0, True, 33, 0.9, 0.9, order=0.88, solid=0.97, apart=0.03),  # another
         Comb(38.0, 16.3, True, 169, 0.73, 0.75),  # lines of text
         Comb(41.0, 12.8, False, 10, 0.2, 0.37),  # a square code
         Comb(42.0, 10.6, True, 75, 0.22, 0.24, order=0.02, solid=0.77),  # bold letters
@@ -130,6 +132,20 @@ def test_triangles_have_neighbours_all_around_whatever_their_pitch_looks_like() 
     places = np.concatenate((up, np.add(up, [15.0, 8.66])))
     for pitch in (13.0, 21.0, 30.0):
         assert lattice_order(places, pitch)[0] > 0.6
+
+
+@pytest.mark.parametrize("stretch", [0.4, 0.6, 2.0])
+def test_stretched_cells_have_neighbours_opposite_each_other(stretch: float) -> None:
+    places = honeycomb(20.0, 14) * [1.0, stretch]
+    inner = ((places > 30.0) & (places < places.max(axis=0) - 30.0)).all(axis=1)
+    assert lattice_order(places, 20.0 * np.sqrt(stretch))[0] > 0.8 * np.mean(inner)
+
+
+def test_hexagons_stay_apart_and_a_boards_squares_do_not() -> None:
+    board = (np.indices((12, 12)).sum(axis=0) % 2).astype(np.uint8)
+    for picture, least, most in ((drawn(6), 0.95, 1.0), (np.kron(board, np.ones((25, 25), np.uint8)), 0.0, 0.1)):
+        labels = np.asarray(cv2.connectedComponents(picture, connectivity=4, ltype=cv2.CV_32S)[1], np.int32)
+        assert least <= apart(labels, np.arange(1, int(labels.max()) + 1), 10.0) <= most
 
 
 def test_things_strewn_at_random_have_no_order() -> None:

@@ -28,7 +28,7 @@ _NEARBY_PITCHES = 8.0
 # Of the busiest places in the picture: less is table, however quiet its surroundings.
 _LEAST_SHARE = 0.3
 _BUSIEST = 0.98
-# A missing cell is no opening, and a scratch is no part of the block.
+# A missing cell is no opening unless the contour has a hole there, and a scratch is no part of the block.
 _OPENING_PITCHES = 2.2
 _SCRATCH_PITCHES = 1.8
 # How far the busy region reaches beyond the block's edge: half of the window it is averaged over.
@@ -36,6 +36,8 @@ _BLUR_PITCHES = 0.5
 # So far inside walls may be faint: there they are so busy of what comb is. In the middle of holes it is 0.08 of that,
 # of faded walls 0.17 or more; and nothing is a hole that is busier than the table and so much of what comb is.
 _FAR_INSIDE_PITCHES, _FAINTEST, _FAINTEST_IN_HOLES = 3.0, 0.12, 0.06
+# Up to so far within a hole its walls count: two windows of a pitch reach a pitch, and half as far again aslant.
+_RIM_PITCHES = 1.5
 # A corner is cut off where both turns are more than the first, and together less than the second; and the edges on both
 # sides so long. A piece so wide lies there, so near the tip; the contour is followed so closely.
 _BEVEL, _SIDE_PITCHES, _EVEN_PITCHES = (np.radians(15.0), np.radians(125.0)), 3.0, 0.3
@@ -83,7 +85,8 @@ def disagreement(
     small = whole_averaged(picture, shrink)
     small_pitch_px = pitch_px / shrink
     activity = _activity(small, small_pitch_px)
-    busy = _without_small_gaps(_busy(activity, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2)
+    holes = _drawn(contour.holes, small.shape[:2], shrink)
+    busy = _without_small_gaps(_busy(activity, small_pitch_px), (_OPENING_PITCHES * small_pitch_px) ** 2, holes)
     ours = _drawn(contour.rings, busy.shape, shrink)
     if flat is not None and flat.any():
         there = cv2.resize(flat, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
@@ -109,13 +112,15 @@ def disagreement(
     # The picture's border is no block, and block ends there.
     outside = np.asarray(cv2.distanceTransform(_inverted(busy), cv2.DIST_L2, 3), np.float32)
     inside = _distances(theirs)
-    holes = _drawn(contour.holes, ours.shape, shrink)
     points = _reduced_points(contour, pitch_px / _POINTS_A_PITCH, shrink)
     farthest = [
         (*_widest(_but(ours, busy)), True),
         (*_widest(_but(theirs, around)), False),
         (*in_tips, False),
-        (*_faint_holes(activity, holes, max(of_table, _FAINTEST_IN_HOLES * of_comb), small_pitch_px), False),
+        (
+            *_faint_holes(activity, holes, max(of_table, _FAINTEST_IN_HOLES * of_comb), _RIM_PITCHES * small_pitch_px),
+            False,
+        ),
         (*_farthest(outside, points, 0.0), True),
         (*_farthest(inside, points, _BLUR_PITCHES * small_pitch_px), False),
     ]
@@ -166,9 +171,10 @@ def _busy(average: Float32s, small_pitch_px: float) -> Bytes:
     return np.asarray(busy, np.uint8) * np.uint8(255)
 
 
-def _without_small_gaps(mask: Bytes, area_px2: float) -> Bytes:
+def _without_small_gaps(mask: Bytes, area_px2: float, holes: Bytes) -> Bytes:
     labels, area = pieces_and_areas(_inverted(mask), 4)
     small = area < area_px2
+    small[labels[holes > 0]] = False
     small[0] = False
     return np.asarray(cv2.bitwise_or(mask, small.astype(np.uint8).take(labels) * np.uint8(255)), np.uint8)
 

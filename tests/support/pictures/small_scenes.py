@@ -30,6 +30,7 @@ OUTLINES = {
     "l": l_shape(MIDDLE, 200, 160, 75, 20),
     "crescent": crescent(MIDDLE, 90, 75, 65, 35),
     "holed": with_holes(rectangle(MIDDLE, 200, 150, -15), disc_ring((150, 122), 30)),
+    "small-holed": with_holes(rectangle(MIDDLE, 200, 150, -15), disc_ring((150, 122), 16)),
 }
 
 

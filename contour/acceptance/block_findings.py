@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from contour.acceptance.edge_contrast import shows_table
 from contour.acceptance.findings import SHOWN_PITCHES, Finding, Limits, Refusal, around, closed, runs_where
 from contour.acceptance.quality import QualityLimits, lost_in_noise
 from contour.acceptance.trace_check import CheckedTrace
@@ -36,7 +37,9 @@ def no_comb(traced: CheckedTrace | None) -> Finding | None:
     if traced is None or traced.trace.comb is None:
         return None
     blur_px = 0.0 if traced.quality is None else traced.quality.blur_px
-    why = unlike_comb(traced.trace.comb, blur_px, cut=traced.trace.edge not in ("cells", "mixed"))
+    trace, comb = traced.trace, traced.trace.comb
+    shown = comb.lattice and shows_table(trace.light, trace.contour, comb.pitch_px, dark=not comb.bright)
+    why = unlike_comb(comb, blur_px, cut=trace.edge not in ("cells", "mixed"), shown=shown)
     return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
 
 

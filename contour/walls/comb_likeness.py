@@ -91,18 +91,18 @@ def surely_comb(comb: Comb) -> bool:
     return many and comb.solid >= _CONVEX and comb.order >= _ORDER_OF_SCATTERED
 
 
-def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True) -> str | None:
+def unlike_comb(comb: Comb, blur_px: float, *, cut: bool = True, shown: bool = True) -> str | None:
     """Why this is no honeycomb, as a sentence with what was measured and what to do; None where it may be one.
 
     `blur_px`: standard deviation of the picture's blur there; it makes walls look wider, and is taken off. `cut`: its
-    border was cut through cells, so that it may be foam.
+    border was cut through cells, so that it may be foam. `shown`: cells show the table, so that it may be a lattice.
     """
     sharp_px = math.sqrt(max(comb.wall_px**2 - (_BLUR_WIDTH * blur_px) ** 2, 0.0))
     share = min(sharp_px, comb.wall_px - WIDER_PX) / comb.pitch_px
     # Foam has wide bright walls, and cells of all sizes between them; so has a sheet with letters, which closes them.
     even = not (cut and comb.bright) or comb.regular > _REGULAR
     widest = _WIDEST_WALL if comb.pitch_px > FINE_PITCH_PX else WIDEST_FINE
-    if share > widest and even and not (comb.plate or comb.lattice):
+    if share > widest and even and not (comb.plate or (comb.lattice and shown)):
         return (
             f"what lies between patches {comb.pitch_px:.0f} px apart is {100 * share:.0f} % as wide as that, cell "
             f"walls are {100 * widest:g} % at most: a board, a print, a perforated plate, or foam whose cells "

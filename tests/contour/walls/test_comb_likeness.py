@@ -38,6 +38,12 @@ def test_combs_foams_and_plates_may_be_blocks(comb: Comb) -> None:
     assert unlike_comb(comb, 0.7) is None
 
 
+def test_a_lattice_of_wide_webs_shows_the_table() -> None:
+    comb = Comb(34.0, 20.0, True, 140, 0.7, 0.9, order=0.9, solid=0.96, apart=1.0)
+    assert unlike_comb(comb, 0.7, shown=True) is None
+    assert unlike_comb(comb, 0.7, shown=False) is not None, "dots on a sheet"
+
+
 def test_blur_makes_walls_look_wider_and_is_taken_off() -> None:
     comb = Comb(20.0, 9.5, False, 300, 0.5, 0.6)
     assert unlike_comb(comb, 3.3) is None

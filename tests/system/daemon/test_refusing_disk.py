@@ -118,7 +118,8 @@ def test_while_it_waits_it_is_the_only_one_and_ends_when_told_to(disk: Path, tmp
     config = ("--config", tmp_path / "config.yaml")
     try:
         cell.in_error()
-        status = until(lambda: called("status", *config), what="an answer")
+        until((disk / "state" / "control.sock").exists, what="its socket")
+        status = called("status", *config)
         assert (status.returncode, "storage_full" in status.stdout) == (1, True), status.stdout + status.stderr
         second = combtrace("run", *config)
         assert (second.returncode, "another combtrace" in second.stderr) == (2, True), second.stderr

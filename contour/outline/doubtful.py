@@ -35,6 +35,9 @@ _IN_CORNER, _DEEP_IN_CORNER = 2, 0.35
 # So may one across which a clean end that deep and two more witnesses lie in one line, so long and so far off it,
 # pitches: the ends along a bevel of two cells, of which one was drawn off as a corner. Of 260 right outlines none has.
 _ACROSS_LONG, _IN_LINE = 1.0, 0.03
+# So may one of which so many square pitches are unseen between the last ends on both: a bevel of three cells was drawn
+# halfway. Of 255 right outlines none has such a corner, of 139 cut lattices one.
+_UNSEEN = 2.6
 # So is a line across a corner no longer than that, by so few witnesses, if less than a cell would be lost in it: of 135
 # blocks none has one, and one whose last walls are inked has.
 _BEVEL_LONG, _LOST = 2.0, 1.0
@@ -129,7 +132,7 @@ def _bent_lines(
 
 
 def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools) -> list[np.complex128]:
-    """Corners between lines that clean ends lie in which neither explains."""
+    """Corners between lines that clean ends lie in which neither explains, or of which hardly anything was seen."""
     places = []
     first, last = outermost(witnesses, segments, inlier)
     lines = ~segments.bend & ~rolled(segments.bend, -1)
@@ -140,9 +143,11 @@ def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inl
         both = segments.models.take(np.array([[k], [after]]))
         inside = -distance(both, witnesses.points[index]).max(axis=0) / witnesses.pitch_px
         corner = np.complex128(0.5 * (found.end[k] + found.begin[k]))
+        sides = np.array([last[k], first[after]]) - corner
+        unseen = 0.5 * abs((sides[0] * sides[1].conjugate()).imag) / witnesses.pitch_px**2
         row = np.concatenate([last[[k]], witnesses.points[index], first[[after]]])
         across = _in_one_line(row, witnesses.pitch_px, np.pad(inside > _DEEP_IN_CORNER, 1))
-        if across or np.count_nonzero(inside > _DEEP_IN_CORNER) >= _IN_CORNER:
+        if unseen > _UNSEEN or across or np.count_nonzero(inside > _DEEP_IN_CORNER) >= _IN_CORNER:
             places.append(corner)
     return places
 

@@ -15,6 +15,8 @@ from contour.geometry.signed_distance import nearest
 from contour.outline.uncertainty import RingBounds
 
 _SHORTEST_PITCHES = 1.0
+# So many ends of walls at a thing lie so near to a shorter one that is hidden: it takes a corner off.
+_FEW, _AT_THING_PITCHES = 2, 0.5
 # A bridge joins two sides: walls seen over so much of each, and between them no more of a bend than this.
 _FLANK_PITCHES, _FLANK_WITNESSES = 6.0, 3
 _STRAIGHT_PITCHES, _STRAIGHT_PX = 0.02, 0.7
@@ -41,8 +43,13 @@ def ring_evidence(
     # Walls that end inside beside a thing end at it: there its own bound counts.
     unsure = (sure > _LESS_SURE * bounds.whole_px) & (nearest(places.points, told) > _FOOT_PITCHES * pitch_px)
     label = np.where(unsure, -2, np.where(filled, -1, 0))
-    # Shorter ones are gaps between ends, as there are everywhere.
-    runs = [run for run in runs_of(hidden) if len(run) > _SHORTEST_PITCHES / SPACING_PITCHES]
+    # Shorter ones are gaps between ends, as there are everywhere, but where walls end at a thing.
+    runs = [
+        run
+        for run in runs_of(hidden)
+        if len(run) > _SHORTEST_PITCHES / SPACING_PITCHES
+        or np.count_nonzero(nearest(visible.distrusted, places.points[run]) < _AT_THING_PITCHES * pitch_px) >= _FEW
+    ]
     for index, run in enumerate(runs):
         label[run] = index + 1
     states = [_run_state(run, places.points, visible.on_line, pitch_px) for run in runs]

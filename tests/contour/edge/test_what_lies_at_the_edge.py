@@ -108,6 +108,14 @@ def test_dark_things_cover_what_they_part_from_the_block_or_hide_in_a_corner(kin
     assert "covered" in {stretch.state for stretch in traced.evidence}
 
 
+def test_a_tape_that_takes_a_corner_off_covers_it_though_its_border_is_short() -> None:
+    """Two ends at it happen to lie on the lines of the edge, and hardly a cell between them is hidden."""
+    rendered = render(shop_floor_scene("tape", 1_650_033).scene)
+    traced = trace(rendered.picture, TraceSettings())
+    assert traced.evidence is not None
+    assert any(stretch.state == "covered" for stretch in traced.evidence)
+
+
 def test_a_block_that_a_hand_brings_to_the_frame_lies_in_view_and_is_hardly_known() -> None:
     """No wall of the block lies in the picture's last pixels, and the outline goes around the hand."""
     traced = trace(render(shop_floor_scene("hand_or_cable", 1_003_002).scene).picture, TraceSettings())

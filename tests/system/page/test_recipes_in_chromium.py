@@ -75,6 +75,7 @@ def test_a_change_is_tried_adopted_used_by_the_next_job_and_taken_back(served: R
         page.locator("#language").click()
         expect(page.locator("#edit .dim")).to_contain_text("Изменение сначала пробуют")
         expect(page.locator("#tried > li.flipped")).to_contain_text("по рецепту от 100 до 90000 мм²")
+        expect(page.locator("#history")).to_contain_text("Как в файле настроек")  # drawn anew, or a click is lost
         page.locator("#note").fill("the press is gone")
         page.locator('[data-back="0"]').click()
         expect(page.locator("#history")).to_contain_text("person1: the press is gone")

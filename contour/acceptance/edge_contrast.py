@@ -49,9 +49,8 @@ def shows_table(light: Bytes, contour: Contour, pitch_px: float, *, dark: bool) 
     lengths = RingLengths.of(contour.exterior)
     out_px = float(np.sign(signed_area(contour.exterior))) * pitch_px
     at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
-    place, outward = lengths.at(at), out_px * lengths.normals(at, _SPACING * pitch_px)
-    beyond, within = (light_beside(light, place, outward, pitches) for pitches in (_OUT, -_IN))
-    floors, walls = quantiles(within.ravel(), (1.0 - _CELLS, 1.0 - _WALLS) if dark else (_CELLS, _WALLS))
+    beyond, within = _sampled(light, lengths, at, out_px)
+    floors, walls = quantiles(within.ravel(), _tails(dark=dark))
     return bool(abs(median(beyond) - floors) < _SHOWN * abs(walls - floors))
 
 
@@ -65,9 +64,8 @@ def _longest(planes: list[Bytes], ring: Ring, out_px: float, *, dark: bool) -> E
 
 def _alike(planes: list[Bytes], lengths: RingLengths, at: Float64s, out_px: float, *, dark: bool) -> Bools:
     """At which lengths along a ring what lies beyond is nowhere told from the walls, shape (N,)."""
-    place, outward = lengths.at(at), out_px * lengths.normals(at, _SPACING * abs(out_px))
-    tails = (1.0 - _CELLS, 1.0 - _WALLS) if dark else (_CELLS, _WALLS)
-    sampled = [[light_beside(plane, place, outward, pitches) for pitches in (_OUT, -_IN)] for plane in planes]
+    tails = _tails(dark=dark)
+    sampled = [_sampled(plane, lengths, at, out_px) for plane in planes]
     by_all = _like_walls(sampled, lambda within: quantiles(within.ravel(), tails)[:, None])
     if not by_all.any():
         return by_all
@@ -79,7 +77,18 @@ def _alike(planes: list[Bytes], lengths: RingLengths, at: Float64s, out_px: floa
     return by_all & _like_walls(sampled, nearby)
 
 
-def _like_walls(sampled: list[list[Float64s]], levels: Callable[[Float64s], Float64s]) -> Bools:
+def _sampled(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s]:
+    """Light beyond and within a ring, at lengths along it, (K, N) each."""
+    place, outward = lengths.at(at), out_px * lengths.normals(at, _SPACING * abs(out_px))
+    return light_beside(light, place, outward, _OUT), light_beside(light, place, outward, -_IN)
+
+
+def _tails(*, dark: bool) -> tuple[float, float]:
+    """Which quantiles of light within are those of cells, and of walls."""
+    return (1.0 - _CELLS, 1.0 - _WALLS) if dark else (_CELLS, _WALLS)
+
+
+def _like_walls(sampled: list[tuple[Float64s, Float64s]], levels: Callable[[Float64s], Float64s]) -> Bools:
     """Where what lies beyond an edge is somewhere as light as walls, shape (N,), by light sampled beyond it and within
     the block, (K, N) each in each channel; `levels` tells from the latter that of cells and of walls, (2, N) or (2, 1).
     """

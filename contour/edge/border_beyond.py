@@ -69,12 +69,11 @@ class _Rays:
 
 @dataclass(frozen=True, eq=False)
 class _Reach:
-    """How far rays go: places ahead, (R, T), the middles of their parts, (R, K), both in pixels, and whether each place
-    across is away from the block in each part, (R, O, K).
+    """How far rays go: places ahead, (R, T), pixels, and whether each place across is away from the block in each part
+    of them, (R, O, K).
     """
 
     ahead: Float64s
-    middle: Float64s
     clear: Bools
 
 
@@ -133,7 +132,7 @@ def _over(sampled: Float64s, reach: _Reach, pitch_px: float) -> tuple[Float64s, 
     """
     count = reach.ahead.shape[1]
     parts = sampled[..., :count].reshape(*sampled.shape[:2], _PARTS, count // _PARTS).mean(axis=3)
-    step, at, turn, other = _clearest(parts, reach.clear, reach.middle / pitch_px)
+    step, at, turn, other = _clearest(parts, reach.clear, _middles(reach.ahead) / pitch_px)
     noise = np.abs(np.diff(parts, axis=1)).mean(axis=(1, 2))
     over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
     return over, (reach.ahead, at[:, None] * pitch_px + turn[:, None] * reach.ahead)
@@ -223,13 +222,18 @@ def _pairs(places: Complexes) -> Float64s:
 
 def _reach(rays: _Rays, ring: Ring, ahead: Float64s, pitch_px: float, *, inside: bool) -> _Reach:
     """So many places ahead, (R, T), in parts. inside: whether the rays are in a hole."""
-    middle = ahead.reshape(len(ahead), _PARTS, -1).mean(axis=2)
+    middle = _middles(ahead)
     out = _ACROSS[::_EVERY] * pitch_px
     shape = (len(middle), len(out), _PARTS)
     places = rays.at(np.broadcast_to(middle[:, None], shape), np.broadcast_to(out[:, None], shape))
     depth = depth_inside(ring, places.reshape(-1, 2)).reshape(shape)
     clear = (depth if inside else -depth) > _CLEAR * pitch_px
-    return _Reach(ahead, middle, np.repeat(clear, _EVERY, axis=1)[:, : len(_ACROSS)])
+    return _Reach(ahead, np.repeat(clear, _EVERY, axis=1)[:, : len(_ACROSS)])
+
+
+def _middles(ahead: Float64s) -> Float64s:
+    """The middles of the parts of rays, (R, K), by places ahead, (R, T)."""
+    return np.asarray(ahead.reshape(len(ahead), _PARTS, -1).mean(axis=2))
 
 
 def _clearest(parts: Float64s, clear: Bools, middle: Float64s) -> tuple[Float64s, Float64s, Float64s, Float64s]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from contour.geometry.arrays import rolled
+from contour.geometry.arrays import Float64s, rolled
 from contour.geometry.rings import Ring
 from contour.image.opencv import fewer_vertices
 from contour.narrow_features.feature import DEPTH, NarrowFeature
@@ -35,10 +35,17 @@ def steps(ring: Ring, pitch_px: float, large: float) -> list[NarrowFeature]:
     return [step for step in found if step.depth_pitches * step.width_pitches < large]
 
 
-def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
+def _edges(corners: Ring, pitch_px: float) -> tuple[Float64s, Float64s]:
+    """How long the edge from each corner of a ring is, pitches, and by how much the ring turns there, radians, positive
+    where it turns around the material, (N,) both.
+    """
     edges = rolled(corners, -1) - corners
-    long, heading = np.hypot(*edges.T) / pitch_px, edges[:, 0] + 1j * edges[:, 1]
-    turn = -np.angle(heading / rolled(heading, 1))
+    heading = edges[:, 0] + 1j * edges[:, 1]
+    return np.hypot(*edges.T) / pitch_px, -np.angle(heading / rolled(heading, 1))
+
+
+def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
+    long, turn = _edges(corners, pitch_px)
     least, turned = np.radians([_TURN_DEG, _TURNED_DEG])
     after = rolled(turn, -1)
     high = long * np.sin(np.abs(after))
@@ -61,29 +68,26 @@ def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
 def jogs(ring: Ring, pitch_px: float) -> list[NarrowFeature]:
     """Where an edge goes on less than a cell aside."""
     corners = fewer_vertices(ring, _JOG_EVEN * pitch_px)
-    edges = rolled(corners, -1) - corners
-    long, heading = np.hypot(*edges.T) / pitch_px, edges[:, 0] + 1j * edges[:, 1]
-    turn_deg = np.degrees(np.angle(heading / rolled(heading, 1)))
-    after_deg = rolled(turn_deg, -1)
-    away = (np.minimum(np.abs(turn_deg), np.abs(after_deg)) > _JOG_TURN_DEG) & (turn_deg * after_deg < 0.0)
-    beside = np.minimum(rolled(long, 1), rolled(long, -1)) > _JOG_LONG
-    aside = long * np.abs(np.sin(np.radians(0.5 * (turn_deg - after_deg))))
-    chosen = away & beside & (np.abs(turn_deg + after_deg) < _JOG_ASIDE_DEG)
+    long, turn = _edges(corners, pitch_px)
+    after = rolled(turn, -1)
+    least, turned = np.radians([_JOG_TURN_DEG, _JOG_ASIDE_DEG])
+    beside = np.minimum(rolled(long, 1), rolled(long, -1))
+    aside = long * np.abs(np.sin(0.5 * (turn - after)))
+    chosen = (np.minimum(np.abs(turn), np.abs(after)) > least) & (turn * after < 0.0)
+    chosen &= (np.abs(turn + after) < turned) & (beside > _JOG_LONG)
     chosen &= (aside > _JOG_HIGH[0]) & (aside < _JOG_HIGH[1])
     found = []
     for foot in np.flatnonzero(chosen).tolist():
         x, y = corners[foot].tolist()
-        wide = min(long[foot - 1], long[(foot + 1) % len(corners)])
-        found.append(NarrowFeature(float(aside[foot]), float(wide), (x, y), bool(turn_deg[foot] > 0.0)))
+        found.append(NarrowFeature(float(aside[foot]), float(beside[foot]), (x, y), bool(turn[foot] < 0.0)))
     return found
 
 
 def horns(ring: Ring, pitch_px: float) -> list[NarrowFeature]:
     """Sharp corners that stand out of the outline beside them."""
     corners = fewer_vertices(ring, _HORN_EVEN * pitch_px)
-    edges = rolled(corners, -1) - corners
-    long, heading = np.hypot(*edges.T) / pitch_px, edges[:, 0] + 1j * edges[:, 1]
-    turn_deg = -np.degrees(np.angle(heading / rolled(heading, 1)))
+    long, turn = _edges(corners, pitch_px)
+    turn_deg = np.degrees(turn)
     found = []
     for tip in np.flatnonzero(turn_deg > 180.0 - _HORN_DEG).tolist():
         sides = ((long[tip - 1], turn_deg[tip - 1]), (long[tip], turn_deg[(tip + 1) % len(corners)]))

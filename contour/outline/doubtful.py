@@ -169,8 +169,7 @@ def _astray(witnesses: Witnesses, segments: Segments, found: Joints) -> list[np.
     begin, places = rolled(found.begin, 1), []
     for k in np.flatnonzero(segments.bend).tolist():
         curvature = segments.models.curvature[k]
-        ends = np.array([begin[k], found.end[k]])
-        tangent = feet(segments.models.take(np.array([k, k])), ends)[1]
+        _, tangent = _at_ends(segments, found, k)
         turn = np.angle(tangent[1] * tangent[0].conjugate()) * np.sign(curvature) % (2.0 * np.pi)
         others = np.setdiff1d(np.flatnonzero(segments.bend), [k])
         if turn < _ROUND or not len(others):
@@ -180,6 +179,12 @@ def _astray(witnesses: Witnesses, segments: Segments, found: Joints) -> list[np.
         if _ASTRAY[0] < off < _ASTRAY[1]:
             places.append(joints.mean())
     return places
+
+
+def _at_ends(segments: Segments, found: Joints, k: int) -> tuple[Complexes, Complexes]:
+    """Where a segment begins and ends, and its unit tangents there, (2,) each."""
+    ends = np.array([found.begin[k - 1], found.end[k]])
+    return ends, feet(segments.models.take(np.array([k, k])), ends)[1]
 
 
 def _unseen_corners(
@@ -251,11 +256,10 @@ def _hardly_seen(
 
     A radius r passes the corner of a turn t at r / cos(t / 2) - r.
     """
-    begin, owner = rolled(found.begin, 1), segments.owner(len(witnesses))
+    owner = segments.owner(len(witnesses))
     places = []
     for k in arcs:
-        ends = np.array([begin[k], found.end[k]])
-        tangent = feet(segments.models.take(np.array([k, k])), ends)[1]
+        ends, tangent = _at_ends(segments, found, k)
         turn = float(np.abs(np.angle(tangent[0].conjugate() * tangent[1])))
         passed = (1.0 / np.cos(0.5 * min(turn, MOST_TURN)) - 1.0) / abs(segments.models.curvature[k])
         if turn > MOST_TURN or passed < _APART * witnesses.pitch_px:

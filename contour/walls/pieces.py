@@ -24,7 +24,7 @@ _FEWEST_CELLS = 7
 # A strip of swarf beside the block has closed cells of its own, and broken walls have none; but of a block that seems
 # to be in two, parts as large as this may be its own. No such strip has less wall, pitches times pixels.
 _LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
-_CELL = 0.2
+_LEAST_CELL = 0.2
 # But cells that lie where the block's rows of cells go on are its own, parted from it by ink: pitches around a piece,
 # between neighbours, and rows across; of middles that lie in a cell of such a row so many, and most so near to its own.
 # Of 30 strips of swarf and 40 offcuts one has as many, by chance; a corner that a felt-pen parted has all.
@@ -118,7 +118,8 @@ def with_earlier(pieces: tuple[Piece, ...], earlier: tuple[Piece, ...], exterior
 
 def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes] | None = None) -> Bytes:
     """A wall mask (H, W), uint8, 255 on walls, without small pieces of comb whose walls nowhere touch the block's,
-    however near they lie: strips of swarf, chips. Where no piece holds most of the walls, nothing is taken out.
+    however near they lie, and whose cells do not go on in its rows: strips of swarf, chips. Where no piece holds most
+    of the walls, nothing is taken out.
 
     `faint` makes the mask by a lower threshold: shavings without cells, too, are loose where no faint wall leads from
     the block to them, as one does to every wall of its own.
@@ -130,7 +131,7 @@ def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes
     small = (area > _LEAST_WALL * pitch_px) & (area < _LOOSE_SHARE * area.max())
     few = np.flatnonzero(small[piece])
     boxes = _boxes(np.divmod(places[few], mask.shape[1]), piece[few], count)
-    loose, own = np.zeros((2, count), np.bool_)
+    loose = np.zeros(count, np.bool_)
     for number in np.flatnonzero(small & ((boxes[2:] - boxes[:2]).min(axis=0) > pitch_px)).tolist():
         top, left, bottom, right = boxes[:, number].tolist()
         cells = _cells(labels[top:bottom, left:right], number, pitch_px)
@@ -139,9 +140,9 @@ def without_loose_pieces(mask: Bytes, pitch_px: float, faint: Callable[[], Bytes
             beyond = round(_ORDER_PITCHES * pitch_px)
             x, y = max(0, left - beyond), max(0, top - beyond)
             block = _cells(labels[y : bottom + beyond, x : right + beyond], main, pitch_px)
-            own[number] = _go_on(block + np.array([x, y]), cells + np.array([left, top]), pitch_px)
-    loose &= ~own
-    long = small & ~loose & ~own & (np.hypot(*(boxes[2:] - boxes[:2])) > _SHAVING_PITCHES * pitch_px)
+            if _go_on(block + np.array([x, y]), cells + np.array([left, top]), pitch_px):
+                small[number] = loose[number] = False
+    long = small & ~loose & (np.hypot(*(boxes[2:] - boxes[:2])) > _SHAVING_PITCHES * pitch_px)
     if faint is not None and long.any():
         loose |= long & ~_hang_together(labels, main, mask | faint())
     return (~loose).astype(np.uint8).take(labels) * mask if loose.any() else mask
@@ -152,7 +153,9 @@ def _cells(labels: Int32s, number: int, pitch_px: float) -> Float64s:
     rings, around = cv2.findContours((labels == number).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
     holes = [ring for ring, outer in zip(rings, around[0, :, 3], strict=True) if outer >= 0] if rings else []
     moments = [cv2.moments(hole) for hole in holes]
-    found = [(one["m10"] / one["m00"], one["m01"] / one["m00"]) for one in moments if one["m00"] > _CELL * pitch_px**2]
+    found = [
+        (one["m10"] / one["m00"], one["m01"] / one["m00"]) for one in moments if one["m00"] > _LEAST_CELL * pitch_px**2
+    ]
     return np.array(found, np.float64).reshape(-1, 2)
 
 

@@ -92,8 +92,9 @@ def test_a_deep_camera_is_calibrated_by_what_it_shows(tmp_path):
     config, views = tmp_path / "config.yaml", [tmp_path / f"{number}.png" for number in range(len(shown))]
     made = "width: 960, height: 720, pixel_format: Mono12, exposure_us: 2000, packet_size: 9000, timeout_s: 5"
     config.write_text(f"camera: {{kind: genicam, serial: GV7, {made}}}\ncontroller: {{kind: none}}\ntriggers: []\n")
-    with GigeCamera(tmp_path, [frame.view(np.uint8) for frame in shown]):
-        for _ in range(5 * len(views)):  # each opens the camera anew; a frame that came broken leaves a view for later
+    # A command takes two frames, three where one came broken: shown twice each, none is passed over for ever.
+    with GigeCamera(tmp_path, [frame.view(np.uint8) for frame in shown for _ in range(2)]):
+        for _ in range(10 * len(views)):
             assert main(["grab", "--config", str(config), "--output", str(tmp_path / "seen.png")]) == 0
             seen = cv2.imread(str(tmp_path / "seen.png"), cv2.IMREAD_UNCHANGED)
             assert seen.dtype == np.uint16
@@ -101,6 +102,7 @@ def test_a_deep_camera_is_calibrated_by_what_it_shows(tmp_path):
             (tmp_path / "seen.png").rename(views[number])
             if all(view.exists() for view in views):
                 break
+    assert all(view.exists() for view in views), "the camera showed every view"
     board = ["--board", "charuco", "--squares", "11x8", "--square-mm", "30", "--marker-mm", "21"]
     output = tmp_path / "cell.yaml"
     assert main(["calibrate", *board, "--plane", str(views[0]), "--output", str(output), *map(str, views)]) == 0

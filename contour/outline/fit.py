@@ -108,10 +108,8 @@ def _fitted(
         untold(witnesses, segments, found, inlier, residual, chains),
         maybe_round(witnesses, segments, found, arcs),
     ]
-    whole = found.end
-    found = bevelled(witnesses, segments, found, inlier, material[:, 0] + 1j * material[:, 1])
-    # Cut or whole, such a corner is up to a cell off.
-    doubtful.append(whole[found.end != whole])
+    found, maybe_cut = bevelled(witnesses, segments, found, inlier, material[:, 0] + 1j * material[:, 1])
+    doubtful.append(maybe_cut)
     vertices = _vertices(witnesses, segments, found, chains)
     if len(vertices.ring) < 3:
         raise NoBlockFound(

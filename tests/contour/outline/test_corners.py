@@ -68,6 +68,27 @@ def test_a_corner_that_is_cut_part_of_the_way_is_told_to_be_unsure() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
+def test_a_corner_that_is_drawn_whole_far_from_what_was_seen_is_told_to_be_unsure(seed: int) -> None:
+    """It is cut off at little more than a pitch, with one end on the cut."""
+    size = 1.15 * PITCH
+    evidence = witnesses(cut_corner(size), seed=seed, sigma=0.15)
+    away = np.abs(evidence.points - CORNER).sum(axis=1) > 1.2 * size
+    across = CORNER + np.array([0.35, 0.65]) * size
+    told = RingEvidence(
+        points=np.vstack([evidence.points[away], across]),
+        normal=np.vstack([evidence.normal[away], [[-np.sqrt(0.5), -np.sqrt(0.5)]]]),
+        position=np.append(evidence.position[away], evidence.position[away].max() + 1.0),
+        sigma=np.append(evidence.sigma[away], 0.3),
+        kind=np.append(evidence.kind[away], WitnessKind.CLEAN).astype(np.int8),
+        coarse=evidence.coarse,
+        is_hole=False,
+    )
+    found = fitted(told)
+    assert distances(CORNER[None], found.ring)[0] < 1.0
+    assert len(found.untold) > 0
+
+
+@pytest.mark.parametrize("seed", range(4))
 def test_a_corner_across_which_ends_lie_in_one_line_is_told_to_be_unsure(seed: int) -> None:
     """It is cut off at two pitches, where the last ends on both edges lie, with one end between them."""
     truth = cut_corner(2.0 * PITCH)

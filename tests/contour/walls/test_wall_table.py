@@ -76,6 +76,16 @@ def test_a_lamp_mirrored_by_the_table_in_a_hole_leaves_it_a_hole(spot: int) -> N
     assert [ring.is_hole for ring in rings] == [False, True]
 
 
+@pytest.mark.parametrize(("level", "holes"), [(100, [True]), (82, [])])
+def test_a_light_table_in_the_shade_of_a_block_makes_a_hole_and_black_cells_do_not(
+    level: int, holes: list[bool]
+) -> None:
+    light, _ = comb(150.0)
+    light[103:180, 183:260] = level
+    rings = coarse_block(wall_mask(light, 20.0, bright=True).mask, light, 20.0).rings
+    assert [ring.is_hole for ring in rings] == [False, *holes]
+
+
 def test_an_opening_with_a_wide_way_out_is_a_bay() -> None:
     light, _ = comb(5.0)
     light[63:140, 240:330] = 5

@@ -63,7 +63,7 @@ def bevelled(
             continue
         unseen = _unseen(witnesses, between(segments, inlier, k, after), material, corner=corner, near=near, far=far)
         left_out = _left_out(unseen)
-        if left_out > 0.0 or (unseen.anything and unseen.distance > _UNTOLD and unseen.area > _UNTOLD_AREA):
+        if left_out > 0.0 or _may_be_cut(unseen):
             untold.append(corner)
         if left_out <= 0.0:
             continue
@@ -71,6 +71,11 @@ def bevelled(
         cut = np.array([near + share * (corner - near), far + share * (corner - far)])
         end[k], begin[k] = feet(segments.models.take(np.array([k, after])), cut)[0]
     return replace(found, end=end, begin=begin), np.array(untold, np.complex128)
+
+
+def _may_be_cut(corner: _Corner) -> bool:
+    """Whether so much of a corner that is drawn whole is unseen that it may as well be cut off."""
+    return corner.anything and corner.distance > _UNTOLD and corner.area > _UNTOLD_AREA
 
 
 def _left_out(corner: _Corner) -> float:

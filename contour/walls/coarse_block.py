@@ -37,7 +37,7 @@ _WALL_COVERAGE = 0.12
 # Grey levels between table and walls, averaged with their cells, below which an opening's own level says nothing.
 _LEAST_SHADE = 8.0
 # A light table in a hole lies in the block's shade: of what table and walls differ by, it is lighter than walls by 0.13
-# and more, and black cells by 0.05 at most.
+# and more. Black cells are by 0.05 at most, but for one block (0.17) that is refused for its light.
 _LIGHTER_THAN_WALLS = 0.1
 # Cells make a block a pitch wide at the least; a horn with an angle of 25 degrees is thinner over 1.8 pitches, and
 # strands of broken cells lie along the block.
@@ -166,7 +166,7 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], ra
         wall = median_where(shade, walls)
         for number in np.flatnonzero(opening):
             inside = median_where(shade, labels == number)
-            # What is lighter than a light block's walls and cells together is a lamp's spot on the table in a hole.
+            # Lighter than a light block's walls and cells together is the table in a hole, or a lamp's spot on it.
             lighter = inside - wall > _LIGHTER_THAN_WALLS * (table - wall)
             opening[number] = table < wall or lighter or table - wall < _LEAST_SHADE
     opening[outside] = True

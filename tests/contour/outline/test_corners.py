@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from contour.outline.fit import FittedRing, fit_ring
 from contour.outline.labelling import supports
 from contour.outline.witnesses import cost, prepare
-from contour.walls.wall_evidence import RingEvidence, WitnessKind
+from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, circle, distances, errors, perimeter, rectangle, witnesses
 
 CORNER = np.array([300.0, 300.0])
@@ -21,10 +21,12 @@ def fitted(evidence: RingEvidence) -> FittedRing:
     return fit_ring(evidence, pitch_px=PITCH, wall_px=3.0, rectifier=None)
 
 
-def taken(evidence: RingEvidence, index: NDArray[np.bool_] | NDArray[np.intp]) -> RingEvidence:
-    """The evidence with those of its witnesses alone, as copies."""
-    names = ("points", "position", "normal", "sigma", "kind")
-    return replace(evidence, **{name: getattr(evidence, name)[index] for name in names})
+def joined(
+    evidence: RingEvidence, points: NDArray[np.float64], normal: NDArray[np.float64], beyond_px: NDArray[np.float64]
+) -> RingEvidence:
+    """The evidence with clean ends that follow its last witness, so far on along the ring."""
+    ends = EdgePoints(points, evidence.position.max() + beyond_px, normal)
+    return evidence.joined_by(ends, float(evidence.sigma[0]), WitnessKind.CLEAN)[0]
 
 
 def cut_corner(length: float, size: float = 600.0) -> NDArray[np.float64]:
@@ -73,17 +75,8 @@ def test_a_corner_that_is_drawn_whole_far_from_what_was_seen_is_told_to_be_unsur
     size = 1.15 * PITCH
     evidence = witnesses(cut_corner(size), seed=seed, sigma=0.15)
     away = np.abs(evidence.points - CORNER).sum(axis=1) > 1.2 * size
-    across = CORNER + np.array([0.35, 0.65]) * size
-    told = RingEvidence(
-        points=np.vstack([evidence.points[away], across]),
-        normal=np.vstack([evidence.normal[away], [[-np.sqrt(0.5), -np.sqrt(0.5)]]]),
-        position=np.append(evidence.position[away], evidence.position[away].max() + 1.0),
-        sigma=np.append(evidence.sigma[away], 0.3),
-        kind=np.append(evidence.kind[away], WitnessKind.CLEAN).astype(np.int8),
-        coarse=evidence.coarse,
-        is_hole=False,
-    )
-    found = fitted(told)
+    across, outwards = CORNER + np.array([[0.35, 0.65]]) * size, np.full((1, 2), -np.sqrt(0.5))
+    found = fitted(joined(evidence.take(away), across, outwards, np.ones(1)))
     assert distances(CORNER[None], found.ring)[0] < 1.0
     assert len(found.untold) > 0
 
@@ -96,16 +89,7 @@ def test_a_corner_across_which_ends_lie_in_one_line_is_told_to_be_unsure(seed: i
     away = np.abs(evidence.points - CORNER).sum(axis=1) > 2.6 * PITCH
     across = CORNER + PITCH * np.array([[0.0, 2.0], [1.1, 0.9], [2.0, 0.0]])
     outwards = np.array([[-1.0, 0.0], [-np.sqrt(0.5), -np.sqrt(0.5)], [0.0, -1.0]])
-    begun = float(evidence.position[away].max())
-    told = RingEvidence(
-        points=np.vstack([evidence.points[away], across]),
-        coarse=evidence.coarse,
-        position=np.append(evidence.position[away], begun + PITCH * np.array([0.4, 1.8, 3.0])),
-        normal=np.vstack([evidence.normal[away], outwards]),
-        sigma=np.append(evidence.sigma[away], np.full(3, evidence.sigma[0])),
-        kind=np.append(evidence.kind[away], np.full(3, WitnessKind.CLEAN)).astype(np.int8),
-        is_hole=False,
-    )
+    told = joined(evidence.take(away), across, outwards, PITCH * np.array([0.4, 1.8, 3.0]))
     assert len(fitted(told).untold) > 0
 
 
@@ -123,7 +107,7 @@ def test_a_corner_behind_which_nothing_is_seen_is_where_its_edges_meet() -> None
     for seed in range(8):
         evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
         seen = np.abs(evidence.points - CORNER).sum(axis=1) > 1.3 * PITCH
-        assert distances(CORNER[None], fitted(taken(evidence, seen)).ring)[0] < 0.1 * PITCH, seed
+        assert distances(CORNER[None], fitted(evidence.take(seen)).ring)[0] < 0.1 * PITCH, seed
 
 
 def test_a_corner_hidden_by_more_than_two_cells_is_cut_unless_something_stands_in_it() -> None:
@@ -131,7 +115,7 @@ def test_a_corner_hidden_by_more_than_two_cells_is_cut_unless_something_stands_i
     for seed in range(3):
         evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
         seen = np.abs(evidence.points - CORNER).sum(axis=1) > far
-        evidence = taken(evidence, seen)
+        evidence = evidence.take(seen)
         assert distances(CORNER[None], fitted(evidence).ring)[0] > 1.5 * PITCH, seed
         strand = np.array([[low + 0.3 * PITCH, low + 0.8 * PITCH], [low + 0.8 * PITCH, low + 0.3 * PITCH]])
         assert distances(CORNER[None], fitted(replace(evidence, beside=strand)).ring)[0] < 0.1 * PITCH, seed
@@ -145,7 +129,7 @@ def test_a_sharp_horn_is_drawn_to_its_tip_though_a_wall_is_seen_short_of_it() ->
         away = np.flatnonzero(evidence.points[:, 0] > tip[0] + 1.4 * PITCH)
         last = away[-1]
         seen = np.append(away, last)
-        evidence = taken(evidence, seen)
+        evidence = evidence.take(seen)
         evidence.points[-1] = (tip[0] + 1.35 * PITCH, tip[1] + 2.0)
         evidence.position[-1] += 0.5 * PITCH
         assert distances(tip[None], fitted(evidence).ring)[0] < 0.2 * PITCH, seed
@@ -156,7 +140,7 @@ def test_a_speck_on_an_edges_line_beyond_its_corner_draws_no_spike(beyond: float
     for seed in range(4):
         evidence = witnesses(cut_corner(0.0), seed=seed, sigma=0.25)
         seen = np.append(np.arange(len(evidence.points)), -1)
-        evidence = taken(evidence, seen)
+        evidence = evidence.take(seen)
         evidence.points[-1] = CORNER - [0.0, beyond * PITCH]
         evidence.position[-1] += 0.3 * PITCH
         ring = fitted(evidence).ring

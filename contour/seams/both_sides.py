@@ -84,10 +84,9 @@ class Order:
 
 def cell_order(free: Openings, found: Parted) -> Order:
     """The order of cells on both sides of a line; none where they are too few to say."""
-    column, row = np.rint(free.centre).astype(np.intp).T
-    away = np.where(free.cells, found.away[row, column], np.inf)
+    side, distance = found.at(free.centre)
+    away = np.where(free.cells, distance, np.inf)
     near, about = np.flatnonzero(away < _ROWS), np.flatnonzero(away < _ROWS + NEIGHBOURS[1])
-    side = found.part[row, column]
     apart = free.centre[near][:, None] - free.centre[about]
     far = np.hypot(apart[:, :, 0], apart[:, :, 1]) / free.pitch
     start, other = np.nonzero((far > NEIGHBOURS[0]) & (far < NEIGHBOURS[1]) & (side[near][:, None] == side[about]))
@@ -99,8 +98,7 @@ def cell_order(free: Openings, found: Parted) -> Order:
         # What lies in a merged cell or beyond the edge says nothing, a wall that there is no cell.
         said = (free.cells[number] | (number == 0)) & inside
         hit = free.met(aim[said], number[said])
-        x, y = np.rint(aim[said]).astype(np.intp).T
-        across = found.part[y, x] != side[start][said]
+        across = found.at(aim[said])[0] != side[start][said]
         hits[0].extend(hit[~across].tolist())
         hits[1].extend(hit[across].tolist())
     if min(map(len, hits)) < _FEWEST:

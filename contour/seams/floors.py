@@ -61,8 +61,7 @@ def parted_by_floors(light: Bytes, free: Openings) -> Parted | None:
     found = parted_by_kind(free, kinds.lighter)
     if found is None:
         return None
-    column, row = np.rint(free.centre[free.cells]).astype(np.intp).T
-    if np.mean(found.part[row, column] != kinds.lighter) > _ASTRAY:
+    if np.mean(found.at(free.centre[free.cells])[0] != kinds.lighter) > _ASTRAY:
         return None
     order = cell_order(free, found)
     return found if order.surely_other or (not order.same and _surely(kinds, place, floor)) else None

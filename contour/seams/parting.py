@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -48,13 +49,30 @@ _END = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Parted:
-    """A part of the block, (h, w): how much of the line that parts it from the rest runs along openings, and the
-    distance from that line, (h, w), pitches.
+    """A part of the block: how much of the line that parts it from the rest runs along openings, and, kept for every so
+    manieth sample of (h, w), where it lies and the distance from that line, pitches.
     """
 
     along: float
-    part: Bools
-    away: Float32s
+    every: int
+    shape: tuple[int, ...]
+    _part: Bools
+    _away: Float32s
+
+    @cached_property
+    def part(self) -> Bools:
+        """Where it lies, (h, w)."""
+        return enlarged(self._part, self.every, self.shape)
+
+    @cached_property
+    def away(self) -> Float32s:
+        """The distance from the line, pitches, (h, w)."""
+        return enlarged(self._away, self.every, self.shape)
+
+    def at(self, places: Float64s) -> tuple[Bools, Float32s]:
+        """Of samples (N, 2), x and y: whether each lies in the part, and how far from the line, pitches, (N,) both."""
+        column, row = np.rint(places).astype(np.intp).T // self.every
+        return self._part[row, column], self._away[row, column]
 
 
 def parted(free: Openings) -> Parted | None:
@@ -226,9 +244,8 @@ def parted_by_order(free: Openings) -> Iterator[Parted]:
 
 
 def _parted(free: Openings, every: int, along: float, part: Bools, off_line: Bools) -> Parted:
-    """A part and what is not the line around it, on every so manieth sample, (h, w) both, on all."""
-    away, shape = _away(off_line) / np.float32(free.pitch / every), free.numbers.shape
-    return Parted(along, enlarged(part, every, shape), enlarged(away, every, shape))
+    """A part and what is not the line around it, both on every so manieth sample."""
+    return Parted(along, every, free.numbers.shape, part, _away(off_line) / np.float32(free.pitch / every))
 
 
 def _pieces_and_lines(rest: Bools, inside: Bools, least: float) -> Iterator[tuple[Bools, Bools]]:

@@ -9,13 +9,15 @@ import cv2
 import numpy as np
 
 from contour.errors import EdgeContradicted
-from contour.geometry.arrays import Bools, Float64s
+from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, densified
 from contour.geometry.segments import BoxTree, distances_to_ring, distances_to_tree
 from contour.geometry.signed_distance import nearest
+from contour.image.pixel_sampling import sample_at
 from contour.material.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
+from contour.walls.cell_scale import CellScale
 from contour.walls.wall_ends import ring_tips, thin
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 
@@ -39,6 +41,10 @@ FINE_PITCH_PX = 12.0
 # Corners of fine closed cells pass for ends all around: their teeth lie 0.15 pitches inside of lines through these and
 # more, in the mean. Material whose cells' floors differ from the table runs along a cut, 0.1 pitches off at most.
 _ALONG_PITCHES = 0.12
+# Walls line a border that closes its cells: at so many places of it, within a wall's width, light is nearer to theirs
+# than to floors'. On tables as light as they a right border has 0.92, and cells that were cut open, whose floors alone
+# differ from the table, 0.75 at most.
+_LINED, _STEPS_INTO_WALL, _NORMAL_PITCHES = 0.85, 6, 0.2
 # Of a triangle over the pitch of a hexagon as large.
 _TRIANGLE_SIDE = math.sqrt(2.0)
 
@@ -97,6 +103,23 @@ def tooth_px(seen: BlockEvidence) -> float:
 
 def _triangular(seen: BlockEvidence) -> bool:
     return seen.comb is not None and seen.comb.triangular
+
+
+def lined_by_walls(border: Ring, light: Bytes, cells: CellScale) -> bool:
+    """Whether walls line a border around material, pixels, negative shoelace, in `light` (H, W). Only where the table
+    is as light as walls may it run along floors of cells.
+    """
+    lengths = RingLengths.of(border)
+    at = np.arange(0.0, lengths.length, 1.0)
+    place, inwards = lengths.at(at), lengths.normals(at, _NORMAL_PITCHES * cells.pitch_px)
+
+    def as_walls(depth: Float64s) -> Bools:
+        x, y = (place[:, k, None] + depth * inwards[:, k, None] for k in (0, 1))
+        share = (sample_at(light, x, y) - cells.floor) / (cells.level - cells.floor)
+        return np.asarray(share.max(axis=1) > 0.5)
+
+    within = np.linspace(0.5 * cells.wall_px, cells.wall_px + 1.0, _STEPS_INTO_WALL)
+    return bool(as_walls(-within).mean() < 0.5 or as_walls(within).mean() > _LINED)
 
 
 def check_promise(promise: str, kind: Edge, *, traced: bool) -> None:

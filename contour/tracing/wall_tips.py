@@ -31,6 +31,7 @@ from contour.tracing.edge_kind import (
     check_fine,
     check_promise,
     edge_kind,
+    lined_by_walls,
     may_be_closed,
     tooth_px,
 )
@@ -382,6 +383,8 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
     try:
         material = solid.edge
     except NoBlockFound:
+        return None, "cut"
+    if not lined_by_walls(material.contour.exterior, solid.light, cells):
         return None, "cut"
     kind, comb = edge_kind(material, seen), cells.comb
     sheet = plate_edge(material, wide=False) if kind == "cells" else None

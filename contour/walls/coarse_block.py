@@ -37,8 +37,9 @@ _WALL_COVERAGE = 0.12
 # Grey levels between table and walls, averaged with their cells, below which an opening's own level says nothing.
 _LEAST_SHADE = 8.0
 # A light table in a hole lies in the block's shade: of what table and walls differ by, it is lighter than walls by 0.13
-# and more. Black cells are by 0.05 at most, but for one block (0.17) that is refused for its light.
-_LIGHTER_THAN_WALLS = 0.1
+# and more. Black cells are by 0.05 at most, but for one block (0.17) that is refused for its light. Of a hole that lies
+# half in deep shade a quarter is lighter by 0.54, of black cells in blocks that are accepted by 0.10.
+_LIGHTER_THAN_WALLS, _A_QUARTER_LIGHTER = 0.1, 0.3
 # Cells make a block a pitch wide at the least; a horn with an angle of 25 degrees is thinner over 1.8 pitches, and
 # strands of broken cells lie along the block.
 _THIN_PITCHES = 0.8
@@ -165,9 +166,9 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], ra
         table = median_where(shade, labels == outside)
         wall = median_where(shade, walls)
         for number in np.flatnonzero(opening):
-            inside = median_where(shade, labels == number)
+            half, quarter = np.quantile(shade[labels == number], (0.5, 0.75)) - wall
             # Lighter than a light block's walls and cells together is the table in a hole, or a lamp's spot on it.
-            lighter = inside - wall > _LIGHTER_THAN_WALLS * (table - wall)
+            lighter = half > _LIGHTER_THAN_WALLS * (table - wall) or quarter > _A_QUARTER_LIGHTER * (table - wall)
             opening[number] = table < wall or lighter or table - wall < _LEAST_SHADE
     opening[outside] = True
     return (~opening).astype(np.uint8).take(labels)

@@ -13,11 +13,15 @@ from contour.errors import EdgeContradicted, NoBlockFound
 from contour.geometry.agreement import agreement
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour
+from contour.material.closed_cells import material_edge
 from contour.tracing import wall_tips as tracing_wall_tips
+from contour.tracing.edge_kind import lined_by_walls
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
 from contour.walls import see_block
 from contour.walls.cell_scale import CellScale, probe
+from contour.walls.lightness import wall_light
+from contour.walls.wall_mask import wall_mask
 from tests.support.scenes.lattices import Border, Cells, Lattice, lattice
 
 # Drawn for these tests, and looked at by no rule.
@@ -261,3 +265,17 @@ def test_the_scale_of_a_grey_picture_is_read_once(monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(module, "probe", counted)
     assert wall_tips(drawn("hexagonal", "closed").picture, TraceSettings()).edge == "cells"
     assert read == ["auto"]
+
+
+@pytest.mark.parametrize(("border", "lined"), [("closed", True), ("cut", False)])
+def test_walls_line_a_closed_border_and_no_cut_one_on_a_table_as_light_as_they(border: Border, lined: bool) -> None:
+    one = drawn("hexagonal", border)
+    level = probe(wall_light(one.picture), "auto").level
+    block = cv2.fillPoly(np.zeros_like(one.picture), [np.rint(one.outline.exterior).astype(np.int32)], 255)
+    table = level if border == "cut" else float(np.median(one.picture[block == 0]))
+    picture = cv2.GaussianBlur(np.where(block > 0, one.picture, np.uint8(table)), (0, 0), 0.7)
+    light = wall_light(np.asarray(picture, np.uint8))
+    cells = probe(light, "auto")
+    mask = wall_mask(light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
+    material = material_edge(np.asarray(picture, np.uint8), cells.pitch_px, mask)
+    assert lined_by_walls(material.contour.exterior, light, cells) == lined

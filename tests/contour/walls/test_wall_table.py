@@ -86,6 +86,14 @@ def test_a_light_table_in_the_shade_of_a_block_makes_a_hole_and_black_cells_do_n
     assert [ring.is_hole for ring in rings] == [False, *holes]
 
 
+def test_a_hole_of_which_half_lies_in_deep_shade_is_one() -> None:
+    light, _ = comb(150.0)
+    light[103:180, 183:260] = 150
+    light[103:150, 183:260] = 20
+    rings = coarse_block(wall_mask(light, 20.0, bright=True).mask, light, 20.0).rings
+    assert [ring.is_hole for ring in rings] == [False, True]
+
+
 def test_an_opening_with_a_wide_way_out_is_a_bay() -> None:
     light, _ = comb(5.0)
     light[63:140, 240:330] = 5

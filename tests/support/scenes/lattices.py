@@ -28,6 +28,8 @@ _ROW = np.sqrt(3.0) / 2.0
 _PARTLY = 0.05
 # Pitches around a block's outline within which all of its cells lie, drawn out ones too.
 _BESIDE = 3.5
+# Rows that are drawn at once: their arrays stay in the cache.
+_BAND = 32
 
 Floats = NDArray[np.float32]
 
@@ -62,13 +64,14 @@ def lattice(seed: int, cells: Cells, border: Border) -> Lattice:
     # Round holes leave more material between them than walls are wide.
     wall = pitch * float(rng.uniform(0.2, 0.45) if cells == "round" else rng.uniform(0.06, 0.2))
     wall = max(wall, 1.5)
-    y, x = np.mgrid[0 : HEIGHT * _FINER, 0 : WIDTH * _FINER].astype(np.float32)
-    x, y = (x + 0.5) / _FINER - 0.5, (y + 0.5) / _FINER - 0.5
+    # A row and a column, of which all places are made.
+    y, x = (((np.arange(size * _FINER) + 0.5) / _FINER - 0.5).astype(np.float32) for size in (HEIGHT, WIDTH))
+    y = y[:, None]
     # A hole that a later cut opens is a bay with closed cells: nobody can tell where it was meant to end.
     whole = _box(rng, x, y, pitch, holed=border != "mixed")
     # All but the table lies there.
     part = _around(whole, round(_BESIDE * pitch * _FINER))
-    outline, x, y = whole[part], x[part], y[part]
+    outline, x, y = whole[part], x[part[1]], y[part[0]]
     angle = float(rng.uniform(0, np.pi))
     into_wall, number, centre = _pattern(rng, cells, (x, y), angle, pitch, wall)
     centre = centre[0] - part[1].start / _FINER, centre[1] - part[0].start / _FINER
@@ -137,8 +140,34 @@ def _pattern(
 ) -> tuple[Floats, NDArray[np.int64], tuple[Floats, Floats]]:
     """How far each place lies within a wall (px, negative in cells), its cell's number, and that cell's centre."""
     x, y = place
-    u = x * np.cos(angle) + y * np.sin(angle) + rng.uniform(0, pitch)
-    v = -x * np.sin(angle) + y * np.cos(angle) + rng.uniform(0, pitch)
+    shift = rng.uniform(0, pitch), rng.uniform(0, pitch)
+    drawn = [_rows(cells, (x, y[top : top + _BAND]), angle, shift, pitch) for top in range(0, len(y), _BAND)]
+    gap, *at = (np.concatenate(rows) for rows in zip(*drawn, strict=True))
+    if cells == "triangular":
+        a, b, j = at
+        i = (a - a.min()) * (b.max() - b.min() + 1.0) + b
+    else:
+        i, j = at
+    into = 0.5 * wall - np.asarray(gap, np.float32) * pitch
+    number = ((np.rint(i) - i.min()) * np.rint(j.max() - j.min() + 2.0) + np.rint(j)).astype(np.int64)
+    index = _ranked(number)
+    count = np.maximum(np.bincount(index.ravel()), 1)
+    centre_x, centre_y = (
+        (np.bincount(index.ravel(), np.broadcast_to(at, index.shape).ravel()) / count).astype(np.float32)
+        for at in place
+    )
+    return into.astype(np.float32), index, (centre_x, centre_y)
+
+
+def _rows(
+    cells: Cells, place: tuple[Floats, Floats], angle: float, shift: tuple[float, float], pitch: float
+) -> tuple[Any, ...]:
+    """How far each place lies from the middle of its nearest wall, pitches, and in which row and column of cells: of
+    triangles in which one of three families of rows.
+    """
+    x, y = place
+    u = x * np.cos(angle) + y * np.sin(angle) + shift[0]
+    v = -x * np.sin(angle) + y * np.cos(angle) + shift[1]
     wide = 1.0
     if cells == "flex":
         v = v + 0.18 * pitch * np.sin(2 * np.pi * u / (5.3 * pitch))
@@ -147,27 +176,16 @@ def _pattern(
     u, v = u / pitch / wide, v / pitch
     if cells == "square":
         i, j = np.rint(u), np.rint(v)
-        gap = 0.5 - np.maximum(np.abs(u - i), np.abs(v - j))
-    elif cells == "triangular":
+        return 0.5 - np.maximum(np.abs(u - i), np.abs(v - j)), i, j
+    if cells == "triangular":
         # Three families of lines, one apart; a triangle is the place between them.
-        a, b, c = v / _ROW, (0.5 * v + _ROW * u) / _ROW, (0.5 * v - _ROW * u) / _ROW
-        gap = np.minimum.reduce([np.abs(k - np.rint(k)) for k in (a, b, c)]) * _ROW
-        a, b, c = (np.floor(k) for k in (a, b, c))
-        i, j = (a - a.min()) * (b.max() - b.min() + 1.0) + b, c
-    else:
-        i, j, du, dv = _nearest_hex(u, v)
-        if cells == "round":
-            gap = 0.5 - np.hypot(du, dv)
-        else:
-            across = [np.abs(du * nx + dv * ny) for nx, ny in ((1.0, 0.0), (0.5, _ROW), (-0.5, _ROW))]
-            gap = 0.5 - np.maximum.reduce(across)
-    into = 0.5 * wall - np.asarray(gap, np.float32) * pitch
-    number = ((np.rint(i) - i.min()) * np.rint(j.max() - j.min() + 2.0) + np.rint(j)).astype(np.int64)
-    index = _ranked(number)
-    count = np.maximum(np.bincount(index.ravel()), 1)
-    centre_x = (np.bincount(index.ravel(), x.ravel()) / count).astype(np.float32)
-    centre_y = (np.bincount(index.ravel(), y.ravel()) / count).astype(np.float32)
-    return into.astype(np.float32), index, (centre_x, centre_y)
+        lines = v / _ROW, (0.5 * v + _ROW * u) / _ROW, (0.5 * v - _ROW * u) / _ROW
+        return np.minimum.reduce([np.abs(k - np.rint(k)) for k in lines]) * _ROW, *(np.floor(k) for k in lines)
+    i, j, du, dv = _nearest_hex(u, v)
+    if cells == "round":
+        return 0.5 - np.hypot(du, dv), i, j
+    across = [np.abs(du * nx + dv * ny) for nx, ny in ((1.0, 0.0), (0.5, _ROW), (-0.5, _ROW))]
+    return 0.5 - np.maximum.reduce(across), i, j
 
 
 def _ranked(number: NDArray[np.int64]) -> NDArray[np.int64]:

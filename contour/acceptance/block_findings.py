@@ -172,7 +172,7 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
 
 
 def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
-    """A chip's bump or dent, or a part of the edge without cells behind it or with comb beyond it."""
+    """A chip's bump or dent, a part of the edge without cells behind it or with comb beyond it, or an edge left out."""
     if traced.narrow is not None:
         narrow = traced.narrow
         what = "stands out of its edge" if narrow.outwards else "goes into its edge"
@@ -191,6 +191,15 @@ def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
             f"Along {traced.bare.length_pitches:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, no cells lie "
             "just within it: it may run over the table, a label or along a cable there. Look at the overlay; clear the "
             "edge, check light and table, or set max_disagreement_pitches: 0 for blocks with filled cells.",
+            (around(x, y, shown_px),),
+        )
+    if traced.trace.opening_px is not None:
+        x, y, wide = traced.trace.opening_px
+        return Finding(
+            Refusal.METHODS_DISAGREE,
+            f"Walls are missing over {wide / (traced.trace.pitch_px or wide):.1f} cells around ({x:.0f}, {y:.0f}) px: "
+            "a hole so small is not traced. Take another block, or one whose holes are wider than 2.2 cells, or set "
+            "max_disagreement_pitches: 0 for blocks from which cells are missing.",
             (around(x, y, shown_px),),
         )
     if traced.beyond is not None:

@@ -46,6 +46,8 @@ class Trace:
     `evidence`: what the contour rests on, stretches without gaps along each ring, and `look` what lies about it; None
     where the method does not say.
     `untold_px`: where (x, y) hardly anything seen tells whether it is round or a corner; None where nowhere.
+    `opening_px`: where (x, y) cells are missing or a hole too small to be traced lies, and how wide, pixels; None where
+    nowhere.
     `parted`: the smaller of two parts of it between which no walls lead; None where it is one.
     """
 
@@ -62,6 +64,7 @@ class Trace:
     evidence: tuple[Stretch, ...] | None = None
     look: TableLook | None = field(default=None, compare=False, repr=False)
     untold_px: tuple[float, float] | None = None
+    opening_px: tuple[float, float, float] | None = None
     parted: Piece | None = None
 
     def moved(self, first: Float64s) -> Trace:
@@ -70,4 +73,8 @@ class Trace:
         others = tuple(piece.moved(x, y) for piece in self.others)
         untold = None if self.untold_px is None else (self.untold_px[0] + x, self.untold_px[1] + y)
         parted = None if self.parted is None else self.parted.moved(x, y)
-        return replace(self, contour=shifted(self.contour, first), others=others, untold_px=untold, parted=parted)
+        opening = (
+            None if self.opening_px is None else (self.opening_px[0] + x, self.opening_px[1] + y, *self.opening_px[2:])
+        )
+        moved = replace(self, contour=shifted(self.contour, first), others=others, untold_px=untold, parted=parted)
+        return replace(moved, opening_px=opening)

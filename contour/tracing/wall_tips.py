@@ -249,7 +249,11 @@ def _cut(
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     untold = next(((float(x), float(y)) for one in rings for x, y in one.untold), None)
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
-    return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold)
+    # What fills cells hides walls, too; but what is dark may be a hole in the block's shade.
+    middles = seen.openings[:, :2]
+    clear = (look.foreign_at(middles) > 0.0) | ~look.lighter_at(middles)
+    opening = next(((float(x), float(y), 2.0 * float(radius)) for x, y, radius in seen.openings[clear]), None)
+    return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold, opening_px=opening)
 
 
 def looked_at(picture: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[BlockEvidence, TableLook]:

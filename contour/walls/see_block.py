@@ -129,7 +129,9 @@ def see_block(
     evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway, walls.relief)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))
-    return replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose, mask=seen.mask)
+    openings = np.column_stack([pixels_of(coarse.openings[:, :2], scale), coarse.openings[:, 2] * scale])
+    evidence = replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose, mask=seen.mask)
+    return replace(evidence, openings=openings)
 
 
 def _scale(light: Bytes, cells: CellScale) -> int:

@@ -101,7 +101,7 @@ class BlockEvidence:
     others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
     pixels. comb: what its cells look like. clipped: share of its witnesses beside which light is at full scale. loose:
     walls of small pieces that were told from it, however near they lie, uint8, 255 there, on a grid over the picture.
-    mask: all other walls, on the same grid.
+    mask: all other walls, on the same grid. openings: as a coarse block's, in pixels.
     """
 
     rings: tuple[RingEvidence, ...]
@@ -118,3 +118,4 @@ class BlockEvidence:
     comb: Comb | None = None
     loose: Bytes | None = None
     mask: Bytes | None = None
+    openings: Float64s = field(default_factory=lambda: np.empty((0, 3)))

@@ -37,7 +37,7 @@ _CONTACTS = 6
 _HOLE_RADIUS_PITCHES = 1.1
 # So far within a block no larger disc fits between walls in 92 of 93 right outlines, none of 0.48 in 90 of them; in the
 # last one adhesive hides walls. Holes of two cells leave room for it.
-_OPENING_RADIUS_PITCHES, _WELL_WITHIN_PITCHES = 0.72, 1.2
+_OPENING_RADIUS_PITCHES, _WELL_WITHIN_PITCHES = 0.6, 1.2
 _WALL_COVERAGE = 0.12
 # Grey levels between table and walls, averaged with their cells, below which an opening's own level says nothing.
 _LEAST_SHADE = 8.0

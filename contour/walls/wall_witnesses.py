@@ -37,7 +37,7 @@ _NEAR_PX = 1.5
 # On a known table: how unsure an end may be, how much of what differs around it its top and side explain, and by how
 # much these differ from the table, of what is usual. Of 5950 ends four differ by less, which are grain and streaks on
 # the table; of 20 that differ by up to 0.3, 19 are ends of walls.
-_MOST_RELIEF_SIGMA_PX, _LEAST_TOLD, _LEAST_RELIEF_HEIGHT = 1.5, 0.4, 0.2
+_MOST_RELIEF_SIGMA_PX, _LEAST_TOLD, _LEAST_RELIEF_HEIGHT, _LEAST_SIDE_HEIGHT = 1.5, 0.4, 0.2, 0.25
 _FAINT_HEIGHT = 0.45
 _FAINT_SIGMA_PX = 3.0
 # How far the edge of dark material is looked for from the last wall seen in it, and how near is the wall's own edge.
@@ -118,6 +118,8 @@ def block_evidence(
         least = np.where(faint, _INSIDE_PITCHES * cells.pitch_px, np.inf)
         sides = _to_the_table(dark, sides, place, normal, least)
     sides = replace(sides, points=_raised(sides.points, normal, depth))
+    if relief is not None:
+        sides = _high(relief, sides, tips)
     polarity = "bright" if cells.bright else "dark"
     return BlockEvidence(
         _rings(coarse, tips, sides, _walls(chains, coarse, pitch_px), depth, scale),
@@ -182,6 +184,13 @@ def _relief_tips(relief: Relief, ends: _Ends, cells: CellScale, model: EndModel)
     sigma = np.hypot(np.where(clean, *_MODEL_SIGMA_PX), fitted.sigma)
     kind = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
     return _Witnesses(fitted.point[good], kind[good], sigma[good])
+
+
+def _high(relief: Relief, sides: _Witnesses, tips: _Witnesses) -> _Witnesses:
+    """Outermost wall points that stand out of a known table, of what ends do, by more than its own shades do."""
+    least = _LEAST_SIDE_HEIGHT * median(relief.height_at(tips.points)) if len(tips.points) else 0.0
+    good = relief.height_at(sides.points) > least
+    return _Witnesses(sides.points[good], sides.kind[good], sides.sigma[good])
 
 
 def _sides(light: Bytes, place: Float64s, normal: Float64s, wall: float, model: EndModel) -> _Witnesses:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from contour.geometry.agreement import agreement
 from contour.material.even_table import even_table
 from contour.synthetic import Scene, Structure, Table, render, render_empty_table
 from service.config.plain_recipe import PlainRecipe
@@ -56,6 +57,13 @@ def test_a_block_on_an_even_table_as_light_as_its_walls_needs_no_taught_one() ->
     seen = measured(scene)
     assert seen.reasons == ()
     assert seen.uncertainty_px is not None
+
+
+def test_the_tables_own_shades_beside_a_block_are_no_walls_of_it() -> None:
+    rendered = render(shop_floor_scene("light_table", 1_712_003, alone=True).scene)
+    seen = Measurer(calibration_for(rendered.camera)).measure(rendered.picture, PlainRecipe(), rendered.thickness_mm)
+    assert seen.pixels is not None
+    assert agreement(seen.pixels, rendered.truth_px).hausdorff_px < 0.5 * rendered.pitch_px
 
 
 @pytest.mark.parametrize("name", [*COVERED, "tape on a corner", "tape along an edge", "hard shadow"])

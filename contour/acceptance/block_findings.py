@@ -198,8 +198,8 @@ def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
         return Finding(
             Refusal.METHODS_DISAGREE,
             f"Walls are missing over {wide / (traced.trace.pitch_px or wide):.1f} cells around ({x:.0f}, {y:.0f}) px: "
-            "a hole so small is not traced. Take another block, or one whose holes are wider than 2.2 cells, or set "
-            "max_disagreement_pitches: 0 for blocks from which cells are missing.",
+            "cells are lost there, or it is a hole, which is traced from 2.2 cells on. Look at the overlay; take "
+            "another block, or set max_disagreement_pitches: 0 for blocks from which cells are missing.",
             (around(x, y, shown_px),),
         )
     if traced.beyond is not None:

@@ -120,19 +120,29 @@ def _box(rng: np.random.Generator, x: Floats, y: Floats, pitch: float, *, holed:
     """An L or a rectangle, turned, all of it in view with the cells that it touches."""
     angle = float(rng.uniform(0, np.pi))
     cx, cy = WIDTH / 2 + rng.uniform(-30, 30), HEIGHT / 2 + rng.uniform(-20, 20)
-    u = (x - cx) * np.cos(angle) + (y - cy) * np.sin(angle)
-    v = -(x - cx) * np.sin(angle) + (y - cy) * np.cos(angle)
     half = float(rng.uniform(200, 250))
     a, b = half, half * float(rng.uniform(0.6, 0.95))
     tall = a * abs(np.sin(angle)) + b * abs(np.cos(angle))
     a, b = np.array([a, b]) * min(1.0, (HEIGHT / 2 - abs(cy - HEIGHT / 2) - _MARGIN_PX - pitch) / tall)
-    box = (np.abs(u) < a) & (np.abs(v) < b)
-    if rng.random() < 0.4:
-        box &= ~((u > 0.1 * a) & (v > 0.0))
+    dented = rng.random() < 0.4
     # Openings narrower than 2.2 cells are missing cells.
-    if rng.random() < 0.3 and holed and 0.3 * b > 2.2 * pitch:
-        box &= np.hypot(u + 0.45 * a, v + 0.3 * b) > 0.3 * b
-    return np.asarray(box)
+    opened = rng.random() < 0.3 and holed and 0.3 * b > 2.2 * pitch
+
+    def rows(y: Floats) -> NDArray[np.bool_]:
+        u = (x - cx) * np.cos(angle) + (y - cy) * np.sin(angle)
+        v = -(x - cx) * np.sin(angle) + (y - cy) * np.cos(angle)
+        box = (np.abs(u) < a) & (np.abs(v) < b)
+        if dented:
+            box &= ~((u > 0.1 * a) & (v > 0.0))
+        if opened:
+            box &= np.hypot(u + 0.45 * a, v + 0.3 * b) > 0.3 * b
+        return box
+
+    return np.concatenate([rows(band) for band in _bands(y)])
+
+
+def _bands(y: Floats) -> list[Floats]:
+    return [y[top : top + _BAND] for top in range(0, len(y), _BAND)]
 
 
 def _pattern(
@@ -141,15 +151,15 @@ def _pattern(
     """How far each place lies within a wall (px, negative in cells), its cell's number, and that cell's centre."""
     x, y = place
     shift = rng.uniform(0, pitch), rng.uniform(0, pitch)
-    drawn = [_rows(cells, (x, y[top : top + _BAND]), angle, shift, pitch) for top in range(0, len(y), _BAND)]
-    gap, *at = (np.concatenate(rows) for rows in zip(*drawn, strict=True))
+    drawn = [_rows(cells, (x, band), angle, shift, pitch) for band in _bands(y)]
+    gap, *at = (np.concatenate(rows, dtype=np.float32) for rows in zip(*drawn, strict=True))
     if cells == "triangular":
         a, b, j = at
         i = (a - a.min()) * (b.max() - b.min() + 1.0) + b
     else:
         i, j = at
-    into = 0.5 * wall - np.asarray(gap, np.float32) * pitch
-    number = ((np.rint(i) - i.min()) * np.rint(j.max() - j.min() + 2.0) + np.rint(j)).astype(np.int64)
+    into = 0.5 * wall - gap * pitch
+    number = ((i - i.min()) * (j.max() - j.min() + 2.0) + j).astype(np.int64)
     index = _ranked(number)
     count = np.maximum(np.bincount(index.ravel()), 1)
     centre_x, centre_y = (

@@ -172,7 +172,9 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
 
 
 def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
-    """A chip's bump or dent, a part of the edge without cells behind it or with comb beyond it, or an edge left out."""
+    """A chip's bump or dent, a part of the edge without cells behind it or with comb beyond it, or cells or a hole that
+    are left out.
+    """
     if traced.narrow is not None:
         narrow = traced.narrow
         what = "stands out of its edge" if narrow.outwards else "goes into its edge"

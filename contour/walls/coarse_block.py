@@ -35,8 +35,8 @@ _GAPS_PITCHES = 2.5
 _CONTACTS = 6
 # An inner opening in which a disc of this radius fits is a hole, not a missing cell.
 _HOLE_RADIUS_PITCHES = 1.1
-# So far within a block no larger disc fits between walls in 92 of 93 right outlines, none of 0.48 in 90 of them; in the
-# last one adhesive hides walls. Holes of two cells leave room for it.
+# So far within a block no larger disc fits between walls in 90 of 93 right outlines, and none of 0.48; in the others
+# ink, adhesive or a hand hides walls. Holes of a cell and a half leave room for it.
 _OPENING_RADIUS_PITCHES, _WELL_WITHIN_PITCHES = 0.6, 1.2
 _WALL_COVERAGE = 0.12
 # Grey levels between table and walls, averaged with their cells, below which an opening's own level says nothing.

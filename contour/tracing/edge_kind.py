@@ -107,8 +107,11 @@ def _triangular(seen: BlockEvidence) -> bool:
 
 def lined_by_walls(border: Ring, light: Bytes, cells: CellScale) -> bool:
     """Whether walls line a border around material, pixels, negative shoelace, in `light` (H, W). Only where the table
-    is as light as walls may it run along floors of cells.
+    is as light as walls may it run along floors of cells. None do that are the darker ones of light walls, or the other
+    way round: compound beside cells looks so.
     """
+    if (cells.level > cells.floor) != cells.bright:
+        return False
     lengths = RingLengths.of(border)
     at = np.arange(0.0, lengths.length, 1.0)
     place, inwards = lengths.at(at), lengths.normals(at, _NORMAL_PITCHES * cells.pitch_px)

@@ -338,6 +338,11 @@ class _Solid:
         """Raises NoBlockFound."""
         return material_edge(self.picture, self.cells.pitch_px, self.walls)
 
+    @cached_property
+    def lined(self) -> bool:
+        """Whether walls, or webs, line the edge of material; raises NoBlockFound."""
+        return lined_by_walls(self.edge.contour.exterior, self.light, self.cells)
+
     def closed(self) -> Trace:
         """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
         _ = self.walls
@@ -388,7 +393,7 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
         material = solid.edge
     except NoBlockFound:
         return None, "cut"
-    if not lined_by_walls(material.contour.exterior, solid.light, cells):
+    if not solid.lined:
         return None, "cut"
     kind, comb = edge_kind(material, seen), cells.comb
     sheet = plate_edge(material, wide=False) if kind == "cells" else None
@@ -422,7 +427,7 @@ def _plate(solid: _Solid, seen: BlockEvidence) -> Trace | BlockEvidence | None:
         return None
     cells, _ = solid.cells, solid.walls
     try:
-        found = plate_edge(solid.edge, wide=wide)
+        found = plate_edge(solid.edge, wide=wide) if solid.lined else None
     except NoBlockFound:
         return None
     if found is None:

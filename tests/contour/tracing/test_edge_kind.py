@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import Literal
 
@@ -14,6 +15,7 @@ from contour.geometry.agreement import agreement
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour
 from contour.material.closed_cells import material_edge
+from contour.synthetic import render
 from contour.tracing import wall_tips as tracing_wall_tips
 from contour.tracing.edge_kind import lined_by_walls
 from contour.tracing.trace import Trace, TraceSettings
@@ -23,6 +25,7 @@ from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
 from contour.walls.wall_mask import wall_mask
 from tests.support.scenes.lattices import Border, Cells, Lattice, lattice
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 # Drawn for these tests, and looked at by no rule.
 SEED = 977001
@@ -279,3 +282,10 @@ def test_walls_line_a_closed_border_and_no_cut_one_on_a_table_as_light_as_they(b
     mask = wall_mask(light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
     material = material_edge(np.asarray(picture, np.uint8), cells.pitch_px, mask)
     assert lined_by_walls(material.contour.exterior, light, cells) == lined
+    assert not lined_by_walls(material.contour.exterior, light, replace(cells, level=cells.floor, floor=cells.level))
+
+
+def test_cells_filled_with_light_compound_amid_a_block_are_no_block_of_closed_cells() -> None:
+    rendered = render(shop_floor_scene("light_table", 1_720_027).scene)
+    with pytest.raises(NoBlockFound):
+        wall_tips(rendered.picture, TraceSettings())

@@ -17,9 +17,9 @@ $(STAMP): pyproject.toml constraints.txt
 demo: install
 	@$(BIN)/combtrace demo --output demo-output
 
-# Four at a time on two cores: half of the time a test waits. A file's tests stay together, first those that wait most.
+# Five at a time on two cores: half of the time a test waits. A file's tests stay together, first those that wait most.
 test: install
-	$(BIN)/python -m pytest --numprocesses $(or $(WORKERS),4) --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --numprocesses $(or $(WORKERS),5) --dist loadfile --no-loadscope-reorder
 
 # A real kernel's camera: the tests run in a virtual machine that this boots (QEMU and kernel from Debian's packages).
 test-camera: install

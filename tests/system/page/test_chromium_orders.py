@@ -64,6 +64,7 @@ def test_a_key_held_down_and_a_double_tap_are_one_order_each(panel: Panel) -> No
         page.keyboard.down("m")
     page.locator("#trigger").dblclick()
     expect(page.locator("#told")).to_have_text("Sending the order…")
+    page.wait_for_timeout(200)
     assert len(orders) == 1
     orders.pop().continue_()
     expect(page.locator("#told")).to_have_text(re.compile(r"job \d+: accepted"))

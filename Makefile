@@ -17,7 +17,7 @@ $(STAMP): pyproject.toml constraints.txt
 demo: install
 	@$(BIN)/combtrace demo --output demo-output
 
-# Five at a time on two cores: half of the time a test waits. A file's tests stay together, first those that wait most.
+# Five at a time keep two cores at work all the time. A file's tests stay together, first those that wait most.
 test: install
 	$(BIN)/python -m pytest --numprocesses $(or $(WORKERS),5) --dist loadfile --no-loadscope-reorder
 

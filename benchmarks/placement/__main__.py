@@ -24,10 +24,9 @@ from contour.placement.place import best_placement
 from contour.placement.pose import Turns
 from contour.synthetic import render
 from service.config.plain_recipe import PlainRecipe
-from service.measuring.measure import Measurer
 from service.parts.sure_block import EVERYWHERE, SureBlock
 from tests.support.scenes.random_scenes import random_scene
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import measured
 
 SECTION = "placement"
 CLOSE_MM = 0.1
@@ -62,7 +61,7 @@ def laid(seed: int) -> Laid | None:
     scene = random_scene(seed).scene
     rendered = render(scene)
     recipe = PlainRecipe(thickness_mm=rendered.thickness_mm)
-    seen = Measurer(calibration_for(rendered.camera)).measure(rendered.picture, recipe, rendered.thickness_mm)
+    seen = measured(rendered, recipe)
     if seen.findings or seen.millimetres is None or seen.uncertainty_mm is None:
         return None
     block = SureBlock.of(seen.millimetres, seen.uncertainty_mm, seen.evidence or ())

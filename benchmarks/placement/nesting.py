@@ -29,9 +29,8 @@ from contour.placement.pose import Pose, Turns
 from contour.placement.several import Wanted, lay_several
 from contour.synthetic import render
 from service.config.plain_recipe import PlainRecipe
-from service.measuring.measure import Measurer
 from tests.support.scenes.random_scenes import random_scene
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import measured
 
 SECTION = "nesting"
 KINDS, QUANTITY, MARGIN_MM, APART_MM, TRIES = 3, 12, 3.0, 4.0, 2
@@ -132,7 +131,7 @@ def case(seed: int) -> Case | None:
         return None
     rendered = render(scene)
     recipe = PlainRecipe(thickness_mm=rendered.thickness_mm)
-    seen = Measurer(calibration_for(rendered.camera)).measure(rendered.picture, recipe, rendered.thickness_mm)
+    seen = measured(rendered, recipe)
     block = seen.millimetres
     if seen.findings or block is None or seen.uncertainty_mm is None or not block.holes:
         return None

@@ -24,7 +24,7 @@ from service.measuring.measurement import Measurement
 from tests.support.scenes.bench_scenes import BenchScene, measured_scenes, tuned_scenes
 from tests.support.scenes.metrics import agreement
 from tests.support.scenes.random_scenes import random_scene
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import measured
 
 TITLE = "What is refused, and by what name"
 # Another block lies beside these: they are what `pieces: largest` is for.
@@ -57,7 +57,7 @@ def judged_traceable(scene: BenchScene) -> Verdict:
     recipe = Recipe(
         number=1, name="default", edge=scene.scene.edge, pieces="largest" if scene.name in _LARGEST else "one"
     )
-    seen = Measurer(calibration_for(rendered.camera)).measure(rendered.picture, recipe, rendered.thickness_mm)
+    seen = measured(rendered, recipe)
     verdict = _verdict(scene.name, scene.tuned, not seen.findings, seen)
     if seen.pixels is None:
         return verdict

@@ -156,11 +156,11 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
     if apart.pitches > limit:
         what = "takes for block what looks like table" if apart.claimed else "leaves out what looks like block"
         x, y = apart.place_px
-        return Finding(
-            Refusal.METHODS_DISAGREE,
+        return _disagreement_at(
+            (x, y),
+            shown_px,
             f"The contour {what} near ({x:.0f}, {y:.0f}) px, by {apart.pitches:.1f} cells, {limit:g} are allowed. "
             f"{advice}",
-            (around(x, y, shown_px),),
         )
     if apart.outside_pitches > _EVERYWHERE * limit:
         return Finding(
@@ -179,41 +179,46 @@ def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
         narrow = traced.narrow
         what = "stands out of its edge" if narrow.outwards else "goes into its edge"
         x, y = narrow.place_px
-        return Finding(
-            Refusal.METHODS_DISAGREE,
+        return _disagreement_at(
+            (x, y),
+            shown_px,
             f"The contour {what} by {narrow.depth_pitches:.1f} cells over {narrow.width_pitches:.1f} cells near "
             f"({x:.0f}, {y:.0f}) px: so narrow a part may be a chip, a strip or a label on the block, or cells lost. "
             "Look at the overlay; take it away, or set max_disagreement_pitches: 0 for parts that narrow.",
-            (around(x, y, shown_px),),
         )
     if traced.bare is not None:
         x, y = traced.bare.place_px
-        return Finding(
-            Refusal.METHODS_DISAGREE,
+        return _disagreement_at(
+            (x, y),
+            shown_px,
             f"Along {traced.bare.length_pitches:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, no cells lie "
             "just within it: it may run over the table, a label or along a cable there. Look at the overlay; clear the "
             "edge, check light and table, or set max_disagreement_pitches: 0 for blocks with filled cells.",
-            (around(x, y, shown_px),),
         )
     if traced.trace.opening_px is not None:
         x, y, wide = traced.trace.opening_px
-        return Finding(
-            Refusal.METHODS_DISAGREE,
+        return _disagreement_at(
+            (x, y),
+            shown_px,
             f"Walls are missing over {wide / (traced.trace.pitch_px or wide):.1f} cells around ({x:.0f}, {y:.0f}) px: "
             "cells are lost there, or it is a hole, which is traced from 2.2 cells on. Look at the overlay; take "
             "another block, or set max_disagreement_pitches: 0 for blocks from which cells are missing.",
-            (around(x, y, shown_px),),
         )
     if traced.beyond is not None:
         x, y = traced.beyond.place_px
-        return Finding(
-            Refusal.METHODS_DISAGREE,
+        return _disagreement_at(
+            (x, y),
+            shown_px,
             f"Along {traced.beyond.length_pitches:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, comb seems to "
             "go on beyond it, its walls faint, or something lies against the block there. Look at the overlay; check "
             "light and exposure, and clear the edge.",
-            (around(x, y, shown_px),),
         )
     return None
+
+
+def _disagreement_at(place_px: tuple[float, float], shown_px: float, text: str) -> Finding:
+    """What speaks against a contour at a place, pixels, that is shown so far around."""
+    return Finding(Refusal.METHODS_DISAGREE, text, (around(*place_px, shown_px),))
 
 
 def vague(traced: Trace | None) -> Finding | None:

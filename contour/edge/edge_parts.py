@@ -34,9 +34,9 @@ def longest_part(chosen: Bools, lengths: RingLengths, at: Float64s, spacing_pitc
     return EdgePart(spacing_pitches * len(run), (x, y))
 
 
-def light_beside(plane: Bytes, place: Float64s, outward: Float64s, pitches: Float64s) -> Float64s:
-    """Light so many pitches, (K,), out of places (N, 2), pixels, by vectors of one pitch outwards (N, 2): (K, N)."""
-    x, y = (place[:, axis] + pitches[:, None] * outward[:, axis] for axis in (0, 1))
+def light_beside(plane: Bytes, place: Float64s, outward: Float64s, steps: Float64s) -> Float64s:
+    """Light so many steps, (K,), out of places (N, 2), pixels, by vectors of one outwards (N, 2): (K, N)."""
+    x, y = (place[:, axis] + steps[:, None] * outward[:, axis] for axis in (0, 1))
     return sample_at(plane, x, y)
 
 

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from contour.edge.edge_parts import light_beside
 from contour.errors import EdgeContradicted
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, densified
 from contour.geometry.segments import BoxTree, distances_to_ring, distances_to_tree
 from contour.geometry.signed_distance import nearest
-from contour.image.pixel_sampling import sample_at
 from contour.material.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
 from contour.walls.cell_scale import CellScale
@@ -116,13 +116,12 @@ def lined_by_walls(border: Ring, light: Bytes, cells: CellScale) -> bool:
     at = np.arange(0.0, lengths.length, 1.0)
     place, inwards = lengths.at(at), lengths.normals(at, _NORMAL_PITCHES * cells.pitch_px)
 
-    def as_walls(depth: Float64s) -> Bools:
-        x, y = (place[:, k, None] + depth * inwards[:, k, None] for k in (0, 1))
-        share = (sample_at(light, x, y) - cells.floor) / (cells.level - cells.floor)
-        return np.asarray(share.max(axis=1) > 0.5)
+    def as_walls(side: Float64s) -> float:
+        within = np.linspace(0.5 * cells.wall_px, cells.wall_px + 1.0, _STEPS_INTO_WALL)
+        share = (light_beside(light, place, side, within) - cells.floor) / (cells.level - cells.floor)
+        return float(np.mean(share.max(axis=0) > 0.5))
 
-    within = np.linspace(0.5 * cells.wall_px, cells.wall_px + 1.0, _STEPS_INTO_WALL)
-    return bool(as_walls(-within).mean() < 0.5 or as_walls(within).mean() > _LINED)
+    return as_walls(-inwards) < 0.5 or as_walls(inwards) > _LINED
 
 
 def check_promise(promise: str, kind: Edge, *, traced: bool) -> None:

@@ -73,8 +73,9 @@ class Trace:
         others = tuple(piece.moved(x, y) for piece in self.others)
         untold = None if self.untold_px is None else (self.untold_px[0] + x, self.untold_px[1] + y)
         parted = None if self.parted is None else self.parted.moved(x, y)
-        opening = self.opening_px
-        if opening is not None:
-            opening = (opening[0] + x, opening[1] + y, opening[2])
-        moved = replace(self, contour=shifted(self.contour, first), others=others, untold_px=untold)
-        return replace(moved, opening_px=opening, parted=parted)
+        opening = None
+        if self.opening_px is not None:
+            left, top, wide = self.opening_px
+            opening = left + x, top + y, wide
+        contour = shifted(self.contour, first)
+        return replace(self, contour=contour, others=others, untold_px=untold, opening_px=opening, parted=parted)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 
@@ -77,8 +75,25 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float, small: Bytes | None
             "no block found: a pattern of cells runs out of the picture on all four sides, as a table's does. "
             "Check that a block lies in view with table around it"
         )
-    block = with_rings(filled, kept, _strands(walls & (1 - kept), samples), step, samples, leaves=bool(left))
-    return replace(block, openings=_small_openings(filled, kept, samples, step))
+    return with_rings(filled, kept, _strands(walls & (1 - kept), samples), step, samples, leaves=bool(left))
+
+
+def small_openings(block: CoarseBlock, pitch_px: float, scale: int) -> Float64s:
+    """The middles x and y of openings between a block's walls that may be holes or missing cells, and radii of discs
+    that fit there, pixels of a picture `scale` times as large as the mask, (K, 3); `pitch_px` in mask pixels.
+    """
+    away = np.asarray(cv2.distanceTransform(1 - block.walls, cv2.DIST_L2, 5), np.float64) * block.step
+    # Told from the middles of samples, the outermost lie half a one within.
+    well_within = block.depth > _WELL_WITHIN_PITCHES * pitch_px - 0.5 * block.step
+    count, pieces = pieces_of((away > _OPENING_RADIUS_PITCHES * pitch_px) & well_within, 8)
+    found = []
+    for number in range(1, count):
+        radius = np.where(pieces == number, away, 0.0)
+        row, column = np.unravel_index(radius.argmax(), radius.shape)
+        if radius[row, column] <= _HOLE_RADIUS_PITCHES * pitch_px:
+            x, y = pixels_of(np.array([column - PAD, row - PAD], np.float64), block.step * scale)
+            found.append((x, y, radius[row, column] * scale))
+    return np.array(found, np.float64).reshape(-1, 3)
 
 
 def _main_piece(pieces: Pieces, samples: float) -> Bytes:
@@ -178,23 +193,6 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], ra
             opening[number] = table < wall or lighter or table - wall < _LEAST_SHADE
     opening[outside] = True
     return (~opening).astype(np.uint8).take(labels)
-
-
-def _small_openings(filled: Bytes, walls: Bytes, samples: float, step: int) -> Float64s:
-    """The middles x and y of openings between a block's walls that may be holes or missing cells, and radii of discs
-    that fit there, mask pixels, (K, 3).
-    """
-    away = np.asarray(cv2.distanceTransform(1 - walls, cv2.DIST_L2, 5), np.float64)
-    well_within = cv2.distanceTransform(filled, cv2.DIST_L2, 5) > _WELL_WITHIN_PITCHES * samples
-    count, pieces = pieces_of((away > _OPENING_RADIUS_PITCHES * samples) & well_within, 8)
-    found = []
-    for number in range(1, count):
-        depth = np.where(pieces == number, away, 0.0)
-        row, column = np.unravel_index(depth.argmax(), depth.shape)
-        if depth.max() <= _HOLE_RADIUS_PITCHES * samples:
-            place = pixels_of(np.array([column - PAD, row - PAD], np.float64), step)
-            found.append((*place.tolist(), float(depth.max()) * step))
-    return np.array(found, np.float64).reshape(-1, 3)
 
 
 def _strands(walls: Bytes, samples: float) -> Bytes:

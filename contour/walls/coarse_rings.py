@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -38,10 +38,9 @@ class CoarseBlock:
     """Rings (exterior first) and the maps that place any point: signed distance and nearest ring vertex.
 
     filled, walls, strands: coarse grid, uint8, 1 in the block, where it has walls, and where there are others that hang
-    on nothing. openings: x and y of inner openings that may be holes or missing cells, and radii of discs that fit
-    there, (K, 3), mask pixels. depth: coarse grid, float32, mask pixels, positive inside. nearest: coarse grid, int32,
-    index into all vertices of all rings one after the other. step: mask pixels a coarse sample. leaves: whether the
-    block runs out of the picture.
+    on nothing. depth: coarse grid, float32, mask pixels, positive inside. nearest: coarse grid, int32, index into all
+    vertices of all rings one after the other. step: mask pixels a coarse sample. leaves: whether the block runs out of
+    the picture.
     """
 
     rings: tuple[CoarseRing, ...]
@@ -52,7 +51,6 @@ class CoarseBlock:
     nearest: Int32s
     step: int
     leaves: bool
-    openings: Float64s = field(default_factory=lambda: np.empty((0, 3)))
 
     def depth_at(self, points: Float64s) -> Float64s:
         """Distance inside the coarse edge, negative outside, shape (N,), mask pixels, for points (N, 2) in mask

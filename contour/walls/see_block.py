@@ -13,7 +13,7 @@ from contour.geometry.arrays import Bools, Bytes
 from contour.image.pixel_grid import averaged, coarse_step, pixels_of
 from contour.relief.relief import Relief
 from contour.walls.cell_scale import CellScale, probe
-from contour.walls.coarse_block import coarse_block
+from contour.walls.coarse_block import coarse_block, small_openings
 from contour.walls.coarse_rings import CoarseBlock, walls_at_frame
 from contour.walls.dark_material import dark_edge, midway_to_table
 from contour.walls.faint_links import with_faint_links
@@ -129,9 +129,8 @@ def see_block(
     evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway, walls.relief)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))
-    openings = np.column_stack([pixels_of(coarse.openings[:, :2], scale), coarse.openings[:, 2] * scale])
     evidence = replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose, mask=seen.mask)
-    return replace(evidence, openings=openings)
+    return replace(evidence, openings=small_openings(coarse, pitch_px, scale))
 
 
 def _scale(light: Bytes, cells: CellScale) -> int:

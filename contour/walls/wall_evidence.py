@@ -101,7 +101,8 @@ class BlockEvidence:
     others: other pieces of comb beside it, in pixels. reaches_frame: whether a wall of it lies in the picture's last
     pixels. comb: what its cells look like. clipped: share of its witnesses beside which light is at full scale. loose:
     walls of small pieces that were told from it, however near they lie, uint8, 255 there, on a grid over the picture.
-    mask: all other walls, on the same grid. openings: as a coarse block's, in pixels.
+    mask: all other walls, on the same grid. openings: x and y of inner openings that may be holes or missing cells, and
+    radii of discs that fit there, (K, 3), pixels.
     """
 
     rings: tuple[RingEvidence, ...]

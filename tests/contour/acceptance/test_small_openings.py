@@ -8,45 +8,42 @@ import numpy as np
 import pytest
 
 from contour.geometry.rings import Contour
-from contour.synthetic import render
+from contour.synthetic import Rendered, render
 from contour.synthetic.outlines import disc_ring, rectangle, with_holes
 from contour.tracing.trace import Trace
 from service.config.plain_recipe import PlainRecipe
-from service.measuring.measure import Measurement, Measurer
 from service.reasons import Reason
 from tests.support.scenes.bench_scenes import easy
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import measured
 
 PITCH_MM = 9.0
 PLACE_MM = (220.0, 200.0)
 
 
-def measured(cells_wide: float, recipe: PlainRecipe) -> tuple[Measurement, float]:
-    """A block with a hole so many cells wide, or without one, measured; and pixels a cell."""
+def with_hole(cells_wide: float) -> Rendered:
+    """A block with a hole so many cells wide, or without one."""
     block = rectangle((250.0, 190.0), 330.0, 230.0, 6.0)
     if cells_wide:
         block = with_holes(block, disc_ring(PLACE_MM, 0.5 * cells_wide * PITCH_MM))
-    rendered = render(easy("small-openings", block))
-    measurer = Measurer(calibration_for(rendered.camera))
-    return measurer.measure(rendered.picture, recipe, rendered.thickness_mm), rendered.pitch_px
+    return render(easy("small-openings", block))
 
 
 @pytest.mark.parametrize(("cells_wide", "holes"), [(0.0, 0), (4.0, 1)])
 def test_a_block_without_a_hole_or_with_one_wide_enough_is_accepted(cells_wide: float, holes: int) -> None:
-    found, _ = measured(cells_wide, PlainRecipe())
+    found = measured(with_hole(cells_wide))
     assert not found.findings
     assert found.pixels is not None
     assert len(found.pixels.holes) == holes
 
 
 def test_a_hole_of_two_cells_is_refused_with_its_place_unless_the_recipe_asks_for_no_second_opinion() -> None:
-    found, _ = measured(2.0, PlainRecipe())
+    rendered = with_hole(2.0)
+    found = measured(rendered)
     ((reason, text),) = found.findings
     assert reason == Reason.METHODS_DISAGREE
     assert text.startswith("Walls are missing over ")
     assert "max_disagreement_pitches: 0" in text
-    found, _ = measured(2.0, PlainRecipe(max_disagreement_pitches=0))
-    assert not found.findings
+    assert not measured(rendered, PlainRecipe(max_disagreement_pitches=0)).findings
 
 
 def test_its_place_moves_with_the_trace() -> None:

@@ -9,20 +9,12 @@ import pytest
 
 from contour.geometry.agreement import agreement
 from contour.material.even_table import even_table
-from contour.synthetic import Scene, Structure, Table, render, render_empty_table
-from service.config.plain_recipe import PlainRecipe
-from service.measuring.measure import Measurer
-from service.measuring.measurement import Measurement
+from contour.synthetic import Structure, Table, render, render_empty_table
 from tests.support.scenes.edge_scenes import COVERED, PLAIN, THINGS
 from tests.support.scenes.shop_floor_scenes import KINDS, LATER, shop_floor_block, shop_floor_scene
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import measured
 
 LIGHT = replace(PLAIN, table=Table(level=0.5))
-
-
-def measured(scene: Scene) -> Measurement:
-    rendered = render(scene)
-    return Measurer(calibration_for(rendered.camera)).measure(rendered.picture, PlainRecipe(), rendered.thickness_mm)
 
 
 @pytest.mark.parametrize("colour", [False, True])
@@ -54,24 +46,24 @@ def test_streaks_without_borders_make_no_even_table() -> None:
 
 def test_a_block_on_an_even_table_as_light_as_its_walls_needs_no_taught_one() -> None:
     scene = shop_floor_scene("light_table", 1_572_033, alone=True).scene
-    seen = measured(scene)
+    seen = measured(render(scene))
     assert seen.reasons == ()
     assert seen.uncertainty_px is not None
 
 
 def test_the_tables_own_shades_beside_a_block_are_no_walls_of_it() -> None:
     rendered = render(shop_floor_scene("light_table", 1_712_003, alone=True).scene)
-    seen = Measurer(calibration_for(rendered.camera)).measure(rendered.picture, PlainRecipe(), rendered.thickness_mm)
+    seen = measured(rendered)
     assert seen.pixels is not None
     assert agreement(seen.pixels, rendered.truth_px).hausdorff_px < 0.5 * rendered.pitch_px
 
 
 @pytest.mark.parametrize("name", [*COVERED, "tape on a corner", "tape along an edge", "hard shadow"])
 def test_what_lies_over_its_edge_is_refused_as_ever(name: str) -> None:
-    assert measured(replace(LIGHT, things=THINGS[name])).reasons != ()
+    assert measured(render(replace(LIGHT, things=THINGS[name]))).reasons != ()
 
 
 def test_two_blocks_against_each_other_are_told_by_how_their_cells_are_lit() -> None:
     """Floors of cells do not differ from the table."""
     rng, block = np.random.default_rng(2), shop_floor_block(1_574_002)
-    assert measured(LATER["pushed_together"](rng, KINDS["light_table"](rng, block))).reasons != ()
+    assert measured(render(LATER["pushed_together"](rng, KINDS["light_table"](rng, block)))).reasons != ()

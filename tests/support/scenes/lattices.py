@@ -163,10 +163,10 @@ def _pattern(
     index = _ranked(number)
     count = np.maximum(np.bincount(index.ravel()), 1)
     centre_x, centre_y = (
-        (np.bincount(index.ravel(), np.broadcast_to(at, index.shape).ravel()) / count).astype(np.float32)
-        for at in place
+        (np.bincount(index.ravel(), np.broadcast_to(axis, index.shape).ravel()) / count).astype(np.float32)
+        for axis in place
     )
-    return into.astype(np.float32), index, (centre_x, centre_y)
+    return into, index, (centre_x, centre_y)
 
 
 def _rows(

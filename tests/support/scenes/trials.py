@@ -17,6 +17,10 @@ from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import CameraModel, Rendered
 from contour.tracing.trace import Method, TraceSettings
 from contour.tracing.tracing import trace
+from service.config.plain_recipe import PlainRecipe
+from service.config.recipes import AnyRecipe
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
 from tests.support.scenes.bench_scenes import BenchScene
 from tests.support.scenes.metrics import Agreement, agreement
 from tests.support.scenes.rivals import RIVALS, Hints, RivalFailed
@@ -48,6 +52,12 @@ class Trial:
     def total_ms(self) -> float:
         """All stages together."""
         return sum(self.milliseconds.values())
+
+
+def measured(rendered: Rendered, recipe: AnyRecipe | None = None) -> Measurement:
+    """What the service makes of a picture, with the calibration of its camera."""
+    measurer = Measurer(calibration_for(rendered.camera))
+    return measurer.measure(rendered.picture, recipe or PlainRecipe(), rendered.thickness_mm)
 
 
 def calibration_for(camera: CameraModel) -> CameraCalibration:

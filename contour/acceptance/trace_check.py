@@ -14,10 +14,12 @@ from contour.acceptance.quality import Quality, block_quality
 from contour.edge.border_beyond import border_beyond
 from contour.edge.edge_parts import EdgePart
 from contour.edge.reflection import reflection
+from contour.edge.table_look import TableLook
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, densified
 from contour.image.opencv import grey
+from contour.image.pixel_grid import samples_of
 from contour.image.side_by_side import side_by_side
 from contour.narrow_features.feature import NarrowFeature
 from contour.narrow_features.narrow_feature import narrow_feature
@@ -72,13 +74,20 @@ def check_trace(
     if traced.pitch_px is None:
         return CheckedTrace(traced, quality)
     pitch_px = traced.pitch_px
-    flat = None if traced.look is None else traced.look.lit.astype(np.uint8)
+    flat = None if traced.look is None else _flat(traced.look, traced.contour)
     loose = None if traced.look is None or traced.look.loose is None else traced.look.loose.astype(np.uint8)
     apart, edge = side_by_side(
         lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat, loose),
         lambda: _checked_edge(picture, traced, pitch_px, relief),
     )
     return _without_image(CheckedTrace(traced, quality, apart, *edge), pitch_px)
+
+
+def _flat(look: TableLook, contour: Contour) -> Bytes:
+    """1 where something flat lies that is not the table, on the look's grid; within the contour no shadow is."""
+    block = np.zeros(look.things.shape, np.uint8)
+    cv2.fillPoly(block, [np.rint(samples_of(contour.exterior, look.step)).astype(np.int32)], 1)
+    return np.asarray(look.lit | (look.things & (block == 0)), np.uint8)
 
 
 def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:

@@ -120,7 +120,8 @@ def _borders(
         clear = shorter > _SHORT_MORE
         if clear.any():
             outer, inner = _both_sides(light, rays, lines, pitch_px)
-            chosen = chosen | _at_both_ends(rays, np.where(clear, np.sign(outer - inner), 0.0), pitch_px)
+            signed = np.where(clear, shorter * np.sign(outer - inner), 0.0)
+            chosen = chosen | _at_both_ends(rays, signed, _SHORT_MORE, pitch_px)
             over = np.maximum(over, shorter)
         found += [(float(over[k]), rays.corner[k]) for k in np.flatnonzero(chosen).tolist()]
     return [(over, (float(x), float(y))) for over, (x, y) in found]
@@ -148,8 +149,8 @@ def _of_things(
     shadow = (inner < outer) & (np.abs(inner - usual) > np.abs(outer - usual))
     same = np.where(over > _CLEAR_BORDER, _SAME_IF_CLEAR, _SAME)
     alone = (np.abs(outer - own) < same * np.abs(outer - inner)) & ~shadow
-    sign = np.where(over > 1.0, np.sign(outer - inner), 0.0)
-    twice = _at_both_ends(rays, np.where(over > _MORE, sign, 0.0), pitch_px) | _around_notch(rays, sign)
+    signed = np.where(over > 1.0, over * np.sign(outer - inner), 0.0)
+    twice = _at_both_ends(rays, signed, _MORE, pitch_px) | _around_notch(rays, signed)
     return np.asarray(((over > 1.0) & alone) | twice)
 
 
@@ -161,22 +162,24 @@ def _both_sides(
     return outer, inner
 
 
-def _at_both_ends(rays: _Rays, sign: Float64s, pitch_px: float) -> Bools:
-    """Which rays have a border of the same sign, (R,), at the other end of their edge, on one line with it."""
-    one = np.arange(len(sign) // 2)
+def _at_both_ends(rays: _Rays, over: Float64s, least: float, pitch_px: float) -> Bools:
+    """Which rays have a border of the same sign at the other end of their edge, on one line with it, if both together
+    stand out so far on (geometric) average. over: how far each does, with its sign, (R,).
+    """
+    one = np.arange(len(over) // 2)
     other = len(one) + np.roll(one, 1)  # from the corner before, backwards
     straight = -(rays.along[one] * rays.along[other]).sum(axis=1) > _STRAIGHT
     aside = np.abs(((rays.origin[one] - rays.origin[other]) * rays.across[other]).sum(axis=1))
-    both = straight & (aside < _ASIDE * pitch_px) & (sign[one] * sign[other] > 0.0)
+    both = straight & (aside < _ASIDE * pitch_px) & (over[one] * over[other] > least**2)
     return np.concatenate([both, np.roll(both, -1)])
 
 
-def _around_notch(rays: _Rays, sign: Float64s) -> Bools:
-    """Which rays have a border of the same sign, (R,), at the other end of a notch with one corner inside."""
-    last = np.arange(len(sign) // 2)
+def _around_notch(rays: _Rays, over: Float64s) -> Bools:
+    """Which rays have a border of the same sign at the other end of a notch with one corner inside; over: as above."""
+    last = np.arange(len(over) // 2)
     first = len(last) + np.roll(last, 2)  # from the corner before the one inside, backwards
     notch = np.roll(rays.inner[last], 1) & ~rays.inner[last] & ~rays.inner[first]
-    both = notch & (sign[last] * sign[first] > 0.0)
+    both = notch & (over[last] * over[first] > 0.0)
     return np.concatenate([both, np.roll(both, -2)])
 
 

@@ -20,7 +20,6 @@ from contour.geometry.signed_distance import depth_inside, nearest
 from contour.outline.fit import FittedRing, fit_ring
 from contour.walls.wall_evidence import BlockEvidence, EdgePoints, RingEvidence, WitnessKind
 
-SPACING_PITCHES = 0.25
 # Ends of walls beside a thing are the edge's own where they lie on the line of those that are seen well.
 _AGREE_PITCHES = 0.22
 _FEWEST, _FEW = 8, 3

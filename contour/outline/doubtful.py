@@ -24,6 +24,8 @@ _AS_WELL, _FAR, _OF_A_LINE = 8.0, 0.4, 2
 # Motion moves ends of neighbouring walls alike: of 215 right outlines the least is 17 nats for a line for an arc
 # whose ends it misses by so much; of two that were off by 0.8 and 1.2 cells it was 15 and 9.
 _HARDLY_BENT = 16.0
+# Where an arc meets a line in a corner, its outermost ends may be that line's if they lie so near to it, pitches.
+_AT_JOINT = 0.2
 # Where two arcs meet so far from what was seen of either, pitches, and so deep in the material, one arc through so many
 # witnesses of both may run there; and where nothing was seen for longer, a corner so far aside is a guess. Of 150 right
 # outlines none has either.
@@ -115,20 +117,36 @@ def _bent_lines(
     witnesses: Witnesses, segments: Segments, arcs: Indices, found: Joints, residual: Float64s
 ) -> list[np.complex128]:
     """Middles of those arcs whose witnesses a line explains as well, which meets what is beside them elsewhere."""
-    begin = rolled(found.begin, 1)
     places = []
     for k in arcs.tolist() if len(segments) > 1 else ():
-        index = segments.members(k, len(witnesses))
-        points, off, ends = witnesses.points[index], residual[index], np.array([begin[k], found.end[k]])
-        most = cost(witnesses, off, index).sum() + PRICE_ARC + _HARDLY_BENT
-        for weight in (_weights(witnesses, index, _lying(witnesses, index, off)), np.ones(len(index))):
-            line = _lines(points, weight).take([-1])
-            nats = cost(witnesses, distance(line.take((slice(None), None)), points), index).sum() + PRICE_LINE
-            apart = np.abs(((ends - line.origin) * line.tangent.conjugate()).imag).max()
-            if nats < most and apart > _APART * witnesses.pitch_px:
+        index, (ends, tangent) = segments.members(k, len(witnesses)), _at_ends(segments, found, k)
+        beside = np.array([k - 1, (k + 1) % len(segments)])
+        off = np.abs(distance(segments.models.take(beside[:, None]), witnesses.points[index]))
+        turn = np.abs(np.angle(segments.models.tangent[beside] * tangent.conjugate()))
+        corner = (turn > LEAST_TURN) & ~segments.bend[beside]
+        theirs = (off < _AT_JOINT * witnesses.pitch_px) & corner[:, None]
+        first, last = (int(np.argmin(np.append(one, False))) for one in (theirs[0], theirs[1, ::-1]))
+        for start, stop in {(a, len(index) - b) for a in (0, first) for b in (0, last)}:
+            own = index[start:stop]
+            if len(own) > _OF_A_LINE and _may_be_a_line(witnesses, own, residual[own], ends):
                 places.append(ends.mean())
                 break
     return places
+
+
+def _may_be_a_line(witnesses: Witnesses, index: Indices, residual: Float64s, ends: Complexes) -> bool:
+    """Whether a line explains the witnesses at `index` nearly as well as an arc that they have these distances from,
+    and misses that arc's ends.
+    """
+    points = witnesses.points[index]
+    most = cost(witnesses, residual, index).sum() + PRICE_ARC + _HARDLY_BENT
+    for weight in (_weights(witnesses, index, _lying(witnesses, index, residual)), np.ones(len(index))):
+        line = _lines(points, weight).take([-1])
+        nats = cost(witnesses, distance(line.take((slice(None), None)), points), index).sum() + PRICE_LINE
+        apart = np.abs(((ends - line.origin) * line.tangent.conjugate()).imag).max()
+        if nats < most and apart > _APART * witnesses.pitch_px:
+            return True
+    return False
 
 
 def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inlier: Bools) -> list[np.complex128]:

@@ -18,7 +18,7 @@ from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.tracing import trace
 from tests.support.pictures.small_scenes import block
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import calibration_for, measured
 
 
 class Magnifier:
@@ -162,3 +162,8 @@ def test_a_sheet_whose_border_runs_on_is_told_beside_closed_cells_too_and_where_
     for edge, evidence in (("cells", None), ("cut", ())):
         traced = Trace("wall-tips", "bright", 16.0, outline, light, evidence=evidence, edge=edge)
         assert check_trace(picture, traced, None).runs_on is not None
+
+
+def test_dark_grooves_of_a_table_that_lead_to_the_block_are_not_left_out_of_it() -> None:
+    """Slots whose sides are as busy as comb, two cells apart, and which no edge ends along."""
+    assert measured(render(shop_floor_scene("slots", 1_830_036, alone=True).scene)).reasons == ()

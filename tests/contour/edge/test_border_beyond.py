@@ -116,11 +116,15 @@ def test_what_is_no_edge_going_on_is_not_told(thing: tuple[Float64s, float]) -> 
     assert border_beyond([light], contour, PITCH_PX) is None
 
 
-def test_a_border_beyond_both_ends_of_an_edge_is_told_where_light_falls_off_along_it() -> None:
-    """A sheet over all of one side, dimmer towards the right; over one corner alone it may be the table's own light."""
+@pytest.mark.parametrize("levels", [3.0, 6.0])
+def test_a_border_beyond_both_ends_of_an_edge_is_told_where_light_falls_off_along_it(levels: float) -> None:
+    """A sheet over all of one side, dimmer towards the right; over one corner alone it may be the table's own light.
+
+    A faint one hardly stands out of the noise at its dim end, and twice as far at the other.
+    """
     falls = np.linspace(1.0, 0.4, 640) + 0.0 * np.arange(480)[:, None]
     for thing, told in ((ALONG_TOP, True), (BESIDE_TOP_RIGHT, False)):
-        light, contour = block_on_table((thing, 6.0), degrees=0.0)
+        light, contour = block_on_table((thing, levels), degrees=0.0)
         dimmed = [np.rint(np.where(light > 100, light, falls * light)).astype(np.uint8)]
         assert (border_beyond(dimmed, contour, PITCH_PX) is not None) == told
 

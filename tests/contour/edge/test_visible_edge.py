@@ -205,6 +205,20 @@ def test_where_nearly_all_ends_lie_at_something_foreign_there_is_no_block_to_be_
         fitted(evidence, look(BLOCK, everywhere))
 
 
+@pytest.mark.parametrize("place", [350.0, 600.0])
+def test_a_thing_that_ends_at_the_edge_hides_none_of_it(place: float) -> None:
+    """A groove of the table, amidst an edge or at its corner: its sides count as walls, and comb lies along it."""
+    beside = patch(BLOCK, place, 0.0, 4.0)
+    evidence = ending_at(witnesses(BLOCK, seed=1), BLOCK, place, -0.6, 4.0)
+    there = look(BLOCK, beside)
+    one = fitted(evidence, there)
+    assert len(one.distrusted) >= 3
+    assert errors(one.fitted.ring, BLOCK).max() < 0.1 * PITCH
+    assert told(one, there) == []
+    over = look(BLOCK, patch(BLOCK, place, 1.0, 4.0))
+    assert told(fitted(evidence, over), over) != []
+
+
 def test_over_an_arc_a_bridge_is_told_as_one() -> None:
     ring = circle(350.0)
     evidence = ending_at(witnesses(ring, seed=7), ring, 600.0, 1.5, 4.0)

@@ -36,6 +36,11 @@ def test_an_arc_whose_ends_a_line_explains_nearly_as_well_and_leads_elsewhere_is
     assert_told(shop_floor_scene("motion", 1_420_045), (480.0, 490.0), within=2.0)
 
 
+def test_so_is_one_whose_outermost_ends_may_be_those_of_the_lines_beside_it() -> None:
+    """Over a side of a square hole of six cells, 0.9 of a cell off at its corner."""
+    assert_told(shop_floor_scene("swarf", 1_830_011, alone=True), (1077.0, 727.0), within=2.0)
+
+
 def test_a_corner_of_two_arcs_out_of_sight_is_told() -> None:
     """A notch at the end of a dark splice, 0.6 of a cell deep, and a step under glare, 0.7 off."""
     assert_told(shop_floor_scene("splice", 1_480_021, alone=True), (773.0, 205.0), within=2.0)

@@ -4,6 +4,7 @@ ContourError
 ├── PictureError        the array is no usable picture (shape, dtype, empty)
 ├── ParameterError      a method's or renderer's parameter is out of its range
 ├── NoBlockFound        the picture was usable, but no block could be traced in it
+│   └── NoCellsFound    no part of it has cells of one size
 ├── EdgeContradicted    the block's border is not of the kind that was promised
 ├── BoardNotSeen        the picture shows no calibration board that could be used
 ├── GaugeNotSeen        the picture shows no gauge, or not all of it
@@ -33,6 +34,10 @@ class NoBlockFound(ContourError):
     """
 
     edge: Literal["cut"] | None = None
+
+
+class NoCellsFound(NoBlockFound):
+    """No part of the picture has cells of one size, however it is looked at."""
 
 
 class EdgeContradicted(ContourError):

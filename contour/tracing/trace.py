@@ -22,7 +22,10 @@ OnStage = Callable[[str], None]
 
 @dataclass(frozen=True)
 class TraceSettings:
-    """What to trace with. Sizes left at None follow from the picture's own cell pitch."""
+    """What to trace with. Sizes left at None follow from the picture's own cell pitch.
+
+    `least_rise`: walls no fainter than that share of what walls of the wider region rise by; None takes fainter ones.
+    """
 
     method: Method = "wall-tips"
     polarity: Literal["auto", "bright", "dark"] = "auto"
@@ -33,6 +36,7 @@ class TraceSettings:
     threshold: float | None = None
     max_gap_px: int | None = None
     min_width_px: int | None = None
+    least_rise: float | None = None
 
 
 @dataclass(frozen=True)

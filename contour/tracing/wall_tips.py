@@ -49,7 +49,7 @@ from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import Piece, pieces_beside, with_earlier
-from contour.walls.see_block import SeenWalls, see_block, see_walls
+from contour.walls.see_block import SeenWalls, see_block, see_walls, strong_walls
 from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import wall_mask
 
@@ -95,6 +95,8 @@ def wall_tips(
     if settings.edge == "cells":
         return solid.closed()
     walls = replace(see_walls(picture, light, polarity, solid.cells), relief=relief)
+    if settings.least_rise is not None:
+        walls = strong_walls(walls, settings.least_rise)
     foam = None if walls.cells.comb.cellular else solid.foam()
     return foam or _of_comb(solid, walls, settings.edge, rectifier)
 
@@ -151,6 +153,8 @@ def _cut_or_mirrored(
     if walls.relief is not None:
         found = _cut(picture, light, looked, rectifier, on_stage, walls.relief)
         return _no_surer_than_anywhere(found, _ON_EVEN_TABLE if walls.relief.even else 1.0)
+    if walls.strong:
+        return _cut(picture, light, looked, rectifier, on_stage)
     try:
         found = _cut(picture, light, looked, rectifier, on_stage)
     except NoBlockFound:

@@ -9,7 +9,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from contour.errors import NoBlockFound
+from contour.errors import NoCellsFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.opencv import inverted, pieces_and_areas, pieces_and_middles
 from contour.image.side_by_side import side_by_side
@@ -110,7 +110,7 @@ def probe(light: Bytes, polarity: str) -> CellScale:
         best = max([one for one in (best, *finest) if one is not None], key=lambda one: one.score, default=None)
     if best is None or not _is_comb(best):
         seen = " and ".join(_shown(light, bright=bright) for bright in senses)
-        raise NoBlockFound(
+        raise NoCellsFound(
             f"no block found: the most textured part of the picture shows {seen}, "
             "expected a dozen or more of one size. Check that a block lies in view, the light, and the polarity"
         )

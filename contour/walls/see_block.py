@@ -39,7 +39,8 @@ _STRANDS_PITCHES = 5.0
 @dataclass(frozen=True, eq=False)
 class SeenWalls:
     """Walls of a picture, whatever hides them: the light they were seen in, (H, W), and the same `scale` times smaller,
-    their cells, and their mask in the smaller one. `relief`: how they stand out of a table that is known.
+    their cells, and their mask in the smaller one. `relief`: how they stand out of a table that is known; `strong`:
+    without fainter ones.
     """
 
     light: Bytes
@@ -48,6 +49,7 @@ class SeenWalls:
     cells: CellScale
     mask: WallMask
     relief: Relief | None = None
+    strong: bool = False
 
 
 def see_walls(picture: Bytes, light: Bytes, polarity: str, cells: CellScale | None = None) -> SeenWalls:
@@ -87,7 +89,7 @@ def strong_walls(walls: SeenWalls, least: float) -> SeenWalls:
         wall=cells.wall_px / scale,
         least=least,
     )
-    return replace(walls, mask=replace(seen, faint=lambda: seen.mask))
+    return replace(walls, mask=replace(seen, faint=lambda: seen.mask), strong=True)
 
 
 def see_block(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ from contour.acceptance.sent_evidence import ToMillimetres, sent_evidence
 from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
 from contour.edge.known_table import over_known_table
-from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, ParameterError
+from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, NoCellsFound, ParameterError
 from contour.geometry.arrays import Float64s
 from contour.geometry.rectifier import CroppedRectifier, Rectifier
 from contour.geometry.rings import Contour, Ring, densified
@@ -47,6 +47,9 @@ if TYPE_CHECKING:
 log = logging.getLogger("combtrace.measure")
 
 _ROI_STEPS = 12
+# Of the height of walls in the wider region: a table's grain and grooves rise less than most walls do.
+_STRONG_WALLS = 0.6
+_LIES_THERE = {Reason.SEVERAL_BLOCKS, Reason.EDGE_COVERED}
 
 
 class _Stopwatch:
@@ -176,34 +179,49 @@ class Measurer:
             relief = _relief(picture, look, recipe, displacement)
             return outlined(look.picture if relief is None else relief.apart, relief)
 
-        def on_even_table() -> Measurement | None:
-            """What nothing speaks against, where the table need not be taught to be known; else None."""
-            displacement = self._displacement(recipe, thickness_mm, (height, width))
-            look = None if displacement is None else even_table(picture)
-            relief = None if look is None else _relief(picture, look, recipe, displacement)
-            watch.lap("table")
-            if relief is None:
-                return None
-            with contextlib.suppress(NoBlockFound, EdgeContradicted):
-                found = outlined(relief.apart, replace(relief, even=True))
-                if not found.findings:
-                    return found
+        def looked_again(*, at_strong_walls: bool) -> Measurement | None:
+            """What nothing speaks against at another look; None without any."""
+            for look in self._other_looks(picture, recipe, thickness_mm, at_strong_walls=at_strong_walls):
+                watch.lap("table")
+                with contextlib.suppress(NoBlockFound, EdgeContradicted):
+                    again = outlined(*look)
+                    if not again.findings:
+                        return again
             watch.lap("table")
             return None
 
         try:
             found = outlined(picture, None)
-        except NoBlockFound:
-            again = on_even_table()
+        except NoBlockFound as error:
+            # Cells that nothing shows are nowhere.
+            again = looked_again(at_strong_walls=not isinstance(error, NoCellsFound))
             if again is None:
                 raise
             return again
-        return (on_even_table() if found.findings else None) or found
+        if not found.findings:
+            return found
+        # What was seen to lie there is there.
+        return looked_again(at_strong_walls=not _LIES_THERE & {*found.reasons}) or found
+
+    def _other_looks(
+        self, picture: NDArray[np.uint8], recipe: AnyRecipe, thickness_mm: float, *, at_strong_walls: bool
+    ) -> Iterator[tuple[NDArray[np.uint8], Relief | None, float | None]]:
+        """What else to look at where a picture is refused: what differs from a table that need not be taught to be
+        known, and the walls that rise high.
+        """
+        displacement = self._displacement(recipe, thickness_mm, picture.shape[:2])
+        look = None if displacement is None else even_table(picture)
+        relief = None if look is None else _relief(picture, look, recipe, displacement)
+        if relief is not None:
+            yield relief.apart, replace(relief, even=True), None
+        if at_strong_walls and recipe.method == "wall-tips":
+            yield picture, None, _STRONG_WALLS
 
     def _outlined(
         self,
         picture: NDArray[np.uint8],
         relief: Relief | None,
+        least_rise: float | None = None,
         *,
         recipe: AnyRecipe,
         thickness_mm: float,
@@ -215,7 +233,8 @@ class Measurer:
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
-        checked = _checked_trace(picture, recipe, region, rectifier, watch, relief)
+        settings = replace(trace_settings(recipe), least_rise=least_rise)
+        checked = _checked_trace(picture, settings, region, rectifier, watch, relief)
         traced = checked.trace
         result = replace(
             result,
@@ -354,7 +373,7 @@ def _relief(
 
 def _checked_trace(
     picture: NDArray[np.uint8],
-    recipe: AnyRecipe,
+    settings: TraceSettings,
     region: Region | None,
     rectifier: Rectifier | None,
     watch: _Stopwatch,
@@ -362,14 +381,14 @@ def _checked_trace(
 ) -> CheckedTrace:
     """The block traced in the region alone, and checked there, in pixels of the whole picture."""
     if region is None:
-        traced = trace(picture, trace_settings(recipe), rectifier=rectifier, relief=relief, on_stage=watch.lap)
+        traced = trace(picture, settings, rectifier=rectifier, relief=relief, on_stage=watch.lap)
         checked = check_trace(picture, traced, rectifier, relief)
         watch.lap("quality")
         return checked
     part, first = region.cut(picture)
     within = None if rectifier is None else CroppedRectifier(rectifier, first)
     there = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
-    return _checked_trace(part, recipe, None, within, watch, there).moved(first)
+    return _checked_trace(part, settings, None, within, watch, there).moved(first)
 
 
 def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:

@@ -14,11 +14,15 @@ from contour.errors import ParameterError, PictureError
 from contour.geometry.rings import area, hausdorff, perimeter
 from contour.synthetic import render
 from contour.tracing import tracing
+from contour.tracing.trace import Trace, TraceSettings
 from service.config.recipes import Recipe
+from service.measuring import measure
 from service.measuring.calibration_file import load_record
 from service.measuring.measure import Measurer, trace_settings
 from service.reasons import Reason
 from tests.support.scenes.sample_scenes import THICKNESS_MM, sample_scenes
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+from tests.support.scenes.trials import measured
 
 SAMPLES = Path(__file__).parents[3] / "service" / "samples"
 RECIPE = Recipe(number=1, name="default")
@@ -256,3 +260,40 @@ def test_the_summary_for_the_journal_is_plain_json(rendered, measurer: Measurer)
     summary = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM).summary()
     assert json.loads(json.dumps(summary)) == summary
     assert summary["vertices"] > 3
+
+
+def test_on_a_tables_grain_a_block_is_found_by_its_strong_walls() -> None:
+    """By walls of usual height grain leads away from it."""
+    seen = measured(render(shop_floor_scene("wood", 1_880_020).scene))
+    assert seen.findings == ()
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason", "looks"),
+    [("tape", Reason.EDGE_COVERED, [None]), ("wood", Reason.NO_BLOCK_FOUND, [None, 0.6])],
+)
+def test_what_lies_over_an_edge_is_not_looked_past(
+    kind: str, reason: Reason, looks: list[float | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[float | None] = []
+
+    def traced(picture: np.ndarray, settings: TraceSettings, **known: object) -> Trace:
+        asked.append(settings.least_rise)
+        return tracing.trace(picture, settings, **known)
+
+    monkeypatch.setattr(measure, "trace", traced)
+    seen = measured(render(shop_floor_scene(kind, 1_880_001, alone=True).scene))
+    assert seen.reasons[0] == reason
+    assert asked == looks
+
+
+def test_a_table_without_any_cells_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[TraceSettings] = []
+    monkeypatch.setattr(
+        measure,
+        "trace",
+        lambda picture, settings, **known: asked.append(settings) or tracing.trace(picture, settings, **known),
+    )
+    seen = Measurer(None).measure(np.full((300, 400), 80, np.uint8), RECIPE, THICKNESS_MM)
+    assert seen.reasons == (Reason.NO_BLOCK_FOUND,)
+    assert len(asked) == 1

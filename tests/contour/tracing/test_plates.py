@@ -6,10 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
+from contour.errors import NoBlockFound
 from contour.geometry.agreement import agreement
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour
 from contour.tracing import wall_tips
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
 from service.reasons import Reason
@@ -62,8 +65,12 @@ def test_holes_of_which_few_were_counted_are_asked_whatever_these_look_like() ->
 
 @pytest.mark.parametrize("seed", [1224003, 1240010], ids=["material left out", "beside its edge"])
 def test_an_outline_that_leaves_the_edge_of_a_cut_sheet_is_refused(seed: int) -> None:
-    found = Measurer(None).measure(lattice(seed, "round", "cut").picture, PlainRecipe(), 0.0)
-    assert Reason.NO_BLOCK_FOUND in found.reasons
+    with pytest.raises(NoBlockFound):
+        trace(lattice(seed, "round", "cut").picture, TraceSettings())
+
+
+def test_a_cut_sheet_of_which_faint_ends_lead_astray_is_found_by_its_strong_webs() -> None:
+    assert_traced(lattice(1240010, "round", "cut"), "cut", within=0.15)
 
 
 def test_a_board_whose_squares_are_as_dark_as_the_table_is_none() -> None:
@@ -130,10 +137,8 @@ def test_a_dents_rounded_corner_is_no_hole_that_was_opened(seed: int) -> None:
 
 def test_a_cut_out_of_a_sheet_is_held_against_its_material() -> None:
     """Drawn through ends of webs farther out, 0.6 of a pitch."""
-    assert (
-        Reason.NO_BLOCK_FOUND
-        in Measurer(None).measure(lattice(1440042, "round", "cut").picture, PlainRecipe(), 0.0).reasons
-    )
+    with pytest.raises(NoBlockFound):
+        trace(lattice(1440042, "round", "cut").picture, TraceSettings())
 
 
 @pytest.mark.parametrize("seed", [1051003, 1051005, 1051006])

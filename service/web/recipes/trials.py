@@ -142,7 +142,8 @@ class Trials:
             worker = Worker(Trial(self._archive, run.asked.changed).tried, gives_way=True)
             with self._lock:
                 run.worker = worker
-            for job_id in run.asked.jobs:
+                jobs = run.asked.jobs if run.ended is None else ()  # ended while its process began
+            for job_id in jobs:
                 found = worker.answer(job_id)
                 with self._lock:
                     run.add(found)

@@ -19,7 +19,7 @@ from contour.geometry.arrays import Bools, Bytes, Float64s, Indices
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring, oriented
 from contour.geometry.signed_distance import depth_inside
-from contour.image.pixel_grid import pixels_of, samples_of
+from contour.image.pixel_grid import fill, pixels_of, samples_of
 from contour.image.pixel_sampling import planes_of, sample_at
 from contour.walls.coarse_block import CLOSING_PITCHES
 from contour.walls.wall_evidence import EdgePoints, RingEvidence
@@ -185,7 +185,7 @@ def _with_things(clear: RingEvidence, distrusted: Float64s, look: TableLook) -> 
         touching[near] = True
     touching[0] = False
     union = touching[parts].astype(np.uint8)
-    cv2.fillPoly(union, [np.rint(samples_of(clear.coarse, look.step)).astype(np.int32)], 1)
+    fill(union, clear.coarse, look.step)
     # An open cell beside filled ones is bridged.
     size = 2 * round(CLOSING_PITCHES * look.pitch_px / look.step) + 1
     union = np.asarray(

@@ -62,11 +62,13 @@ def ring_evidence(
         if len(run) > _SHORTEST_PITCHES / _SPACING_PITCHES
         or np.count_nonzero(nearest(visible.distrusted, places.points[run]) < _AT_THING_PITCHES * pitch_px) >= _FEW
     ]
-    # Fitted rings have the material on their left, which is where these point from.
-    out = np.sign(signed_area(ring) * signed_area(visible.fitted.ring))
-    inward = -out * RingLengths.of(ring).normals(places.at, pitch_px)
-    told = [_hidden_run(run, places.points, inward, visible.on_line, look) for run in runs]
-    hides = [one for one in told if one.state != "seen"]
+    hides: list[_HiddenRun] = []
+    if runs:
+        # Fitted rings have the material on their left, which is where these point from.
+        out = np.sign(signed_area(ring) * signed_area(visible.fitted.ring))
+        inward = -out * RingLengths.of(ring).normals(places.at, pitch_px)
+        told = [_hidden_run(run, places.points, inward, visible.on_line, look) for run in runs]
+        hides = [one for one in told if one.state != "seen"]
     for index, one in enumerate(hides):
         label[one.places] = index + 1
     starts = distinct(np.concatenate([[0], np.flatnonzero(label != np.roll(label, 1))]))

@@ -19,7 +19,7 @@ from contour.edge.table_light import table_light
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
 from contour.image import channels
 from contour.image.opencv import deep, pieces_and_boxes, pieces_of, within
-from contour.image.pixel_grid import samples_of, whole_averaged
+from contour.image.pixel_grid import fill, samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
 
@@ -141,7 +141,7 @@ class TableLook:
         as light along its rim as amidst it. A block shades the table along a hole's rim, also where a lamp lights it.
         """
         drawn = np.zeros(self.foreign.shape[:2], np.uint8)
-        cv2.fillPoly(drawn, [np.rint(samples_of(hole.coarse, self.step)).astype(np.int32)], 1)
+        fill(drawn, hole.coarse, self.step)
         inside = cv2.erode(drawn, np.ones((3, 3), np.uint8)) > 0
         filled = self.foreign & self.lighter & inside
         if np.count_nonzero(filled) <= _MOST * np.count_nonzero(inside):
@@ -246,7 +246,7 @@ def _drawn(rings: Sequence[RingEvidence], shape: tuple[int, ...], step: int) -> 
     """1 inside of coarse rings, exterior first, and not in their holes, (h, w)."""
     block = np.zeros(shape[:2], np.uint8)
     for ring in rings:
-        cv2.fillPoly(block, [np.rint(samples_of(ring.coarse, step)).astype(np.int32)], 0 if ring.is_hole else 1)
+        fill(block, ring.coarse, step, 0 if ring.is_hole else 1)
     return block
 
 

@@ -35,6 +35,11 @@ def samples_of(pixels: Float64s, step: int) -> Float64s:
     return np.asarray((pixels + 0.5) / step - 0.5, np.float64)
 
 
+def fill(mask: Bytes, ring: Float64s, step: int, value: int = 1) -> None:
+    """Set a mask's samples, (h, w), within a ring, (N, 2), pixels, its border's own among them."""
+    cv2.fillPoly(mask, [np.rint(samples_of(ring, step)).astype(np.int32)], value)
+
+
 def averaged(picture: Bytes, step: int, border: int = cv2.BORDER_CONSTANT) -> Bytes:
     """Mean over the pixels of each sample, (H, W); the last ones are filled up by a border of OpenCV's, constant 0."""
     if step == 1:

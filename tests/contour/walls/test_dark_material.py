@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import numpy as np
 import pytest
 
@@ -31,8 +29,11 @@ def test_a_corner_where_walls_fade_into_dark_cells_is_seen_against_the_table() -
     """Over ten pitches beside a corner no wall of this block is told from its cells. By the last bits, in which
     processors differ, cells of 8 px are too small to tell a cut border from a closed one there: that is asked for.
     """
-    with suppress(EdgeContradicted):
-        assert hausdorff_pitches(960208) < 0.25
+    try:
+        off: float | str = hausdorff_pitches(960208)
+    except EdgeContradicted as refused:
+        off = refused.edge
+    assert off == "cut" or (isinstance(off, float) and off < 0.25)
 
 
 def test_a_curve_where_wall_ends_fade_is_followed_to_the_table_beside_visible_parallax() -> None:

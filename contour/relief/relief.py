@@ -9,6 +9,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes, Float32s, Float64s
 from contour.image.pixel_sampling import FULL_SCALE, planes_of, sample_at
+from contour.relief.shadow import in_shadow
 
 # The table's shade is the median of its light now over what it was, over so many pitches: cells show more of the
 # table than walls cover. The median of so many samples is enough, in steps of a 64th that a blur takes out again.
@@ -97,7 +98,10 @@ def relief_of(picture: Bytes, table: Bytes, pitch_px: float, displacement: Displ
     size = np.maximum.reduce([np.abs(plane) for plane in signed])
     root = np.minimum(_ROOT * np.sqrt(size), 255.0).astype(np.uint8)
     closed = cv2.morphologyEx(root, cv2.MORPH_CLOSE, np.ones((_GAP_PX, _GAP_PX), np.uint8))
-    ratio = np.float32(_ALIKE) * (picture + np.float32(_DARK)) / (table + np.float32(_DARK))
+    # A shadow lies over nothing.
+    unshaded = np.where(in_shadow(light, known, shade, pitch_px), shade, np.float32(1.0))
+    then = table * (unshaded if table.ndim == 2 else unshaded[:, :, None])
+    ratio = np.float32(_ALIKE) * (picture + np.float32(_DARK)) / (then + np.float32(_DARK))
     lit = np.minimum(ratio, 255.0).astype(np.uint8)
     return Relief(np.asarray(closed, np.uint8), signed, lit, displacement, wall_px)
 

@@ -116,3 +116,17 @@ def test_nor_is_what_the_table_does_not_follow() -> None:
 def test_nor_is_a_border_that_nothing_shows() -> None:
     area = thing(*GAP)
     assert not len(found(area, picture(area, TABLE + 3), look(BLOCK, area)).points)
+
+
+@pytest.mark.parametrize(("share", "cut"), [(0.25, True), (0.4, False)])
+def test_an_outline_through_what_lies_along_a_third_of_the_edge_tells_nothing(share: float, cut: bool) -> None:
+    """It goes on smoothly around a hand, too."""
+    round_block = circle(15.0 * PITCH)
+    gap = (100.0, 100.0 + share * 30.0 * np.pi * PITCH)
+    points, normal = along(round_block, np.linspace(*gap, 60))
+    area = np.vstack([points, (points - 3.0 * PITCH * normal)[::-1]])
+    clear = replace(witnesses(round_block, seed=1, gaps=(gap,)), coarse=densified(round_block, 5.0))
+    hidden = np.hypot(*(round_block[:, None] - points[1:-1]).transpose(2, 0, 1)).min(axis=1) < 2.0 * PITCH
+    args = picture(area), clear, round_block[~hidden], area[[0, 59]], look(round_block, area)
+    assert not cut_borders(*args)
+    assert bool(cut_borders(*args, lambda _: round_block)) == cut

@@ -10,6 +10,7 @@ from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.findings import Finding, Limits, Refusal, closed, runs_where
 from contour.acceptance.quality import Quality
 from contour.acceptance.trace_check import CheckedTrace
+from contour.edge.stretches import Stretch
 from contour.geometry.rings import Contour
 from contour.image.region import Region
 from contour.narrow_features.feature import NarrowFeature
@@ -207,6 +208,22 @@ def test_a_corner_that_may_as_well_be_round_is_refused_with_its_place() -> None:
     assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
     assert "(120, 90) px" in finding.text
     assert len(finding.shown_px) == 1
+
+
+@pytest.mark.parametrize(("unsure_px", "bound_px", "refused"), [(25, 15.0, True), (15, 15.0, False), (60, 11.0, False)])
+def test_a_ring_of_which_a_fifth_is_no_surer_than_half_a_cell_is_refused(
+    unsure_px: float, bound_px: float, refused: bool
+) -> None:
+    """However sure the outline is as a whole."""
+    hole = Contour(GOOD.pixels.exterior, (SQUARE[::-1] * 2.5 + 130,))
+    evidence = (
+        Stretch(0, 0.0, 400.0, "seen", None, 1.0),
+        Stretch(1, 0.0, 100.0 - unsure_px, "seen", None, 1.0),
+        Stretch(1, 100.0 - unsure_px, 100.0, "seen", None, bound_px),
+    )
+    findings = judge(GOOD, FRAME, LIMITS, traced=traced(contour=hole, uncertainty_px=1.0, evidence=evidence))
+    assert [finding.refusal for finding in findings] == [Refusal.UNCERTAINTY_TOO_LARGE] * refused
+    assert all(f"Of the edge of hole 1 {unsure_px} %" in finding.text for finding in findings)
 
 
 def test_the_ring_that_the_polygon_was_made_of_must_keep_off_the_frame_too() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,9 +30,18 @@ _BLUR_PX = 1.2
 _ANY_PITCH_PX = 20.0
 
 
-def over_known_table(picture: Bytes, look: TableLook, polarity: str, displacement: Displacement) -> Relief | None:
-    """How the picture, grey (H, W) or BGR (H, W, 3), uint8, stands out of the table; None where walls stand out of it
-    no less than out of their cells. Raises NoBlockFound.
+@dataclass(frozen=True, eq=False)
+class OverTable:
+    """A block on a known table. `alike`: whether walls stand out of the table less than out of their cells."""
+
+    alike: bool
+    relief: Callable[[], Relief]
+    """How the picture stands out of the table."""
+
+
+def over_known_table(picture: Bytes, look: TableLook, polarity: str, displacement: Displacement) -> OverTable | None:
+    """What a picture, grey (H, W) or BGR (H, W, 3), uint8, shows of a block on the table; None where that is far darker
+    than the block. Raises NoBlockFound.
     """
     hop = max(1, round(np.sqrt(picture.shape[0] * picture.shape[1] / _SAMPLES)))
     light, taught = (grey(np.ascontiguousarray(one[::hop, ::hop])).astype(np.float32) for one in (picture, look.known))
@@ -41,14 +51,15 @@ def over_known_table(picture: Bytes, look: TableLook, polarity: str, displacemen
     table = np.asarray(cv2.convertScaleAbs(look.known, alpha=look.gain), np.uint8)
     try:
         walls = see_walls(look.picture, wall_light(look.picture), polarity)
+        cells, alike = walls.cells, sampled.alike(walls)
     except NoBlockFound:
         # Walls as light as the table hang together with it. What differs from it has cells, or there are none.
         cells = probe(relief_of(picture, table, _ANY_PITCH_PX, displacement, 1.0).apart, "bright")
-    else:
-        if not sampled.alike(walls):
-            return None
-        cells = walls.cells
-    return relief_of(picture, table, cells.pitch_px, displacement, true_width(cells.wall_px, _BLUR_PX))
+        alike = True
+    return OverTable(
+        alike,
+        lambda: relief_of(picture, table, cells.pitch_px, displacement, true_width(cells.wall_px, _BLUR_PX)),
+    )
 
 
 @dataclass(frozen=True, eq=False)

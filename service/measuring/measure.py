@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from contour.acceptance.picture_findings import judge_table
 from contour.acceptance.sent_evidence import ToMillimetres, sent_evidence
 from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
-from contour.edge.known_table import over_known_table
+from contour.edge.known_table import OverTable, over_known_table
 from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, NoCellsFound, ParameterError
 from contour.geometry.arrays import Float64s
 from contour.geometry.rectifier import CroppedRectifier, Rectifier
@@ -168,73 +168,82 @@ class Measurer:
         if calibration is not None:
             calibration.check_fits(width, height)
         picture = without_line_noise(picture)
-        outlined = partial(self._outlined, recipe=recipe, thickness_mm=thickness_mm, result=result, watch=watch)
-        if self._table is not None:
-            look = self._look_at_table(self._table, picture, camera)
+        known = None if self._table is None else self._look_at_table(self._table, picture, camera)
+        if known is not None:
             watch.lap("table")
-            changes = judge_table(look, TableLimits())
+            changes = judge_table(known, TableLimits())
             if changes:
                 return replace(result, findings=rejections(changes))
-            displacement = self._displacement(recipe, thickness_mm, (height, width))
-            relief = _relief(picture, look, recipe, displacement)
-            return outlined(look.picture if relief is None else relief.apart, relief)
-
-        def looked_again(*, at_strong_walls: bool) -> Measurement | None:
-            """What nothing speaks against at another look; None without any."""
-            for look in self._other_looks(picture, recipe, thickness_mm, at_strong_walls=at_strong_walls):
-                watch.lap("table")
-                with contextlib.suppress(NoBlockFound, EdgeContradicted):
-                    again = outlined(*look)
-                    if not again.findings:
-                        return again
-            watch.lap("table")
-            return None
-
+        outlined = partial(self._outlined, recipe=recipe, thickness_mm=thickness_mm, result=result, watch=watch)
+        looks = self._looks(picture, known, recipe, thickness_mm)
+        refused: NoBlockFound | None = None
         try:
-            found = outlined(picture, None)
+            found = outlined(next(looks))
+            lies_there = bool(_LIES_THERE & {*found.reasons})
+            if not found.findings:
+                return found
         except NoBlockFound as error:
             # Cells that nothing shows are nowhere.
-            again = looked_again(at_strong_walls=not isinstance(error, NoCellsFound))
-            if again is None:
-                raise
-            return again
-        if not found.findings:
-            return found
-        # What was seen to lie there is there.
-        return looked_again(at_strong_walls=not _LIES_THERE & {*found.reasons}) or found
+            refused, lies_there = error, isinstance(error, NoCellsFound)
+        # What was seen to lie there is there, whatever walls say.
+        for look in looks:
+            watch.lap("table")
+            if look.relief is None and lies_there:
+                continue
+            with contextlib.suppress(NoBlockFound, EdgeContradicted):
+                again = outlined(look)
+                if not again.findings:
+                    return again
+        watch.lap("table")
+        if refused is not None:
+            raise refused
+        return found
 
-    def _other_looks(
-        self, picture: NDArray[np.uint8], recipe: AnyRecipe, thickness_mm: float, *, at_strong_walls: bool
-    ) -> Iterator[tuple[NDArray[np.uint8], Relief | None, float | None]]:
-        """What else to look at where a picture is refused: what differs from a table that need not be taught to be
-        known, and the walls that rise high.
+    def _looks(
+        self, picture: NDArray[np.uint8], known: TableLook | None, recipe: AnyRecipe, thickness_mm: float
+    ) -> Iterator[_Look]:
+        """What to look at, one after the other until nothing speaks against what is found: what differs from a table
+        that is known, or need not be taught to be, the picture's walls, and those of them that rise high.
         """
         displacement = self._displacement(recipe, thickness_mm, picture.shape[:2])
-        look = None if displacement is None else even_table(picture)
-        relief = None if look is None else _relief(picture, look, recipe, displacement)
-        if relief is not None:
-            yield relief.apart, replace(relief, even=True), None
-        if at_strong_walls and recipe.method == "wall-tips":
-            yield picture, None, _STRONG_WALLS
+        if known is None:
+            yield _Look(picture)
+            even = None if displacement is None else even_table(picture)
+            over = None if even is None else _over(picture, even, recipe, displacement)
+            if over is not None and over.alike:
+                relief = over.relief()
+                yield _Look(relief.apart, replace(relief, even=True))
+        else:
+            over = _over(picture, known, recipe, displacement)
+            picture = known.picture
+            plain_first = over is None or not over.alike
+            if plain_first:
+                yield _Look(picture)
+            if over is not None:
+                relief = over.relief()
+                yield _Look(relief.apart, relief)
+            if not plain_first:
+                yield _Look(picture)
+        if recipe.method == "wall-tips":
+            yield _Look(picture, least_rise=_STRONG_WALLS)
 
     def _outlined(
         self,
-        picture: NDArray[np.uint8],
-        relief: Relief | None,
-        least_rise: float | None = None,
+        look: _Look,
         *,
         recipe: AnyRecipe,
         thickness_mm: float,
         result: Measurement,
         watch: _Stopwatch,
     ) -> Measurement:
-        """The measurement of a picture, or of what differs in it from a known table."""
+        """The measurement of what is looked at."""
+        picture = look.picture
         height, width = picture.shape[:2]
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
-        settings = replace(trace_settings(recipe), least_rise=least_rise)
-        checked = _checked_trace(picture, settings, region, rectifier, watch, relief)
+        settings = replace(trace_settings(recipe), least_rise=look.least_rise)
+        checked = _checked_trace(picture, settings, region, rectifier, watch, look.relief)
         traced = checked.trace
         result = replace(
             result,
@@ -360,11 +369,21 @@ class Measurer:
         )
 
 
-def _relief(
+class _Look(NamedTuple):
+    """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
+    settings of a trace.
+    """
+
+    picture: NDArray[np.uint8]
+    relief: Relief | None = None
+    least_rise: float | None = None
+
+
+def _over(
     picture: NDArray[np.uint8], look: TableLook, recipe: AnyRecipe, displacement: Displacement | None
-) -> Relief | None:
-    """How the picture stands out of a known table as light as the walls; None of a darker one, and where nobody knows
-    how far lower edges of walls seem displaced.
+) -> OverTable | None:
+    """What the picture shows of a block on a known table; None on one that is far darker, and where nobody knows how
+    far lower edges of walls seem displaced.
     """
     with contextlib.suppress(NoBlockFound, CalibrationError):
         return None if displacement is None else over_known_table(picture, look, recipe.polarity, displacement)

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from contour.edge.known_table import over_known_table
+from contour.edge.known_table import OverTable, over_known_table
 from contour.errors import NoBlockFound
 from contour.geometry.agreement import distances_to
 from contour.image.taught_table import look_at, teach
-from contour.relief.relief import Displacement, Relief
+from contour.relief.relief import Displacement
 from contour.synthetic import Cover, Scene, Structure, Table, render, render_empty_table
 from contour.walls.see_block import SeenWalls
 from service.config.recipes import Recipe
@@ -52,31 +52,32 @@ def test_what_darkens_the_table_over_its_edge_as_a_shadow_does_is_told() -> None
 
 
 def test_on_a_darker_table_walls_are_seen_as_ever() -> None:
-    assert relief(PLAIN) is None
+    assert over(PLAIN) is None
 
 
-@pytest.mark.parametrize(("level", "known"), [(0.12, False), (0.4, True), (0.55, True)])
-def test_a_table_lighter_than_the_cells_of_light_walls_is_taken_out_of_the_picture(level: float, known: bool) -> None:
+@pytest.mark.parametrize(("level", "alike"), [(0.12, False), (0.4, True), (0.55, True)])
+def test_a_table_lighter_than_the_cells_of_light_walls_is_taken_out_of_the_picture(level: float, alike: bool) -> None:
     """Also where walls stand out of it by more than half of what they stand out of their cells by."""
-    assert (relief(replace(PLAIN, table=Table(level=level))) is not None) == known
+    seen = over(replace(PLAIN, table=Table(level=level)))
+    assert (seen is not None and seen.alike) == alike
 
 
 def test_where_the_picture_shows_no_cells_they_are_looked_for_in_what_differs_from_the_table(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    plain = relief(WOODEN)
+    plain = over(WOODEN)
 
     def none(*_: object) -> SeenWalls:
         raise NoBlockFound("no cells")
 
     monkeypatch.setattr("contour.edge.known_table.see_walls", none)
-    seen = relief(WOODEN)
+    seen = over(WOODEN)
     assert plain is not None
     assert seen is not None
-    assert seen.wall_px == pytest.approx(plain.wall_px, rel=0.5)
+    assert seen.relief().wall_px == pytest.approx(plain.relief().wall_px, rel=0.5)
 
 
-def relief(scene: Scene) -> Relief | None:
-    """How the scene's picture stands out of its table, which was taught."""
+def over(scene: Scene) -> OverTable | None:
+    """What the scene's picture shows of its block on its table, which was taught."""
     picture, table = render(scene).picture, teach(render_empty_table(scene, 2))
     return over_known_table(picture, look_at(picture, table), "auto", NONE)

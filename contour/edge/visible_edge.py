@@ -32,6 +32,9 @@ _OUT_PITCHES = 0.35
 # A shadow along less of the edge than this may be a dark thing over a corner; and a dent that a thing leaves turns in
 # by more than this, and out before and after, no farther from there.
 _SHADOW_PITCHES, _DENT_DEG, _OUT_DEG = 8.0, 60.0, 30.0
+# One beside a straight edge, so wide at these depths, cannot end at both of its corners where beside the next edges it
+# had to be so wide; what is narrower is not told.
+_WIDTHS, _TOLD_WIDTH, _CORNER_PLACES = np.arange(0.5, 6.0, 0.25), 1.5, 2
 _LEAVES_PITCHES = 0.5
 # What fills cells there is so wide, so far beyond the ends of walls.
 _THING_PITCHES, _THING_ROOM = 1.0, 0.8
@@ -165,7 +168,7 @@ def _unshaded(near: Bools, evidence: RingEvidence, picture: Bytes, look: TableLo
     ring, kept = fit(evidence).ring, near.copy()
     for run in runs_of(_without_gaps(shaded)):
         if len(run) == len(near) or (
-            _is_own_edge(evidence.points[run], ring, look.pitch_px) and not _flush(run, evidence, picture, look, fit)
+            _is_own_edge(run, evidence, ring, look) and not _flush(run, evidence, picture, look, fit)
         ):
             kept[run] &= ~shaded[run]
     return kept
@@ -214,10 +217,11 @@ def _without_gaps(chosen: Bools) -> Bools:
     return np.asarray(np.all([np.roll(grown, step) for step in steps], axis=0))
 
 
-def _is_own_edge(points: Float64s, ring: Ring, pitch_px: float) -> bool:
-    """Whether an outline, at points in what may be a shadow, is long there and nowhere turns into the block: what lies
-    over an edge leaves a dent, or takes a corner off.
+def _is_own_edge(run: Indices, evidence: RingEvidence, ring: Ring, look: TableLook) -> bool:
+    """Whether an outline, at a run of witnesses in what may be a shadow, is long there and nowhere turns into the
+    block: what lies over an edge leaves a dent, or takes a corner off.
     """
+    pitch_px, points = look.pitch_px, evidence.points[run]
     lengths = RingLengths.of(ring)
     first, long = _between(lengths, points[[0, -1]])
     if long < _SHADOW_PITCHES * pitch_px:
@@ -232,7 +236,23 @@ def _is_own_edge(points: Float64s, ring: Ring, pitch_px: float) -> bool:
         turned = into[k - ends : k + ends + 1].sum()
         if (turned > _DENT_DEG and less > _OUT_DEG) or (turned > 2.0 * _DENT_DEG and more > _OUT_DEG):
             return False  # the second where a thing lies in a corner that points into the block
-    return True
+    one, other = (
+        float(np.radians(out[k - _CORNER_PLACES : k + _CORNER_PLACES + 1].sum())) for k in (ends - 1, len(out) - ends)
+    )
+    turned = (out + into)[ends + _CORNER_PLACES : -ends - _CORNER_PLACES].sum()
+    return bool(turned > _CORNER_DEG) or _may_end(one, other, points, evidence.normal[run], look)
+
+
+def _may_end(one: float, other: float, points: Float64s, normal: Float64s, look: TableLook) -> bool:
+    """Whether a shadow beside a straight edge, seen beyond witnesses (N, 2) on it, may end at both of its corners,
+    where the outline turns out by so much, radians. A block's shadow is the block itself, moved away from the light:
+    beside each edge it is as wide as that lies across it.
+    """
+    if min(one, other) < np.radians(_CORNER_DEG) or one + other >= np.pi:
+        return True
+    shaded = [look.foreign_at(points + deep * look.pitch_px * normal) <= 0.0 for deep in _WIDTHS]
+    width = float(np.median(np.logical_and.accumulate(shaded).sum(axis=0)) * (_WIDTHS[1] - _WIDTHS[0]))
+    return bool(width * np.sin(one + other) / (np.sin(one) + np.sin(other)) < _TOLD_WIDTH)
 
 
 def _plain(evidence: RingEvidence, fitted: FittedRing) -> VisibleRing:

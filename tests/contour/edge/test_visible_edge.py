@@ -186,6 +186,27 @@ def test_ends_along_the_border_of_a_thing_across_a_corner_are_not_taken_for_its_
     assert {stretch.state for stretch in hidden} == {"covered"}
 
 
+@pytest.mark.parametrize(
+    ("deep", "beside_next", "hides"), [(3.0, False, True), (3.0, True, False), (1.2, False, False)]
+)
+def test_a_wide_shadow_along_a_bevel_goes_on_beside_one_of_the_next_edges(
+    deep: float, beside_next: bool, hides: bool
+) -> None:
+    """What does not is a dark thing that takes the corner off."""
+    corner = BLOCK[1]
+    one_way, other = ((BLOCK[k] - corner) / np.hypot(*(BLOCK[k] - corner)) * 8.0 * PITCH for k in (0, 2))
+    ends = np.array([corner + one_way, corner + other])
+    bevelled = np.array([BLOCK[0], *ends, BLOCK[2], BLOCK[3]])
+    away = -(one_way + other) / np.hypot(*(one_way + other)) * deep * PITCH
+    thing = np.array([ends[0], ends[1], ends[1] + away, ends[0] + away])
+    if beside_next:
+        down = ends[1] - corner
+        thing = np.array([ends[0], ends[1], ends[1] + down, ends[1] + down + away, ends[0] + away])
+    dark = look(bevelled, thing, lighter=False, shade=True)
+    hidden = told(fitted(witnesses(bevelled, seed=14), dark), dark)
+    assert {stretch.state for stretch in hidden} == ({"covered"} if hides else set())
+
+
 def test_a_corner_that_points_into_the_block_may_lie_in_a_shadow() -> None:
     """The edges beside it are longer than a thing over a corner is wide."""
     ring = rectangle(700.0, 500.0, angle=0.0)

@@ -12,12 +12,14 @@ from contour.edge.edge_evidence import ring_evidence
 from contour.edge.mirrored_block import is_mirrored, mirrored_block
 from contour.edge.open_cells import without_open_cells
 from contour.edge.table_look import TableLook, table_look
-from contour.edge.visible_edge import doubtful, visible_rings
+from contour.edge.visible_edge import VisibleRing, doubtful, visible_rings
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
+from contour.image.opencv import grey
 from contour.material.closed_cells import MaterialEdge, material_edge
+from contour.material.floor_edge import floor_edge
 from contour.material.foam import foam_edge
 from contour.outline.uncertainty import uncertainty
 from contour.relief.reach import reach
@@ -251,13 +253,22 @@ def _cut(
             check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
             check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
-    untold = next(((float(x), float(y)) for one in rings for x, y in one.untold), None)
+    lit = light if relief is None else grey(picture)
+    untold = next(((float(x), float(y)) for one in visible for x, y in _untold(one, lit, seen)), None)
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
     # What fills cells hides walls, too; but what is dark may be a hole in the block's shade.
     middles = seen.openings[:, :2]
     clear = (look.foreign_at(middles) > 0.0) | ~look.lighter_at(middles)
     opening = next(((float(x), float(y), 2.0 * float(radius)) for x, y, radius in seen.openings[clear]), None)
     return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold, opening_px=opening)
+
+
+def _untold(one: VisibleRing, light: Bytes, seen: BlockEvidence) -> Float64s:
+    """Where nothing that is seen tells whether a ring is round or a corner, walls or floors, (K, 2), pixels."""
+    ring = one.fitted
+    floors = floor_edge(light, ring.ring, seen.pitch_px, bright=seen.polarity == "bright")
+    told = floors.tells(ring.untold, seen.pitch_px)
+    return np.concatenate([ring.untold[~told], floors.passed(one.on_line, seen.pitch_px)])
 
 
 def looked_at(picture: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[BlockEvidence, TableLook]:

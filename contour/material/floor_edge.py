@@ -1,0 +1,100 @@
+"""Where the floors of cells end: a block's edge between the ends of its walls, wherever the table is of another light.
+
+Floors lie in the shade of the walls around them, the table beside the block does not. How sharply the one passes into
+the other depends on light and depth, but it does so alike along an edge: a place at which floors end as they do on both
+sides of it is the edge's own, and a corner that they end well within may be a rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from contour.geometry.arrays import Bools, Bytes, Float64s, rolled
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import Ring
+from contour.geometry.signed_distance import nearest
+from contour.image.pixel_sampling import sample_at
+
+# Pitches: places along the ring, and beside each how far in and out and along it light is looked at. Of what lies side
+# by side a quarter is floor, whatever walls stand there.
+_SPACING, _SMOOTHED = 0.25, 0.5
+_OUT, _BESIDE = np.arange(-1.0, 1.01, 0.1), np.linspace(-0.3, 0.3, 5)
+_FLOOR = 1
+_FLOORS, _TABLE = (_OUT > -0.95) & (_OUT < -0.25), _OUT > 0.45
+# Places beside one, and farther on on both sides of it; of those so many must agree within so much, pitches.
+_NEAR, _FLANK = range(-4, 5), range(5, 17)
+_AGREE, _ALIKE, _LEAST_LIGHT = 0.75, 0.21, 6.0
+# A place of the ring, no farther from a point, is the edge's own within that, pitches: a corner that may as well be
+# round, or a rounding that may be a corner, lies half a pitch off.
+_AT, _OWN = 1.0, 0.3
+# A corner turns by more about so many places, none of its witnesses is so near, and floors end so far within it on
+# average, where the table is clearly of another light. Of some 300 right outlines none has one; of three corners that
+# were drawn for roundings of a pitch and a half two were, and three of four pictures of one of a pitch.
+_CORNER, _ABOUT, _UNSEEN, _WITHIN, _CLEAR_LIGHT = np.radians(30.0), range(-3, 4), 0.6, -0.39, 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class FloorEdge:
+    """Places along a ring, (N, 2), pixels; at which floors end as beside them, and well within a corner, (N,) each."""
+
+    places: Float64s
+    own: Bools
+    within: Bools
+
+    def tells(self, points: Float64s, pitch_px: float) -> Bools:
+        """Which points (K, 2) at the ring are its own, shape (K,)."""
+        away = np.hypot(*(self.places - points[:, None]).transpose(2, 0, 1))
+        return np.asarray(self.own[away.argmin(axis=1)] & (away.min(axis=1) < _AT * pitch_px))
+
+    def passed(self, witnesses: Float64s, pitch_px: float) -> Float64s:
+        """Places about corners near none of these (K, 2), and well within which floors end, (M, 2), pixels."""
+        places = self.places[self.within]
+        return places[nearest(places, witnesses) > _UNSEEN * pitch_px]
+
+
+def floor_edge(light: Bytes, ring: Ring, pitch_px: float, *, bright: bool) -> FloorEdge:
+    """Where floors end along a ring with material on its left, pixels, in light (H, W), uint8, of a block with walls
+    lighter than floors, or darker.
+    """
+    lengths = RingLengths.of(ring)
+    at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
+    places, normal = lengths.at(at), lengths.normals(at, _SMOOTHED * pitch_px)
+    ends, step = _ends(light, places, normal, pitch_px, bright=bright)
+    around = np.stack([rolled(ends, k) for k in _beside()])
+    usual = np.median(around, axis=0)
+    agree = np.mean(np.abs(around - usual) < _ALIKE, axis=0) >= _AGREE
+    near = np.stack([rolled(ends, k) for k in _NEAR]) - usual
+    own = agree & (np.abs(near).max(axis=0) < _OWN) & (np.abs(usual) < _OWN)
+    heading = normal[:, 0] + 1j * normal[:, 1]
+    turn = np.abs(np.angle(rolled(heading, _ABOUT[0]) * rolled(heading, _ABOUT[-1]).conj()))
+    about = near[[k - _NEAR[0] for k in _ABOUT]].mean(axis=0)
+    within = agree & (turn > _CORNER) & (about < _WITHIN) & (np.abs(step) > _CLEAR_LIGHT)
+    return FloorEdge(places, own, within)
+
+
+def _beside() -> list[int]:
+    return [*(-k for k in _FLANK), *_FLANK]
+
+
+def _ends(
+    light: Bytes, places: Float64s, normal: Float64s, pitch_px: float, *, bright: bool
+) -> tuple[Float64s, Float64s]:
+    """How far out of places (N, 2) with outward normals (N, 2) floors end, pitches, nan where the table is as light,
+    and by how much it is lighter, (N,) each.
+    """
+    along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    out = places[:, None] + pitch_px * _OUT[:, None] * normal[:, None]
+    sampled = out[:, :, None] + pitch_px * _BESIDE[:, None] * along[:, None, None]
+    seen = sample_at(light, sampled[..., 0], sampled[..., 1]).reshape(sampled.shape[:3])
+    profile = np.sort(seen if bright else -seen, axis=2)[..., _FLOOR]
+    floor, table = (
+        np.median([rolled(np.median(profile[:, part], axis=1), k) for k in (*_beside(), *_NEAR)], axis=0)
+        for part in (_FLOORS, _TABLE)
+    )
+    step = np.where(np.abs(table - floor) < _LEAST_LIGHT, np.nan, table - floor)
+    # From the table inwards, the first light that is nearer to that of floors.
+    like_floor = (profile - floor[:, None]) / step[:, None] < 0.5
+    ends = np.where(like_floor.any(axis=1), _OUT[::-1][like_floor[:, ::-1].argmax(axis=1)], _OUT[0])
+    return np.where(np.isnan(step), np.nan, ends), step

@@ -49,7 +49,8 @@ log = logging.getLogger("combtrace.measure")
 _ROI_STEPS = 12
 # Of the height of walls in the wider region: a table's grain and grooves rise less than most walls do.
 _STRONG_WALLS = 0.6
-_LIES_THERE = {Reason.SEVERAL_BLOCKS, Reason.EDGE_COVERED}
+# What was seen to lie there is there, and where ends of walls are too few to tell an edge, those of fewer tell less.
+_LIES_THERE, _HARDLY_SEEN = {Reason.SEVERAL_BLOCKS, Reason.EDGE_COVERED}, {Reason.UNCERTAINTY_TOO_LARGE}
 
 
 class _Stopwatch:
@@ -179,16 +180,15 @@ class Measurer:
         refused: NoBlockFound | None = None
         try:
             found = outlined(next(looks))
-            lies_there = bool(_LIES_THERE & {*found.reasons})
+            lies_there, hardly_seen = bool(_LIES_THERE & {*found.reasons}), {*found.reasons} == _HARDLY_SEEN
             if not found.findings:
                 return found
         except NoBlockFound as error:
             # Cells that nothing shows are nowhere.
-            refused, lies_there = error, isinstance(error, NoCellsFound)
-        # What was seen to lie there is there, whatever walls say.
+            refused, lies_there, hardly_seen = error, isinstance(error, NoCellsFound), False
         for look in looks:
             watch.lap("table")
-            if look.relief is None and lies_there:
+            if (lies_there and look.relief is None) or (hardly_seen and look.least_rise is not None):
                 continue
             with contextlib.suppress(NoBlockFound, EdgeContradicted):
                 again = outlined(look)

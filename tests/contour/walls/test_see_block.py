@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound, PictureError
+from contour.geometry.signed_distance import depth_inside
 from contour.synthetic import (
     CameraModel,
     CellGeometry,
@@ -248,3 +249,17 @@ def test_a_shaving_beside_the_block_is_told_from_it() -> None:
     near = seen.loose[middle[1] - 6 : middle[1] + 7, middle[0] - 6 : middle[0] + 7]
     assert near.any()
     assert signed_distance(rendered.truth_px, seen.rings[0].points).min() > -0.1 * pitch
+
+
+def test_beside_a_light_table_the_border_of_the_blocks_shadow_is_no_outermost_wall() -> None:
+    rendered = render(Scene(BLOCK, camera(), CellGeometry(pitch_mm=8.0), table=Table(level=0.8), seed=5))
+    block = np.zeros(rendered.picture.shape[:2], np.uint8)
+    cv2.fillPoly(block, [np.rint(rendered.truth_px.exterior).astype(np.int32)], 1)
+    teeth = 12 - 5 * (np.arange(block.shape[1]) // 9 % 2)
+    shadow = np.stack([np.roll(np.roll(block, 12, 1)[:, x], -high) for x, high in enumerate(teeth)], axis=1)
+    shade = cv2.GaussianBlur(np.where(shadow > block, np.float32(0.45), np.float32(1.0)), (0, 0), 0.8)
+    seen = seen_in(np.where(block > 0, rendered.picture, rendered.picture * shade).astype(np.uint8), "bright").rings[0]
+    outermost = seen.points[seen.kind == WitnessKind.OUTERMOST]
+    beyond = -depth_inside(rendered.truth_px.exterior, outermost) > 0.35 * rendered.pitch_px
+    assert len(outermost) > 10
+    assert np.count_nonzero(beyond) < 3, "it has a corner or two"

@@ -42,7 +42,7 @@ _ON_SHARE, _MOST_OFF, _OPEN_PITCHES = 0.45, 0.1, 0.75
 # that goes around a hand goes on smoothly, too. Of 24 outlines with filled cells in them none is so along 0.16.
 _MOST, _LONGEST = 0.5, 0.33
 # Near its ends the outline through it turns by no more than that over a pitch: blocks are ten cells across and more.
-_FOOT_PITCHES, _SMOOTH = 1.0, np.radians(15.0)
+_FOOT_PITCHES, _SMOOTH, _BESIDE_PITCHES, _CORNER = 1.0, np.radians(15.0), 3.0, np.radians(45.0)
 _STEP_PX = 0.5
 _LEAST_CONTRAST = 6.0
 # Pixels and pitches about a sharp step, and how much of it there is to be there.
@@ -157,12 +157,16 @@ def _outline_through(runs: Sequence[_Border], refit: Refit) -> RingLengths | Non
 
 def _goes_on(lengths: RingLengths, points: Float64s, pitch_px: float) -> bool:
     """Whether an outline goes on smoothly from both ends of a run of points: what lies over an edge leaves it at an
-    angle.
+    angle. And where it turns a corner on it, whether it is straight beside it: a curved edge has none.
     """
     feet = lengths.feet(points[[0, -1]])
     reach = np.arange(-_FOOT_PITCHES, _FOOT_PITCHES + 0.1, 0.25) * pitch_px
-    places = (feet[:, None] + reach).ravel()
-    return bool(np.abs(lengths.turns(places, pitch_px)).max() <= _SMOOTH)
+    if np.abs(lengths.turns((feet[:, None] + reach).ravel(), pitch_px)).max() > _SMOOTH:
+        return False
+    amidst = np.arange(0.0, max((feet[1] - feet[0]) % lengths.length, 1.0), 0.25 * pitch_px)
+    beside = feet + np.array([-1.0, 1.0]) * 0.5 * _BESIDE_PITCHES * pitch_px
+    straight = np.abs(lengths.turns(beside, _BESIDE_PITCHES * pitch_px)).max() < _SMOOTH
+    return bool(straight or np.abs(lengths.turns(feet[0] + amidst, pitch_px)).max() < _CORNER)
 
 
 def joined(parts: Sequence[EdgePoints]) -> EdgePoints:

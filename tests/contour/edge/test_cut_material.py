@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from contour.edge.cut_material import cut_borders, joined
 from contour.edge.table_look import TableLook
+from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import densified
 from contour.walls.wall_evidence import EdgePoints
 from tests.support.pictures.hand_looks import HEIGHT, WIDTH, look
@@ -130,3 +131,22 @@ def test_an_outline_through_what_lies_along_a_third_of_the_edge_tells_nothing(sh
     args = picture(area), clear, round_block[~hidden], area[[0, 59]], look(round_block, area)
     assert not cut_borders(*args)
     assert bool(cut_borders(*args, lambda _: round_block)) == cut
+
+
+@pytest.mark.parametrize("round_block", [True, False])
+def test_a_corner_on_a_curved_edge_is_a_things_and_between_straight_ones_the_blocks_own(round_block: bool) -> None:
+    """The outline goes on smoothly from both."""
+    middle, radius, half = np.array([700.0, 500.0]), 8.0 * PITCH, np.radians(30.0)
+    turn = np.linspace(half, 2.0 * np.pi - half, 300)
+    arc = middle + radius * np.column_stack([np.cos(turn), np.sin(turn)])
+    corner = middle + np.array([radius / np.cos(half), 0.0])
+    ends = arc[[-1, 0]]
+    far = ends + 2.0 * (ends - corner)
+    outline = np.vstack([[corner], arc if round_block else far[::-1]])
+    block = circle(radius) if round_block else outline
+    gap = RingLengths.of(block).feet(ends).tolist()
+    area = np.array([ends[0], corner, ends[1], *(0.75 * ends[::-1] + 0.25 * middle)])
+    gaps = ((gap[0], 1e9), (0.0, gap[1]))
+    clear = replace(witnesses(block, seed=1, gaps=gaps), coarse=densified(block, 5.0))
+    args = picture(area), clear, outline[1:], area[[3, 4]], look(block, area)
+    assert bool(cut_borders(*args, lambda _: outline)) == (not round_block)

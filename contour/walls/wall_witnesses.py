@@ -40,9 +40,11 @@ _NEAR_PX = 1.5
 _MOST_RELIEF_SIGMA_PX, _LEAST_TOLD, _LEAST_RELIEF_HEIGHT, _LEAST_SIDE_HEIGHT = 1.5, 0.4, 0.2, 0.25
 _FAINT_HEIGHT = 0.45
 _FAINT_SIGMA_PX = 3.0
-# Beside a light table the border of a shadow is an outermost wall, too, from which light falls nowhere. Of 192 points
-# with less three in four lie more than 0.15 of a cell off, of 1770 others one in ten.
-_LEAST_FALL = 0.2
+# Beside a light table the border of a shadow is an outermost wall, too: of what light falls by at ends of walls it
+# falls there by less than this, and beyond, so far, pixels, it is lighter by more than this than within, so far,
+# pitches.
+_LEAST_FALL, _LIGHTER_BEYOND = 0.2, 0.5
+_BEYOND_PX, _WITHIN_PITCHES = np.array([3.0, 4.0, 5.0]), np.linspace(0.1, 0.6, 6)
 # How far the edge of dark material is looked for from the last wall seen in it, and how near is the wall's own edge.
 _DARK_PITCHES = 4.0
 _INSIDE_PITCHES, _ENDS_INSIDE_PITCHES = 0.4, 0.25
@@ -119,9 +121,10 @@ def block_evidence(
         tips = replace(tips, points=_raised(tips.points, coarse.feet(samples_of(tips.points, scale))[2], depth))
     outer = outer[nearest(outer, samples_of(tips.points, scale)) > _LONELY_PITCHES * pitch_px]
     normal, place = coarse.feet(outer)[2], pixels_of(outer, scale)
-    sides, falls = _sides(light, place, normal, depth.width or cells.wall_px, model)
+    sides, height = _sides(light, place, normal, depth.width or cells.wall_px, model)
     if dark is None:
-        sides, place, normal = sides.take(falls), place[falls], normal[falls]
+        walls = ~_of_shadows(light, place, normal, height, cells.pitch_px, model)
+        sides, normal = sides.take(walls), normal[walls]
     else:
         faint = (sides.sigma >= _FAINT_SIGMA_PX) & (depth.across(place, normal) >= 0.0)
         least = np.where(faint, _INSIDE_PITCHES * cells.pitch_px, np.inf)
@@ -202,9 +205,11 @@ def _high(relief: Relief, sides: _Witnesses, tips: _Witnesses) -> _Witnesses:
     return sides.take(good)
 
 
-def _sides(light: Bytes, place: Float64s, normal: Float64s, wall: float, model: EndModel) -> tuple[_Witnesses, Bools]:
-    """Outermost wall points, moved along the outline's normal to half height where that is near; `wall` is the width
-    of walls at half height. And from which light falls outwards.
+def _sides(
+    light: Bytes, place: Float64s, normal: Float64s, wall: float, model: EndModel
+) -> tuple[_Witnesses, Float64s]:
+    """Outermost wall points, moved along the outline's normal to half height where that is near, and by how much light
+    falls there, (N,); `wall` is the width of walls at half height.
     """
     across = replace(model, width=1.0, reach=min(model.reach, wall))
     fitted = fit_ends(light, place, normal, normal, across)
@@ -216,7 +221,20 @@ def _sides(light: Bytes, place: Float64s, normal: Float64s, wall: float, model: 
     # The outer side of the block, where it is in view below its top, is fainter than any wall.
     sigma = np.where(fitted.height < _FAINT_HEIGHT * (model.height or 1.0), _FAINT_SIGMA_PX, sigma)
     kind = np.full(len(place), WitnessKind.OUTERMOST, np.int8)
-    return _Witnesses(points, kind, sigma), fitted.height > _LEAST_FALL * (model.height or 1.0)
+    return _Witnesses(points, kind, sigma), fitted.height
+
+
+def _of_shadows(
+    light: Bytes, place: Float64s, normal: Float64s, height: Float64s, pitch_px: float, model: EndModel
+) -> Bools:
+    """Which outermost points, from which light falls so much, (N,), are of the border of a shadow on a light table."""
+    usual = model.height or 1.0
+    beyond, within = (
+        sample_at(light, *(place[:, axis, None] + out * normal[:, axis, None] for axis in (0, 1)))
+        for out in (_BEYOND_PX, -_WITHIN_PITCHES * pitch_px)
+    )
+    lighter = (model.sign * beyond).mean(axis=1) - (model.sign * within).min(axis=1)
+    return np.asarray((height < _LEAST_FALL * usual) & (lighter > _LIGHTER_BEYOND * usual))
 
 
 @dataclass(frozen=True, eq=False)

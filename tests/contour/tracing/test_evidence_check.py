@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import nullcontext
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,7 +14,6 @@ from contour.errors import NoBlockFound
 from contour.geometry.rings import densified
 from contour.outline.fit import FittedRing
 from contour.relief.relief import Displacement, Relief
-from contour.synthetic import render
 from contour.tracing.evidence_check import (
     check_against_evidence,
     check_against_relief,
@@ -21,12 +21,8 @@ from contour.tracing.evidence_check import (
     check_own_ends,
     check_unseen,
 )
-from contour.tracing.trace import TraceSettings
-from contour.tracing.tracing import trace
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, along, rectangle, witnesses
-from tests.support.scenes.shop_floor_scenes import shop_floor_scene
-from tests.support.scenes.trials import calibration_for
 
 BLOCK = rectangle(900.0, 600.0)
 
@@ -91,11 +87,20 @@ def test_a_hole_along_which_hardly_any_wall_ends_was_not_cut(every: int, refused
         check_on_walls(hole, on_line, np.zeros((1000, 1400), np.uint8), PITCH)
 
 
-def test_an_outline_along_glare_that_was_taken_for_walls_is_refused() -> None:
-    rendered = render(shop_floor_scene("dim", 1_420_000).scene)
-    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
-    with pytest.raises(NoBlockFound, match="changes too softly for walls"):
-        trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+@pytest.mark.parametrize(("soft", "refused"), [(3, False), (4, True)])
+def test_an_outline_along_glare_that_was_taken_for_walls_is_refused(soft: int, refused: bool) -> None:
+    evidence = witnesses(BLOCK, seed=2)
+    count = len(evidence.points)
+    along = np.isin(np.arange(count), np.arange(10, 10 + soft))
+    x, y = np.rint(evidence.points[~along]).astype(int).T
+    light = np.full((1000, 1400), 40, np.uint8)
+    light[y, x] = 220
+    glare = cv2.circle(light.copy(), np.rint(evidence.points[12]).astype(int).tolist(), round(6 * PITCH), 90, -1)
+    glare = np.where(light == 220, light, cv2.GaussianBlur(glare, (0, 0), 4.0 * PITCH)).astype(np.uint8)
+    evidence = replace(evidence, kind=np.where(along, WitnessKind.OUTERMOST, WitnessKind.CLEAN))
+    on_line = np.ones(count, np.bool_)
+    with pytest.raises(NoBlockFound, match="changes too softly for walls") if refused else nullcontext():
+        check_on_walls(evidence, on_line, glare, PITCH)
 
 
 def test_three_ends_in_a_row_are_missing_cells() -> None:

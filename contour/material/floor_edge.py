@@ -30,8 +30,8 @@ _AGREE, _ALIKE, _LEAST_LIGHT = 0.75, 0.21, 6.0
 # round, or a rounding that may be a corner, lies half a pitch off.
 _AT, _OWN = 1.0, 0.3
 # A corner turns by more about so many places, none of its witnesses is so near, and floors end so far within it on
-# average, where the table is clearly of another light. Of some 300 right outlines none has one; of three corners that
-# were drawn for roundings of a pitch and a half two were, and three of four pictures of one of a pitch.
+# average, where the table is clearly of another light. Of some 300 right outlines none has one; both corners that were
+# drawn for roundings of a pitch and a half do, and one of eleven for roundings of a pitch.
 _CORNER, _ABOUT, _UNSEEN, _WITHIN, _CLEAR_LIGHT = np.radians(30.0), range(-3, 4), 0.6, -0.39, 20.0
 
 

@@ -98,7 +98,7 @@ def _told(seen: Measurement, hidden: Float64s) -> tuple[Float64s, float]:
     rings = [RingLengths.of(ring) for ring in seen.pixels.rings]
     longest = max(
         (one for one in seen.evidence if one.state != "seen"),
-        key=lambda one: one.to_px - one.from_px,
+        key=lambda one: one.length_px,
     )
     middle = rings[longest.ring].at(np.array([0.5 * (longest.from_px + longest.to_px)]))
     feet = np.stack([ring.feet(hidden) for ring in rings])

@@ -11,11 +11,12 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from contour.edge.edge_parts import EdgePart, changes, light_beside, longest_part, with_sides
+from contour.edge.edge_parts import EdgePart, changes, longest_part
 from contour.edge.ring_places import runs_of
-from contour.geometry.arrays import Bools, Bytes, Float64s, median
+from contour.geometry.arrays import Bools, Bytes, Float64s, median, with_sides
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import signed_area
+from contour.image.pixel_sampling import light_beside
 from contour.tracing.trace import Trace
 
 # Cell pitches: along the outline, and out of it.

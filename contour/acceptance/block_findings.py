@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from contour.acceptance.edge_contrast import shows_table
-from contour.acceptance.findings import SHOWN_PITCHES, Finding, Limits, Refusal, around, closed, runs_where
+from contour.acceptance.findings import SHOWN_PITCHES, Finding, Limits, Refusal, around, closed, edge_of, runs_where
 from contour.acceptance.quality import QualityLimits, lost_in_noise
 from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.ring_lengths import RingLengths
@@ -256,18 +256,18 @@ def _vague_ring(traced: Trace, pitch_px: float) -> Finding | None:
     for number, ring in enumerate(traced.contour.rings):
         parts = [one for one in traced.evidence or () if one.ring == number and one.state == "seen"]
         unsure = [one for one in parts if one.bound_px > _UNSURE_PITCHES * pitch_px]
-        share = sum(one.to_px - one.from_px for one in unsure) / perimeter(ring)
+        share = sum(one.length_px for one in unsure) / perimeter(ring)
         if share > _UNSURE_SHARE:
-            longest = max(unsure, key=lambda one: one.to_px - one.from_px)
+            longest = max(unsure, key=lambda one: one.length_px)
             vague.append((share, number, 0.5 * (longest.from_px + longest.to_px)))
     if not vague:
         return None
     share, number, middle = max(vague)
     x, y = RingLengths.of(traced.contour.rings[number]).at(np.array([middle]))[0]
-    edge = f"the edge of hole {number}" if number else "the block's edge"
     return Finding(
         Refusal.UNCERTAINTY_TOO_LARGE,
-        f"Of {edge} {100 * share:.0f} %, the longest part near ({x:.0f}, {y:.0f}) px, is no surer than half a cell: "
-        "few walls end on it. Look at the overlay; check light and focus, and take away what lies against the block.",
+        f"Of {edge_of(number)} {100 * share:.0f} %, the longest part near ({x:.0f}, {y:.0f}) px, is no surer than half "
+        "a cell: few walls end on it. Look at the overlay; check light and focus, and take away what lies against the "
+        "block.",
         (around(float(x), float(y), SHOWN_PITCHES * pitch_px),),
     )

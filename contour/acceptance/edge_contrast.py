@@ -8,11 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from contour.edge.edge_parts import EdgePart, light_beside, longest_part, with_sides
-from contour.geometry.arrays import Bools, Bytes, Float64s, median, quantiles
+from contour.edge.edge_parts import EdgePart, longest_part
+from contour.geometry.arrays import Bools, Bytes, Float64s, median, quantiles, with_sides
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, signed_area
-from contour.image.pixel_sampling import planes_of
+from contour.image.pixel_sampling import light_beside, planes_of
 
 # Cell pitches: along the outline, out of it, and into the block.
 _SPACING = 0.25

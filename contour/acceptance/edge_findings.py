@@ -8,7 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
-from contour.acceptance.findings import SHOWN_PITCHES, Finding, Limits, Refusal, around
+from contour.acceptance.findings import SHOWN_PITCHES, Finding, Limits, Refusal, around, edge_of
 from contour.acceptance.sent_evidence import ToMillimetres
 from contour.acceptance.trace_check import CheckedTrace
 from contour.edge.stretches import Stretch
@@ -34,7 +34,7 @@ class _Run:
 
     @property
     def length_px(self) -> float:
-        return sum(stretch.to_px - stretch.from_px for stretch in self.stretches)
+        return sum(stretch.length_px for stretch in self.stretches)
 
     @property
     def length_mm(self) -> float | None:
@@ -46,7 +46,7 @@ class _Run:
     @property
     def by(self) -> str | None:
         """What hides most of it."""
-        return max(self.stretches, key=lambda stretch: stretch.to_px - stretch.from_px).by
+        return max(self.stretches, key=lambda stretch: stretch.length_px).by
 
     def objection(self, limits: Limits) -> str | None:
         """Why it is not to be bridged; None where it is."""
@@ -68,8 +68,7 @@ class _Run:
         if self.to_mm is not None:
             x, y = self.to_mm(middle)[0]
             long, place = f"{self.length_mm:.1f} mm ({long})", f"{place}, ({x:.1f}, {y:.1f}) mm"
-        edge = f"the edge of hole {number}" if number else "the block's edge"
-        return f"{long} of {edge} near {place}"
+        return f"{long} of {edge_of(number)} near {place}"
 
 
 def edge_covered(traced: Trace | None, to_mm: ToMillimetres | None, limits: Limits) -> Finding | None:

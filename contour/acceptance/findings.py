@@ -77,6 +77,11 @@ class Finding:
     shown_px: tuple[Float64s, ...] = field(default=(), compare=False)
 
 
+def edge_of(ring: int) -> str:
+    """What a sentence calls the edge of a contour's ring, 0 the exterior."""
+    return f"the edge of hole {ring}" if ring else "the block's edge"
+
+
 def around(x: float, y: float, radius_px: float) -> Float64s:
     """A circle as a path, to show a place by."""
     angles = np.linspace(0.0, 2.0 * np.pi, 33)

@@ -25,7 +25,7 @@ def alike_table(traced: CheckedTrace | None) -> Finding | None:
     if traced is None or traced.alike is None or traced.trace.pitch_px is None:
         return None
     alike, stretches = traced.alike, traced.trace.evidence or ()
-    hidden_px = sum(stretch.to_px - stretch.from_px for stretch in stretches if stretch.state != "seen")
+    hidden_px = sum(stretch.length_px for stretch in stretches if stretch.state != "seen")
     if alike.length_pitches <= max(_MOST_ALIKE_PITCHES, hidden_px / traced.trace.pitch_px):
         return None
     x, y = alike.place_px

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.edge.edge_parts import EdgePart, light_beside
+from contour.edge.edge_parts import EdgePart
 from contour.edge.ring_places import runs_of
 from contour.geometry.arrays import Bools, Bytes, Complexes, Float64s, Indices, median, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, signed_area
 from contour.geometry.signed_distance import depth_inside
-from contour.image.pixel_sampling import sample_at
+from contour.image.pixel_sampling import light_beside, sample_at
 
 # Places along a ring, pitches apart; a corner is where it turns by more between its chords before and behind, degrees,
 # so many places long and away from it, and most among its neighbours, or less by so much, radians.

@@ -52,7 +52,7 @@ def _on_ring(own: list[Stretch], traced: RingLengths, polygon: RingLengths) -> l
 
 def _span(stretch: Stretch, traced: RingLengths, polygon: RingLengths) -> tuple[float, float]:
     """Where on the polygon's ring all that is nearest to the stretch begins, and how long it is, pixels."""
-    long = stretch.to_px - stretch.from_px
+    long = stretch.length_px
     count = int(np.clip(np.ceil(long) + 1, 2, _MOST_SAMPLES))
     feet = polygon.feet(traced.at(np.linspace(stretch.from_px, stretch.to_px, count)))
     steps = np.diff(feet)
@@ -70,7 +70,7 @@ def _without_slivers(pieces: list[Stretch]) -> list[Stretch]:
         piece = waiting.pop()
         beside = [*kept[-1:], *waiting[-1:]]
         worse = max(beside, key=lambda other: _WORSE[other.state], default=None)
-        short = piece.to_px - piece.from_px < _SLIVER_PX
+        short = piece.length_px < _SLIVER_PX
         if worse is None or not short or _WORSE[worse.state] < _WORSE[piece.state]:
             kept.append(piece)
         elif kept and worse is kept[-1]:

@@ -8,9 +8,8 @@ import cv2
 import numpy as np
 
 from contour.edge.ring_places import runs_of
-from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.ring_lengths import RingLengths
-from contour.image.pixel_sampling import sample_at
 
 
 @dataclass(frozen=True)
@@ -34,12 +33,6 @@ def longest_part(chosen: Bools, lengths: RingLengths, at: Float64s, spacing_pitc
     return EdgePart(spacing_pitches * len(run), (x, y))
 
 
-def light_beside(plane: Bytes, place: Float64s, outward: Float64s, steps: Float64s) -> Float64s:
-    """Light so many steps, (K,), out of places (N, 2), pixels, by vectors of one outwards (N, 2): (K, N)."""
-    x, y = (place[:, axis] + steps[:, None] * outward[:, axis] for axis in (0, 1))
-    return sample_at(plane, x, y)
-
-
 def changes(values: Float64s, count: float) -> Float64s:
     """By how much values at places around a ring, (K, N), change over so many places about each, (K, N)."""
     half = round(0.5 * count)
@@ -47,10 +40,3 @@ def changes(values: Float64s, count: float) -> Float64s:
     window = np.ones((1, 2 * half + 1), np.uint8)
     spread = cv2.dilate(turned, window) - cv2.erode(turned, window)
     return np.asarray(spread[:, half : half + values.shape[-1]], np.float64)
-
-
-def with_sides(values: Float64s, count: float) -> Float64s:
-    """Values at places around a ring, (..., N), with those of half so many places on each side, (..., N, M)."""
-    half = round(0.5 * count)
-    turned = np.take(values, np.arange(-half, values.shape[-1] + half), axis=-1, mode="wrap")
-    return np.lib.stride_tricks.sliding_window_view(turned, 2 * half + 1, axis=-1)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.edge.edge_parts import light_beside, with_sides
 from contour.edge.ring_places import runs_of
-from contour.geometry.arrays import Bools, Bytes, Float64s, median
+from contour.geometry.arrays import Bools, Bytes, Float64s, median, with_sides
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, signed_area
+from contour.image.pixel_sampling import light_beside
 
 # Cell pitches: along the outline, out of it and into the block.
 _SPACING, _AWAY = 0.1, np.arange(0.15, 0.8, 0.1)

@@ -29,6 +29,11 @@ class Stretch:
     straight: bool = True
     """Bridged along a line; False: along an arc or a curve."""
 
+    @property
+    def length_px(self) -> float:
+        """How long it is, pixels."""
+        return self.to_px - self.from_px
+
 
 def bound_with_bridges(bound_px: float | None, stretches: Iterable[Stretch]) -> float | None:
     """A whole outline's 95 % bound, pixels, no less than that of any bridged stretch; None where nobody knows it."""

@@ -67,6 +67,13 @@ def distinct(numbers: NDArray[Any]) -> Indices:
     return np.flatnonzero(np.bincount(numbers.ravel()))
 
 
+def with_sides(values: A, count: float) -> A:
+    """Values at places around a ring, (..., N), with those of half so many places on each side, (..., N, M)."""
+    half = round(0.5 * count)
+    turned = np.take(values, np.arange(-half, values.shape[-1] + half), axis=-1, mode="wrap")
+    return np.lib.stride_tricks.sliding_window_view(turned, 2 * half + 1, axis=-1)  # type: ignore[return-value]
+
+
 def rolled(values: A, by: int) -> A:
     """The values shifted by so many places along the first axis, at most all of them either way, those at the end to
     the other; np.roll takes several times as long for the few values of a ring.

@@ -27,3 +27,9 @@ def sample_at(image: Bytes | Float32s, x: Float64s, y: Float64s) -> Float64s:
     places = flat.reshape(2, -1, _ROW)
     values = cv2.remap(image, places[0], places[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(values, np.float64).ravel()[: x.size].reshape(x.shape)
+
+
+def light_beside(plane: Bytes, place: Float64s, outward: Float64s, steps: Float64s) -> Float64s:
+    """Light so many steps, (K,), out of places (N, 2), pixels, by vectors of one outwards (N, 2): (K, N)."""
+    x, y = (place[:, axis] + steps[:, None] * outward[:, axis] for axis in (0, 1))
+    return sample_at(plane, x, y)

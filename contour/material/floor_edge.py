@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes, Float64s, rolled
+from contour.geometry.arrays import Bools, Bytes, Float64s, with_sides
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import nearest
-from contour.image.pixel_sampling import sample_at
+from contour.image.pixel_sampling import light_beside
 
 # Pitches: places along the ring, and beside each how far in and out and along it light is looked at. Of what lies side
 # by side a quarter is floor, whatever walls stand there.
@@ -23,8 +23,8 @@ _SPACING, _SMOOTHED = 0.25, 0.5
 _OUT, _BESIDE = np.arange(-1.0, 1.01, 0.1), np.linspace(-0.3, 0.3, 5)
 _FLOOR = 1
 _FLOORS, _TABLE = (_OUT > -0.95) & (_OUT < -0.25), _OUT > 0.45
-# Places beside one, and farther on on both sides of it; of those so many must agree within so much, pitches.
-_NEAR, _FLANK = range(-4, 5), range(5, 17)
+# So many places about one, and which of them are near to it; of the others so many must agree within so much, pitches.
+_ABOUT, _NEAR = 32, slice(12, 21)
 _AGREE, _ALIKE, _LEAST_LIGHT = 0.75, 0.21, 6.0
 # A place of the ring, no farther from a point, is the edge's own within that, pitches: a corner that may as well be
 # round, or a rounding that may be a corner, lies half a pitch off.
@@ -32,7 +32,7 @@ _AT, _OWN = 1.0, 0.3
 # A corner turns by more about so many places, none of its witnesses is so near, and floors end so far within it on
 # average, where the table is clearly of another light. Of some 300 right outlines none has one; both corners that were
 # drawn for roundings of a pitch and a half do, and one of eleven for roundings of a pitch.
-_CORNER, _ABOUT, _UNSEEN, _WITHIN, _CLEAR_LIGHT = np.radians(30.0), range(-3, 4), 0.6, -0.39, 20.0
+_CORNER, _ABOUT_CORNER, _UNSEEN, _WITHIN, _CLEAR_LIGHT = np.radians(30.0), 6, 0.6, -0.39, 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,20 +62,16 @@ def floor_edge(light: Bytes, ring: Ring, pitch_px: float, *, bright: bool) -> Fl
     at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
     places, normal = lengths.at(at), lengths.normals(at, _SMOOTHED * pitch_px)
     ends, step = _ends(light, places, normal, pitch_px, bright=bright)
-    around = np.stack([rolled(ends, k) for k in _beside()])
-    usual = np.median(around, axis=0)
-    agree = np.mean(np.abs(around - usual) < _ALIKE, axis=0) >= _AGREE
-    near = np.stack([rolled(ends, k) for k in _NEAR]) - usual
-    own = agree & (np.abs(near).max(axis=0) < _OWN) & (np.abs(usual) < _OWN)
-    heading = normal[:, 0] + 1j * normal[:, 1]
-    turn = np.abs(np.angle(rolled(heading, _ABOUT[0]) * rolled(heading, _ABOUT[-1]).conj()))
-    about = near[[k - _NEAR[0] for k in _ABOUT]].mean(axis=0)
-    within = agree & (turn > _CORNER) & (about < _WITHIN) & (np.abs(step) > _CLEAR_LIGHT)
+    about = with_sides(ends, _ABOUT)
+    beside = np.delete(about, _NEAR, axis=1)
+    usual = np.median(beside, axis=1)
+    agree = np.mean(np.abs(beside - usual[:, None]) < _ALIKE, axis=1) >= _AGREE
+    own = agree & (np.abs(about[:, _NEAR] - usual[:, None]).max(axis=1) < _OWN) & (np.abs(usual) < _OWN)
+    heading = with_sides(normal[:, 0] + 1j * normal[:, 1], _ABOUT_CORNER)
+    corner = np.abs(np.angle(heading[:, 0] * heading[:, -1].conj())) > _CORNER
+    off = with_sides(ends, _ABOUT_CORNER).mean(axis=1) - usual
+    within = agree & corner & (off < _WITHIN) & (np.abs(step) > _CLEAR_LIGHT)
     return FloorEdge(places, own, within)
-
-
-def _beside() -> list[int]:
-    return [*(-k for k in _FLANK), *_FLANK]
 
 
 def _ends(
@@ -84,17 +80,15 @@ def _ends(
     """How far out of places (N, 2) with outward normals (N, 2) floors end, pitches, nan where the table is as light,
     and by how much it is lighter, (N,) each.
     """
-    along = np.stack([-normal[:, 1], normal[:, 0]], axis=1)
-    out = places[:, None] + pitch_px * _OUT[:, None] * normal[:, None]
-    sampled = out[:, :, None] + pitch_px * _BESIDE[:, None] * along[:, None, None]
-    seen = sample_at(light, sampled[..., 0], sampled[..., 1]).reshape(sampled.shape[:3])
-    profile = np.sort(seen if bright else -seen, axis=2)[..., _FLOOR]
+    along = pitch_px * np.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    beside = (places + aside * along for aside in _BESIDE)
+    seen = np.stack([light_beside(light, one, pitch_px * normal, _OUT) for one in beside])
+    profile = np.sort(seen if bright else -seen, axis=0)[_FLOOR]
     floor, table = (
-        np.median([rolled(np.median(profile[:, part], axis=1), k) for k in (*_beside(), *_NEAR)], axis=0)
-        for part in (_FLOORS, _TABLE)
+        np.median(with_sides(np.median(profile[part], axis=0), _ABOUT), axis=1) for part in (_FLOORS, _TABLE)
     )
     step = np.where(np.abs(table - floor) < _LEAST_LIGHT, np.nan, table - floor)
     # From the table inwards, the first light that is nearer to that of floors.
-    like_floor = (profile - floor[:, None]) / step[:, None] < 0.5
-    ends = np.where(like_floor.any(axis=1), _OUT[::-1][like_floor[:, ::-1].argmax(axis=1)], _OUT[0])
+    like_floor = (profile - floor) / step < 0.5
+    ends = np.where(like_floor.any(axis=0), _OUT[::-1][like_floor[::-1].argmax(axis=0)], _OUT[0])
     return np.where(np.isnan(step), np.nan, ends), step

@@ -32,12 +32,16 @@ def in_shadow(light: Float32s, known: Float32s, shade: Float32s, pitch_px: float
     now, then, dim = (
         np.asarray(cv2.resize(one, size, interpolation=cv2.INTER_AREA), np.float32) for one in (light, known, shade)
     )
-    seen, pattern = _pattern(now), _pattern(then)
+    pattern = _pattern(then)
+    patterned = cv2.blur(np.abs(pattern), (window, window)) > _LEAST
+    if not patterned.any():
+        return np.zeros(light.shape, np.bool_)
+    seen = _pattern(now)
     dark = (dim < _DARKER).astype(np.float32)
     # Among what is dark: the table beside it is no shadow.
     same = cv2.blur(np.sign(seen) * np.sign(pattern) * dark, (window, window))
     alike = same / np.maximum(cv2.blur(dark, (window, window)), np.float32(1.0 / window**2))
-    told = (alike > _ALIKE) & (dark > 0) & (cv2.blur(np.abs(pattern), (window, window)) > _LEAST)
+    told = (alike > _ALIKE) & (dark > 0) & patterned
     thin = np.ones((window // 3, window // 3), np.uint8)
     count, pieces = pieces_of(np.asarray(cv2.morphologyEx(told.astype(np.uint8), cv2.MORPH_OPEN, thin), np.uint8), 8)
     area = np.bincount(pieces.ravel(), minlength=count)

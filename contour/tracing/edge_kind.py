@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from contour.edge.edge_parts import light_beside
 from contour.errors import EdgeContradicted
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, densified
 from contour.geometry.segments import BoxTree, distances_to_ring, distances_to_tree
 from contour.geometry.signed_distance import nearest
+from contour.image.pixel_sampling import light_beside
 from contour.material.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
 from contour.walls.cell_scale import CellScale

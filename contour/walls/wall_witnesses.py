@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from contour.geometry.arrays import Bools, Bytes, Float64s, median
 from contour.geometry.signed_distance import nearest
 from contour.image.pixel_grid import pixels_of, samples_of
-from contour.image.pixel_sampling import FULL_SCALE, sample_at
+from contour.image.pixel_sampling import FULL_SCALE, light_beside, sample_at
 from contour.relief.relief import Relief
 from contour.relief.relief_ends import relief_ends
 from contour.walls.cell_scale import CellScale
@@ -180,10 +180,7 @@ def _tips(light: Bytes, ends: _Ends, cells: CellScale, model: EndModel) -> _Witn
     """Fitted wall ends; those too faint or too unsure are left out."""
     fitted = fit_ends(light, ends.tip, ends.axis, ends.normal, model)
     good = (fitted.sigma < _MOST_SIGMA_PX) & (fitted.height > _LEAST_HEIGHT * (model.height or 1.0))
-    clean = ends.straight > 2 * cells.wall_px + 2
-    sigma = np.hypot(np.where(clean, *_MODEL_SIGMA_PX), fitted.sigma)
-    kind = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
-    return _Witnesses(fitted.point, kind, sigma).take(good)
+    return _ends_of(fitted.point, fitted.sigma, ends, cells).take(good)
 
 
 def _relief_tips(relief: Relief, ends: _Ends, cells: CellScale, model: EndModel) -> _Witnesses:
@@ -192,10 +189,14 @@ def _relief_tips(relief: Relief, ends: _Ends, cells: CellScale, model: EndModel)
     good = (fitted.sigma < _MOST_RELIEF_SIGMA_PX) & (fitted.told > _LEAST_TOLD)
     if good.any():
         good &= fitted.height > _LEAST_RELIEF_HEIGHT * median(fitted.height[good])
+    return _ends_of(fitted.point, fitted.sigma, ends, cells).take(good)
+
+
+def _ends_of(point: Float64s, sigma: Float64s, ends: _Ends, cells: CellScale) -> _Witnesses:
+    """Ends of walls fitted to points (N, 2), so unsure by the fit, (N,): clean ones where enough straight wall is."""
     clean = ends.straight > 2 * cells.wall_px + 2
-    sigma = np.hypot(np.where(clean, *_MODEL_SIGMA_PX), fitted.sigma)
     kind = np.where(clean, WitnessKind.CLEAN, WitnessKind.BLUNT).astype(np.int8)
-    return _Witnesses(fitted.point, kind, sigma).take(good)
+    return _Witnesses(point, kind, np.hypot(np.where(clean, *_MODEL_SIGMA_PX), sigma))
 
 
 def _high(relief: Relief, sides: _Witnesses, tips: _Witnesses) -> _Witnesses:
@@ -230,10 +231,9 @@ def _of_shadows(
     """Which outermost points, from which light falls so much, (N,), are of the border of a shadow on a light table."""
     usual = model.height or 1.0
     beyond, within = (
-        sample_at(light, *(place[:, axis, None] + out * normal[:, axis, None] for axis in (0, 1)))
-        for out in (_BEYOND_PX, -_WITHIN_PITCHES * pitch_px)
+        model.sign * light_beside(light, place, normal, out) for out in (_BEYOND_PX, -_WITHIN_PITCHES * pitch_px)
     )
-    lighter = (model.sign * beyond).mean(axis=1) - (model.sign * within).min(axis=1)
+    lighter = beyond.mean(axis=0) - within.min(axis=0)
     return np.asarray((height < _LEAST_FALL * usual) & (lighter > _LIGHTER_BEYOND * usual))
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from contour.edge.edge_parts import changes, with_sides
+from contour.edge.edge_parts import changes
+from contour.geometry.arrays import with_sides
 
 
 def test_changes_are_those_of_the_windows_about_each_place() -> None:

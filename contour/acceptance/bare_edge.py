@@ -41,8 +41,8 @@ _AROUND = 2.6
 _BARE = ((0.25, 0.2, 0.75), (0.45, 0.3, 1.25), (0.45, np.inf, 2.5))
 # Comb goes on beyond an edge where light changes there by so much of what it does in comb, and so many times what it
 # does on the table about; over more cells than specks, swarf and mirrored walls take: of 860 right outlines one has
-# 3.4, the others up to 2.5.
-_FAINT, _OVER_TABLE, _TABLE_OVER, _GOES_ON = 0.2, 3.0, 4.0, 4.0
+# 3.4, the others up to 2.5. Walls are narrower than so much: in the teeth of a hard shadow light changes too.
+_FAINT, _OVER_TABLE, _TABLE_OVER, _GOES_ON, _NARROW = 0.2, 3.0, 4.0, 4.0, 0.5
 # Lines on which the edge goes on on both sides run through so much of it.
 _FLANK = (0.2, 3.0)
 # Filled cells stand so little out of these lines, up to the corner where they meet, or, on a curve, lie so little
@@ -59,13 +59,15 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
     What the trace's evidence tells as hidden or filled is left out.
     """
     light, first = _about(traced, pitch_px)
+    narrow = _narrow(light, pitch_px, dark=traced.polarity == "dark")
     out_px = float(np.sign(signed_area(traced.contour.exterior))) * pitch_px
     bare: list[EdgePart] = []
     beyond: EdgePart | None = None
     for number, ring in enumerate(traced.contour.rings):
         lengths = RingLengths.of(ring)
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
-        changes, apart, lighter, goes_on = _beside(light, RingLengths.of(ring - first), at, out_px)
+        here = RingLengths.of(ring - first)
+        changes, apart, lighter = _beside(light, here, at, out_px)
         judged = ~_known(traced, number, at, _BESIDE * pitch_px)
         for quiet, alike, long in _BARE:
             chosen = judged & (changes < quiet) & (apart < alike)
@@ -76,7 +78,7 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
             if part is not None and part.length_pitches > long:
                 bare.append(part)
         if number == 0:
-            goes_on &= ~_loose_beside(traced, lengths, at, out_px)
+            goes_on = _goes_on(narrow, here, at, out_px) & ~_loose_beside(traced, lengths, at, out_px)
             part = longest_part(judged & goes_on, lengths, at, _SPACING)
             beyond = part if part is not None and part.length_pitches > _GOES_ON else None
     return max(bare, key=lambda one: one.length_pitches) if bare else None, beyond
@@ -90,6 +92,13 @@ def _about(traced: Trace, pitch_px: float) -> tuple[Bytes, Float64s]:
     right, bottom = np.maximum(np.ceil(exterior.max(axis=0) + margin), 0).astype(int).tolist()
     about = traced.light[top : bottom + 1, left : right + 1]
     return np.asarray(cv2.blur(about, (fine, fine)), np.uint8), np.array([left, top], np.float64)
+
+
+def _narrow(light: Bytes, pitch_px: float, *, dark: bool) -> Bytes:
+    """By how much narrow parts, as walls are, are lighter than what lies around them, or darker."""
+    side = max(3, 2 * round(0.5 * _NARROW * pitch_px) + 1)
+    way = cv2.MORPH_BLACKHAT if dark else cv2.MORPH_TOPHAT
+    return np.asarray(cv2.morphologyEx(light, way, np.ones((side, side), np.uint8)), np.uint8)
 
 
 def _known(traced: Trace, ring: int, at: Float64s, beside_px: float) -> Bools:
@@ -126,28 +135,45 @@ def _in_line(out: Float64s) -> bool:
     return bool(most and (ends < _FLUSH).all() and (ends > -_LAST_CELL).all())
 
 
-def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s, Bools, Bools]:
+def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s, Bools]:
     """By how much light changes just within a ring, at lengths along it, and by how much both sides of it differ, of
-    what it changes by farther in, where it is lighter within than the table beyond, and where it changes beyond as in
-    comb, shape (N,) each.
+    what it changes by farther in, and where it is lighter within than the table beyond, shape (N,) each.
 
     `out_px`: the cell pitch, negative where the ring's material lies to the right of its direction.
     """
-    place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * abs(out_px))
-    within, beyond, farther_in, farther_out = (
-        light_beside(light, place, outward, pitches) for pitches in (_WITHIN, _BEYOND, _FARTHER_IN, _FARTHER_OUT)
+    within, beyond, farther_in, farther_out = _rows(
+        light, lengths, at, out_px, (_WITHIN, _BEYOND, _FARTHER_IN, _FARTHER_OUT)
     )
     deeper = _changes(farther_in)
     usual = median(deeper)
     # Comb all along the outline tells how little of it may be left behind a part: under a hand there is none.
     comb = np.maximum(with_sides(deeper, _COMB_OVER / _SPACING).mean(axis=1), max(_COMB_LEAST * usual, 1.0))
-    table = np.maximum(with_sides(_changes(farther_out), _TABLE_OVER / _SPACING).mean(axis=1), 1.0)
-    goes_on = _changes(beyond) > np.maximum(_FAINT * usual, _OVER_TABLE * table)
+    table = _of_table(farther_out)
     changes = _changes(within)
     in_shade = _SHADED * median(deeper / _brightest(farther_in)) * _brightest(within)
     changes = np.where(changes > np.maximum(in_shade, _SHADED_OVER_TABLE * table), comb, changes)
     step = within.mean(axis=0) - beyond.mean(axis=0)
-    return changes / comb, np.abs(step) / comb, step > np.maximum(_LEAST_LIGHTER, _OVER_TABLE * table), goes_on
+    return changes / comb, np.abs(step) / comb, step > np.maximum(_LEAST_LIGHTER, _OVER_TABLE * table)
+
+
+def _goes_on(narrow: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> Bools:
+    """At which lengths along a ring light that is narrow as walls are changes beyond it as in comb, shape (N,)."""
+    beyond, farther_in, farther_out = _rows(narrow, lengths, at, out_px, (_BEYOND, _FARTHER_IN, _FARTHER_OUT))
+    usual = median(_changes(farther_in))
+    return _changes(beyond) > np.maximum(_FAINT * usual, _OVER_TABLE * _of_table(farther_out))
+
+
+def _rows(
+    light: Bytes, lengths: RingLengths, at: Float64s, out_px: float, rows: tuple[Float64s, ...]
+) -> list[Float64s]:
+    """Light beside a ring, at lengths along it, in rows so many pitches out of it, (K, N) each."""
+    place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * abs(out_px))
+    return [light_beside(light, place, outward, pitches) for pitches in rows]
+
+
+def _of_table(farther_out: Float64s) -> Float64s:
+    """What light changes by on the table about each place, or a grey level, (N,)."""
+    return np.maximum(with_sides(_changes(farther_out), _TABLE_OVER / _SPACING).mean(axis=1), 1.0)
 
 
 def _brightest(light: Float64s) -> Float64s:

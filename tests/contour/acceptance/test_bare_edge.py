@@ -191,6 +191,15 @@ def test_a_speck_beside_the_edge_is_no_comb_nor_is_a_table_that_changes_everywhe
     assert beyond(grained, BLOCK) is None
 
 
+@pytest.mark.parametrize("dark", [False, True])
+def test_nor_are_shadows_of_the_other_sign_than_walls(dark: bool) -> None:
+    block = comb(BLOCK, 130, walls=30, cells=200) if dark else comb(BLOCK, 130, walls=230)
+    for y in range(90, 330, 24):
+        cv2.rectangle(block, (401, y), (412, y + 11), 230 if dark else 30, -1)
+    trace = replace(traced(block, BLOCK), polarity="dark" if dark else "bright")
+    assert comb_at_edge(trace, PITCH)[1] is None
+
+
 def test_comb_beyond_a_contour_is_refused_with_its_place_where_the_picture_is_asked() -> None:
     block = traced(comb(BLOCK, 20), BLOCK)
     agrees = Disagreement(0.1, (0.0, 0.0), True, 0.0)

@@ -217,6 +217,14 @@ def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
             "go on beyond it, its walls faint, or something lies against the block there. Look at the overlay; check "
             "light and exposure, and clear the edge.",
         )
+    if traced.trace.outside_px is not None:
+        x, y = traced.trace.outside_px
+        return _disagreement_at(
+            (x, y),
+            shown_px,
+            f"Beside a corner of the contour a wall ends outside of it, near ({x:.0f}, {y:.0f}) px: the corner may lie "
+            "elsewhere. Look at the overlay; take away what lies beside the block, and check light and focus.",
+        )
     return None
 
 

@@ -96,12 +96,14 @@ def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:
     """
     apart = checked.disagreement
     left_out = apart is not None and not apart.claimed and apart.pitches > _LEFT_OUT_PITCHES
-    if checked.trace.evidence is None or not (left_out or checked.bare or checked.beyond or checked.runs_on):
+    outside = checked.trace.outside_px is not None
+    if checked.trace.evidence is None or not (left_out or outside or checked.bare or checked.beyond or checked.runs_on):
         return checked
     if not reflection(checked.trace.light, checked.trace.contour, pitch_px).whole:
         return checked
     kept = replace(apart, pitches=0.0) if apart is not None and left_out else apart
-    return replace(checked, disagreement=kept, bare=None, beyond=None, runs_on=None)
+    trace = replace(checked.trace, outside_px=None)
+    return replace(checked, trace=trace, disagreement=kept, bare=None, beyond=None, runs_on=None)
 
 
 def _checked_edge(

@@ -27,6 +27,8 @@ _LEAST_ENDS_OF_HOLE = 0.2
 # A clean end outside is a chip, or a streak that a wall's side makes, only where the outline meets the ends beside it.
 _FAR_OUTSIDE_PITCHES, _CLEAN_OUTSIDE_PITCHES = 1.0 / 3.0, 1.0 / 6.0
 _IN_A_ROW, _IN_A_ROW_OUTSIDE = 4, 2
+# Beside a corner a single one may be all that shows that it lies elsewhere; along an edge dust makes such.
+_OUTSIDE_CORNER_PITCHES, _AT_CORNER_PITCHES = 0.3, 1.5
 # Of 290 right outlines none lies so far from all that it was laid through where the coarse edge is so deep inside (0.57
 # pitches at most), but at corners of which cells are missing.
 _DEEP_PITCHES, _FAR_PITCHES, _NEAR_PITCHES = 0.6, 1.0, 0.25
@@ -89,6 +91,27 @@ def check_against_evidence(
             )
 
 
+def ends_outside_corners(
+    evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
+) -> Float64s:
+    """Ends of walls that the ring leaves outside beside one of its corners, (K, 2), pixels; `inlier`, (N,), are those
+    that it was laid through.
+    """
+    into_ring = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, evidence.points, rectifier)
+    ends = evidence.kind < WitnessKind.OUTERMOST
+    left = evidence.points[ends & ~inlier & (into_ring < -_OUTSIDE_CORNER_PITCHES * pitch_px)]
+    if not len(left):
+        return left
+    flat = rectified(ring, rectifier)
+    away = nearest(rectified(left, rectifier), flat[_at_corners(RingLengths.of(flat), pitch_px)])
+    return left[away < _AT_CORNER_PITCHES * pitch_px]
+
+
+def _at_corners(lengths: RingLengths, pitch_px: float) -> Bools:
+    """Which vertices of a ring are corners, shape (N,)."""
+    return np.abs(lengths.turns(lengths.starts, _TURN_PITCHES * pitch_px)) > _CORNER
+
+
 def check_unseen(
     evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
 ) -> None:
@@ -107,7 +130,7 @@ def check_unseen(
     points = rectified(evidence.points[inlier], rectifier)
     material = rectified(np.concatenate([evidence.walls.points, evidence.beside]), rectifier)
     near = material[np.abs(depth_inside(ring, material)) < _NEAR_PITCHES * pitch_px] if len(material) else material
-    corners = lengths.starts[np.abs(lengths.turns(lengths.starts, _TURN_PITCHES * pitch_px)) > _CORNER]
+    corners = lengths.starts[_at_corners(lengths, pitch_px)]
     known = np.concatenate([lengths.feet(np.concatenate([points, near])), corners])
     away = np.abs(feet[:, None] - known)
     away = np.minimum(away, lengths.length - away).min(axis=1, initial=lengths.length)

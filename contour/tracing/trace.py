@@ -50,6 +50,7 @@ class Trace:
     `evidence`: what the contour rests on, stretches without gaps along each ring, and `look` what lies about it; None
     where the method does not say.
     `untold_px`: where (x, y) hardly anything seen tells whether it is round or a corner; None where nowhere.
+    `outside_px`: where (x, y) a wall ends outside of it beside a corner; None where nowhere.
     `opening_px`: where (x, y) cells are missing or a hole too small to be traced lies, and how wide, pixels; None where
     nowhere.
     `parted`: the smaller of two parts of it between which no walls lead; None where it is one.
@@ -68,6 +69,7 @@ class Trace:
     evidence: tuple[Stretch, ...] | None = None
     look: TableLook | None = field(default=None, compare=False, repr=False)
     untold_px: tuple[float, float] | None = None
+    outside_px: tuple[float, float] | None = None
     opening_px: tuple[float, float, float] | None = None
     parted: Piece | None = None
 
@@ -75,11 +77,21 @@ class Trace:
         """The trace in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
         others = tuple(piece.moved(x, y) for piece in self.others)
-        untold = None if self.untold_px is None else (self.untold_px[0] + x, self.untold_px[1] + y)
+        untold, outside = (
+            None if place is None else (place[0] + x, place[1] + y) for place in (self.untold_px, self.outside_px)
+        )
         parted = None if self.parted is None else self.parted.moved(x, y)
         opening = None
         if self.opening_px is not None:
             left, top, wide = self.opening_px
             opening = left + x, top + y, wide
         contour = shifted(self.contour, first)
-        return replace(self, contour=contour, others=others, untold_px=untold, opening_px=opening, parted=parted)
+        return replace(
+            self,
+            contour=contour,
+            others=others,
+            untold_px=untold,
+            outside_px=outside,
+            opening_px=opening,
+            parted=parted,
+        )

@@ -44,6 +44,7 @@ from contour.tracing.evidence_check import (
     check_own_ends,
     check_reached,
     check_unseen,
+    ends_outside_corners,
 )
 from contour.tracing.plates import check_sheet, like_plate, plate_edge
 from contour.tracing.touched_edges import touched_cuts
@@ -200,6 +201,8 @@ def _mirrored(
         except NoBlockFound:
             continue
         if is_mirrored(walls, found.contour):
+            # What ends outside is the block's image.
+            found = replace(found, outside_px=None)
             if _sure(found):
                 return found
             best = best or found
@@ -255,12 +258,19 @@ def _cut(
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     lit = light if relief is None else grey(picture)
     untold = next(((float(x), float(y)) for one in visible for x, y in _untold(one, lit, seen)), None)
+    outside = next(((float(x), float(y)) for one in visible for x, y in _outside(one, seen, rectifier)), None)
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
     # What fills cells hides walls, too; but what is dark may be a hole in the block's shade.
     middles = seen.openings[:, :2]
     clear = (look.foreign_at(middles) > 0.0) | ~look.lighter_at(middles)
     opening = next(((float(x), float(y), 2.0 * float(radius)) for x, y, radius in seen.openings[clear]), None)
-    return replace(found, edge="cut", evidence=evidence, look=look, untold_px=untold, opening_px=opening)
+    found = replace(found, untold_px=untold, outside_px=outside, opening_px=opening)
+    return replace(found, edge="cut", evidence=evidence, look=look)
+
+
+def _outside(one: VisibleRing, seen: BlockEvidence, rectifier: Rectifier | None) -> Float64s:
+    """Ends of walls outside of a ring beside its corners, (K, 2), pixels."""
+    return ends_outside_corners(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
 
 
 def _untold(one: VisibleRing, light: Bytes, seen: BlockEvidence) -> Float64s:

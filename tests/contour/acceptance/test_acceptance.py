@@ -210,6 +210,16 @@ def test_a_corner_that_may_as_well_be_round_is_refused_with_its_place() -> None:
     assert len(finding.shown_px) == 1
 
 
+def test_a_wall_that_ends_outside_beside_a_corner_is_refused_with_its_place_where_the_picture_is_asked() -> None:
+    whole = traced(uncertainty_px=1.0, outside_px=(100.0, 80.0)).moved(np.array([20.0, 10.0]))
+    whole = replace(whole, disagreement=Disagreement(0.0, (0.0, 0.0), True, 0.0))
+    (finding,) = judge(GOOD, FRAME, replace(LIMITS, max_disagreement_pitches=2.0), traced=whole)
+    assert finding.refusal == Refusal.METHODS_DISAGREE
+    assert "Beside a corner of the contour a wall ends outside of it, near (120, 90) px" in finding.text
+    assert len(finding.shown_px) == 1
+    assert judge(GOOD, FRAME, replace(LIMITS, max_disagreement_pitches=None), traced=whole) == ()
+
+
 @pytest.mark.parametrize(("unsure_px", "bound_px", "refused"), [(25, 15.0, True), (15, 15.0, False), (60, 11.0, False)])
 def test_a_ring_of_which_a_fifth_is_no_surer_than_half_a_cell_is_refused(
     unsure_px: float, bound_px: float, refused: bool

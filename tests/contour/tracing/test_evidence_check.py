@@ -14,15 +14,20 @@ from contour.errors import NoBlockFound
 from contour.geometry.rings import densified
 from contour.outline.fit import FittedRing
 from contour.relief.relief import Displacement, Relief
+from contour.synthetic import render
 from contour.tracing.evidence_check import (
     check_against_evidence,
     check_against_relief,
     check_on_walls,
     check_own_ends,
     check_unseen,
+    ends_outside_corners,
 )
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
 from contour.walls.wall_evidence import EdgePoints, RingEvidence, WitnessKind
 from tests.support.pictures.outline_scenes import PITCH, along, rectangle, witnesses
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 BLOCK = rectangle(900.0, 600.0)
 
@@ -64,6 +69,33 @@ def test_four_ends_in_a_row_far_off_on_either_side_are_refused_with_their_place(
     x, y = moved[13]
     with pytest.raises(NoBlockFound, match=rf"near \({x:.0f}, {y:.0f}\) px"):
         check_against_evidence(replace(evidence, points=moved), BLOCK, ~off, PITCH, None)
+
+
+@pytest.mark.parametrize("is_hole", [False, True])
+@pytest.mark.parametrize(
+    ("pitches", "aside", "told"), [(0.4, 1.0, True), (0.2, 1.0, False), (-0.4, 1.0, False), (0.4, 3.0, False)]
+)
+def test_an_end_left_outside_beside_a_corner_is_told(pitches: float, aside: float, told: bool, is_hole: bool) -> None:
+    evidence = replace(witnesses(BLOCK, seed=2), is_hole=is_hole)
+    edge = (BLOCK[1] - BLOCK[0]) / np.hypot(*(BLOCK[1] - BLOCK[0]))
+    outward = np.array([edge[1], -edge[0]]) * (-1.0 if is_hole else 1.0)
+    points, on_line = evidence.points.copy(), np.ones(len(evidence.points), np.bool_)
+    points[5] = BLOCK[0] + PITCH * (aside * edge + pitches * outward)
+    on_line[5] = False
+    kind = evidence.kind.copy()
+    kind[5] = WitnessKind.BLUNT
+    seen = replace(evidence, points=points, kind=kind)
+    assert len(ends_outside_corners(seen, BLOCK, on_line, PITCH, None)) == told
+    kind[5] = WitnessKind.OUTERMOST
+    assert not len(ends_outside_corners(seen, BLOCK, on_line, PITCH, None))
+
+
+def test_a_corner_outside_of_which_a_wall_ends_is_refused_though_the_rest_of_the_outline_is_right() -> None:
+    rendered = render(shop_floor_scene("coloured", 2_100_013).scene)
+    found = trace(rendered.picture, TraceSettings())
+    assert found.outside_px is not None
+    corners = rendered.truth_px.exterior
+    assert np.hypot(*(corners - found.outside_px).T).min() < 1.5 * rendered.pitch_px
 
 
 @pytest.mark.parametrize(("share", "refused"), [(0.5, True), (0.7, False)])

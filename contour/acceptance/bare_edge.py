@@ -173,7 +173,7 @@ def _rows(
 
 def _of_table(farther_out: Float64s) -> Float64s:
     """What light changes by on the table about each place, or a grey level, (N,)."""
-    return np.maximum(with_sides(_changes(farther_out), _TABLE_OVER / _SPACING).mean(axis=1), 1.0)
+    return np.asarray(np.maximum(with_sides(_changes(farther_out), _TABLE_OVER / _SPACING).mean(axis=1), 1.0))
 
 
 def _brightest(light: Float64s) -> Float64s:

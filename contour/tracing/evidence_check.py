@@ -109,7 +109,7 @@ def ends_outside_corners(
 
 def _at_corners(lengths: RingLengths, pitch_px: float) -> Bools:
     """Which vertices of a ring are corners, shape (N,)."""
-    return np.abs(lengths.turns(lengths.starts, _TURN_PITCHES * pitch_px)) > _CORNER
+    return np.asarray(np.abs(lengths.turns(lengths.starts, _TURN_PITCHES * pitch_px)) > _CORNER)
 
 
 def check_unseen(

@@ -15,7 +15,7 @@ from contour.acceptance.block_findings import (
     touches_region,
     vague,
 )
-from contour.acceptance.edge_findings import border_goes_on, edge_covered
+from contour.acceptance.edge_findings import border_goes_on, edge_covered, line_at_edge
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.findings import Finding, Limits, Refusal
 from contour.acceptance.picture_findings import alike_table, badly_seen, useless_picture
@@ -65,7 +65,7 @@ def judge(
     outlines = [trace.contour.exterior] if trace else [polygon.pixels.exterior]
     nothing = [finding for finding in (no_walls(traced, limits.quality), no_comb(traced)) if finding]
     judged = None if limits.max_disagreement_pitches is None else traced
-    covered = edge_covered(trace, to_mm, limits) or border_goes_on(judged, to_mm)
+    covered = edge_covered(trace, to_mm, limits) or border_goes_on(judged, to_mm) or line_at_edge(judged, to_mm)
     findings = [
         *badly_seen(traced, limits.quality),
         alike_table(traced),

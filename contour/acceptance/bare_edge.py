@@ -13,6 +13,7 @@ import numpy as np
 
 from contour.edge.edge_parts import EdgePart, changes, longest_part
 from contour.edge.ring_places import runs_of
+from contour.edge.stretches import hidden_or_filled
 from contour.geometry.arrays import Bools, Bytes, Float64s, median, with_sides
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import signed_area
@@ -68,7 +69,7 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
         here = RingLengths.of(ring - first)
         changes, apart, lighter = _beside(light, here, at, out_px)
-        judged = ~_known(traced, number, at, _BESIDE * pitch_px)
+        judged = ~hidden_or_filled(traced.evidence or (), number, at, _BESIDE * pitch_px)
         for quiet, alike, long in _BARE:
             chosen = judged & (changes < quiet) & (apart < alike)
             for run in runs_of(chosen) if chosen.any() else []:
@@ -99,13 +100,6 @@ def _narrow(light: Bytes, pitch_px: float, *, dark: bool) -> Bytes:
     side = max(3, 2 * round(0.5 * _NARROW * pitch_px) + 1)
     way = cv2.MORPH_BLACKHAT if dark else cv2.MORPH_TOPHAT
     return np.asarray(cv2.morphologyEx(light, way, np.ones((side, side), np.uint8)), np.uint8)
-
-
-def _known(traced: Trace, ring: int, at: Float64s, beside_px: float) -> Bools:
-    """Which lengths along a ring lie where the edge is hidden or filled, or beside that, shape (N,)."""
-    told = [one for one in traced.evidence or () if one.ring == ring and (one.state != "seen" or one.by is not None)]
-    within = [(at > one.from_px - beside_px) & (at < one.to_px + beside_px) for one in told]
-    return np.asarray(np.any(within, axis=0) if within else np.zeros(at.shape, np.bool_))
 
 
 def _loose_beside(traced: Trace, lengths: RingLengths, at: Float64s, out_px: float) -> Bools:

@@ -11,6 +11,7 @@ import numpy as np
 from contour.acceptance.findings import SHOWN_PITCHES, Finding, Limits, Refusal, around, edge_of
 from contour.acceptance.sent_evidence import ToMillimetres
 from contour.acceptance.trace_check import CheckedTrace
+from contour.edge.edge_parts import EdgePart
 from contour.edge.stretches import Stretch
 from contour.geometry.ring_lengths import RingLengths
 from contour.tracing.trace import Trace
@@ -88,17 +89,40 @@ def border_goes_on(traced: CheckedTrace | None, to_mm: ToMillimetres | None) -> 
     """An edge of the outline that goes on past its corner as a border on the table."""
     if traced is None or traced.runs_on is None:
         return None
-    x, y = traced.runs_on.place_px
-    place = f"({x:.0f}, {y:.0f}) px"
-    if to_mm is not None:
-        x_mm, y_mm = to_mm(np.array([[x, y]]))[0]
-        place = f"{place}, ({x_mm:.1f}, {y_mm:.1f}) mm"
-    return Finding(
-        Refusal.EDGE_COVERED,
-        f"An edge of the contour goes on past its corner near {place} as a border on the table: walls may end there "
-        "because something lies over them. Take it away, or turn the block off lines on the table.",
-        (around(x, y, SHOWN_PITCHES * (traced.trace.pitch_px or 0.0)),),
+    return _covered_at(
+        traced.runs_on,
+        traced.trace,
+        f"An edge of the contour goes on past its corner near {_place(traced.runs_on, to_mm)} as a border on the "
+        "table: walls may end there because something lies over them. Take it away, or turn the block off lines on the "
+        "table.",
     )
+
+
+def line_at_edge(traced: CheckedTrace | None, to_mm: ToMillimetres | None) -> Finding | None:
+    """A line along the outline that is none of the block's walls."""
+    if traced is None or traced.trace.wide is None:
+        return None
+    return _covered_at(
+        traced.trace.wide,
+        traced.trace,
+        f"Along the contour near {_place(traced.trace.wide, to_mm)} runs a line that is wider than walls: ink, tape or "
+        "a cable may lie at the edge. Clear the edge, and the table beside it.",
+    )
+
+
+def _place(part: EdgePart, to_mm: ToMillimetres | None) -> str:
+    """Where the middle of a part of an edge lies, in pixels, and in millimetres where they are known."""
+    x, y = part.place_px
+    place = f"({x:.0f}, {y:.0f}) px"
+    if to_mm is None:
+        return place
+    x_mm, y_mm = to_mm(np.array([[x, y]]))[0]
+    return f"{place}, ({x_mm:.1f}, {y_mm:.1f}) mm"
+
+
+def _covered_at(part: EdgePart, trace: Trace, text: str) -> Finding:
+    """What may cover the edge along a part of it."""
+    return Finding(Refusal.EDGE_COVERED, text, (around(*part.place_px, SHOWN_PITCHES * (trace.pitch_px or 0.0)),))
 
 
 def _hidden_runs(traced: Trace, evidence: Sequence[Stretch], to_mm: ToMillimetres | None) -> list[_Run]:

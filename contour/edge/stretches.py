@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
+
+from contour.geometry.arrays import Bools, Float64s
 
 State = Literal["seen", "bridged", "covered"]
 Hider = Literal["object", "compound", "ink", "glare"]
@@ -40,3 +44,10 @@ def bound_with_bridges(bound_px: float | None, stretches: Iterable[Stretch]) -> 
     if bound_px is None:
         return None
     return max(bound_px, *(stretch.bound_px for stretch in stretches if stretch.state == "bridged"), 0.0)
+
+
+def hidden_or_filled(evidence: Sequence[Stretch], ring: int, at: Float64s, beside_px: float) -> Bools:
+    """Which lengths along a ring, (N,), lie where its edge is hidden or filled, or so near to that, shape (N,)."""
+    told = [one for one in evidence if one.ring == ring and (one.state != "seen" or one.by is not None)]
+    within = [(at > one.from_px - beside_px) & (at < one.to_px + beside_px) for one in told]
+    return np.asarray(np.any(within, axis=0) if within else np.zeros(at.shape, np.bool_))

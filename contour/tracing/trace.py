@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from contour.edge.edge_parts import EdgePart
 from contour.edge.stretches import Stretch
 from contour.edge.table_look import TableLook
 from contour.geometry.arrays import Bytes, Float64s
@@ -53,6 +54,7 @@ class Trace:
     `outside_px`: where (x, y) a wall ends outside of it beside a corner; None where nowhere.
     `opening_px`: where (x, y) cells are missing or a hole too small to be traced lies, and how wide, pixels; None where
     nowhere.
+    `wide`: the longest line along it that is wider than walls; None where there is none.
     `parted`: the smaller of two parts of it between which no walls lead; None where it is one.
     """
 
@@ -71,6 +73,7 @@ class Trace:
     untold_px: tuple[float, float] | None = None
     outside_px: tuple[float, float] | None = None
     opening_px: tuple[float, float, float] | None = None
+    wide: EdgePart | None = None
     parted: Piece | None = None
 
     def moved(self, first: Float64s) -> Trace:
@@ -93,5 +96,6 @@ class Trace:
             untold_px=untold,
             outside_px=outside,
             opening_px=opening,
+            wide=None if self.wide is None else self.wide.moved(x, y),
             parted=parted,
         )

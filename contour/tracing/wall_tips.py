@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from contour.edge.edge_evidence import ring_evidence
+from contour.edge.edge_parts import EdgePart
 from contour.edge.mirrored_block import is_mirrored, mirrored_block
 from contour.edge.open_cells import without_open_cells
 from contour.edge.table_look import TableLook, table_look
@@ -49,6 +50,7 @@ from contour.tracing.evidence_check import (
 from contour.tracing.plates import check_sheet, like_plate, plate_edge
 from contour.tracing.touched_edges import touched_cuts
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
+from contour.tracing.wide_lines import wide_line
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import Piece, pieces_beside, with_earlier
@@ -133,7 +135,7 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
             check_sheet(solid.edge, found.contour, seen.pitch_px)
         if promise == "auto" and plate is None and kind is None:
             solid.check_fine(seen, found.contour)
-        return replace(found, parted=parted_by_seam(walls, seen))
+        return replace(found, parted=parted_by_seam(walls, seen), wide=_wide(found, walls))
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
         if kind is None and promise != "cut" and plate is None:
@@ -142,6 +144,14 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
             error.edge = "cut"
             raise
         return closed
+
+
+def _wide(found: Trace, walls: SeenWalls) -> EdgePart | None:
+    """The longest line along a cut outline that is wider than its walls."""
+    if found.evidence is None or found.pitch_px is None:
+        return None
+    sizes = {"pitch_px": found.pitch_px, "wall_px": walls.cells.wall_px}
+    return wide_line(walls.mask.mask, found.contour, found.evidence, **sizes, scale=walls.scale)
 
 
 def _cut_or_mirrored(

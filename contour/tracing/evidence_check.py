@@ -21,9 +21,9 @@ from contour.walls.wall_evidence import RingEvidence, WitnessKind
 _FAR_OFF_PITCHES = 0.5
 # Of 137 right rings 0.71 of the witnesses lie on the one with fewest; of a square hole that was drawn round 0.5.
 _LEAST_ON_RING = 0.58
-# Of what witnesses 82 cut holes 0.38 at least are ends of walls; along dark compound, with whole cells around, 0.06 to
-# 0.25.
-_LEAST_ENDS_OF_HOLE = 0.3
+# Of what witnesses 82 cut holes 0.38 at least are ends of walls, of sheets with wide webs 0.26; along dark compound
+# with whole cells around 0.06, and once 0.25.
+_LEAST_ENDS_OF_HOLE = 0.2
 # Cells are lost, and leave ends inside; but nothing puts two ends side by side outside of a block: one may be a chip.
 # A clean end outside is a chip, or a streak that a wall's side makes, only where the outline meets the ends beside it.
 _FAR_OUTSIDE_PITCHES, _CLEAN_OUTSIDE_PITCHES = 1.0 / 3.0, 1.0 / 6.0

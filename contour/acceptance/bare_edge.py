@@ -42,7 +42,7 @@ _AROUND = 2.6
 _BARE = ((0.25, 0.2, 0.75), (0.45, 0.3, 1.25), (0.45, np.inf, 2.5))
 # Comb goes on beyond an edge where light changes there by so much of what it does in comb, and so many times what it
 # does on the table about; over more cells than specks, swarf and mirrored walls take: of 860 right outlines one has
-# 3.4, the others up to 2.5. Walls are narrower than so much: in the teeth of a hard shadow light changes too.
+# 3.4, the others up to 2.5. Walls are narrower than so much; light changes at wide shadows, too.
 _FAINT, _OVER_TABLE, _TABLE_OVER, _GOES_ON, _NARROW = 0.2, 3.0, 4.0, 4.0, 0.5
 # Lines on which the edge goes on on both sides run through so much of it.
 _FLANK = (0.2, 3.0)
@@ -67,8 +67,8 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
     for number, ring in enumerate(traced.contour.rings):
         lengths = RingLengths.of(ring)
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
-        here = RingLengths.of(ring - first)
-        changes, apart, lighter = _beside(light, here, at, out_px)
+        place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * pitch_px)
+        changes, apart, lighter = _beside(light, place - first, outward)
         judged = ~hidden_or_filled(traced.evidence or (), number, at, _BESIDE * pitch_px)
         for quiet, alike, long in _BARE:
             chosen = judged & (changes < quiet) & (apart < alike)
@@ -79,7 +79,7 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
             if part is not None and part.length_pitches > long:
                 bare.append(part)
         if number == 0:
-            goes_on = _goes_on(narrow, here, at, out_px) & ~_loose_beside(traced, lengths, at, out_px)
+            goes_on = _goes_on(narrow, place - first, outward) & ~_loose_beside(traced, place, outward)
             part = longest_part(judged & goes_on, lengths, at, _SPACING)
             beyond = part if part is not None and part.length_pitches > _GOES_ON else None
     return max(bare, key=lambda one: one.length_pitches) if bare else None, beyond
@@ -102,11 +102,10 @@ def _narrow(light: Bytes, pitch_px: float, *, dark: bool) -> Bytes:
     return np.asarray(cv2.morphologyEx(light, way, np.ones((side, side), np.uint8)), np.uint8)
 
 
-def _loose_beside(traced: Trace, lengths: RingLengths, at: Float64s, out_px: float) -> Bools:
-    """At which lengths along a ring pieces that were told from the block lie beyond it or within a cell of there."""
+def _loose_beside(traced: Trace, place: Float64s, outward: Float64s) -> Bools:
+    """At which places along a ring pieces that were told from the block lie beyond it or within a cell of there."""
     if traced.look is None:
-        return np.zeros(at.shape, np.bool_)
-    place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * abs(out_px))
+        return np.zeros(len(place), np.bool_)
     there = np.any([traced.look.loose_at(place + pitches * outward) for pitches in _BEYOND], axis=0)
     return np.asarray(with_sides(there, _CELL / _SPACING).any(axis=1))
 
@@ -129,14 +128,13 @@ def _in_line(out: Float64s) -> bool:
     return bool(most and (ends < _FLUSH).all() and (ends > -_LAST_CELL).all())
 
 
-def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> tuple[Float64s, Float64s, Bools]:
-    """By how much light changes just within a ring, at lengths along it, and by how much both sides of it differ, of
-    what it changes by farther in, and where it is lighter within than the table beyond, shape (N,) each.
-
-    `out_px`: the cell pitch, negative where the ring's material lies to the right of its direction.
+def _beside(light: Bytes, place: Float64s, outward: Float64s) -> tuple[Float64s, Float64s, Bools]:
+    """By how much light changes just within places along a ring, (N, 2), with vectors of a pitch outwards, and by how
+    much both sides of it differ, of what it changes by farther in, and where it is lighter within than the table
+    beyond, shape (N,) each.
     """
-    within, beyond, farther_in, farther_out = _rows(
-        light, lengths, at, out_px, (_WITHIN, _BEYOND, _FARTHER_IN, _FARTHER_OUT)
+    within, beyond, farther_in, farther_out = (
+        light_beside(light, place, outward, pitches) for pitches in (_WITHIN, _BEYOND, _FARTHER_IN, _FARTHER_OUT)
     )
     deeper = _changes(farther_in)
     usual = median(deeper)
@@ -150,19 +148,13 @@ def _beside(light: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> 
     return changes / comb, np.abs(step) / comb, step > np.maximum(_LEAST_LIGHTER, _OVER_TABLE * table)
 
 
-def _goes_on(narrow: Bytes, lengths: RingLengths, at: Float64s, out_px: float) -> Bools:
-    """At which lengths along a ring light that is narrow as walls are changes beyond it as in comb, shape (N,)."""
-    beyond, farther_in, farther_out = _rows(narrow, lengths, at, out_px, (_BEYOND, _FARTHER_IN, _FARTHER_OUT))
+def _goes_on(narrow: Bytes, place: Float64s, outward: Float64s) -> Bools:
+    """At which places along a ring light that is narrow as walls are changes beyond it as in comb, shape (N,)."""
+    beyond, farther_in, farther_out = (
+        light_beside(narrow, place, outward, pitches) for pitches in (_BEYOND, _FARTHER_IN, _FARTHER_OUT)
+    )
     usual = median(_changes(farther_in))
     return _changes(beyond) > np.maximum(_FAINT * usual, _OVER_TABLE * _of_table(farther_out))
-
-
-def _rows(
-    light: Bytes, lengths: RingLengths, at: Float64s, out_px: float, rows: tuple[Float64s, ...]
-) -> list[Float64s]:
-    """Light beside a ring, at lengths along it, in rows so many pitches out of it, (K, N) each."""
-    place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * abs(out_px))
-    return [light_beside(light, place, outward, pitches) for pitches in rows]
 
 
 def _of_table(farther_out: Float64s) -> Float64s:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -64,11 +64,9 @@ class _Run:
         """How long it is, and where its middle lies, in pixels, and in millimetres where they are known."""
         number = self.stretches[0].ring
         middle = self.ring.at(np.array([self.stretches[0].from_px + self.length_px / 2]))
-        long, (x, y) = f"{self.length_px:.0f} px", middle[0]
-        place = f"({x:.0f}, {y:.0f}) px"
+        long, place = f"{self.length_px:.0f} px", _place(middle[0], self.to_mm)
         if self.to_mm is not None:
-            x, y = self.to_mm(middle)[0]
-            long, place = f"{self.length_mm:.1f} mm ({long})", f"{place}, ({x:.1f}, {y:.1f}) mm"
+            long = f"{self.length_mm:.1f} mm ({long})"
         return f"{long} of {edge_of(number)} near {place}"
 
 
@@ -92,8 +90,8 @@ def border_goes_on(traced: CheckedTrace | None, to_mm: ToMillimetres | None) -> 
     return _covered_at(
         traced.runs_on,
         traced.trace,
-        f"An edge of the contour goes on past its corner near {_place(traced.runs_on, to_mm)} as a border on the "
-        "table: walls may end there because something lies over them. Take it away, or turn the block off lines on the "
+        f"An edge of the contour goes on past its corner near {_place(traced.runs_on.place_px, to_mm)} as a border on "
+        "the table: walls may end there because something lies over them. Take it away, or turn the block off lines on the "
         "table.",
     )
 
@@ -105,19 +103,19 @@ def line_at_edge(traced: CheckedTrace | None, to_mm: ToMillimetres | None) -> Fi
     return _covered_at(
         traced.trace.wide,
         traced.trace,
-        f"Along the contour near {_place(traced.trace.wide, to_mm)} runs a line that is wider than walls: ink, tape or "
-        "a cable may lie at the edge. Clear the edge, and the table beside it.",
+        f"Along the contour near {_place(traced.trace.wide.place_px, to_mm)} runs a line that is wider than walls: "
+        "ink, tape or a cable may lie at the edge. Clear the edge, and the table beside it.",
     )
 
 
-def _place(part: EdgePart, to_mm: ToMillimetres | None) -> str:
-    """Where the middle of a part of an edge lies, in pixels, and in millimetres where they are known."""
-    x, y = part.place_px
+def _place(place_px: Iterable[float], to_mm: ToMillimetres | None) -> str:
+    """A place (x, y) in pixels, and in millimetres where they are known."""
+    x, y = place_px
     place = f"({x:.0f}, {y:.0f}) px"
     if to_mm is None:
         return place
-    x_mm, y_mm = to_mm(np.array([[x, y]]))[0]
-    return f"{place}, ({x_mm:.1f}, {y_mm:.1f}) mm"
+    x, y = to_mm(np.array([[x, y]]))[0]
+    return f"{place}, ({x:.1f}, {y:.1f}) mm"
 
 
 def _covered_at(part: EdgePart, trace: Trace, text: str) -> Finding:

@@ -98,9 +98,11 @@ def ends_outside_corners(
     """Ends of walls that the ring leaves outside beside one of its corners, (K, 2), pixels; `inlier`, (N,), are those
     that it was laid through.
     """
-    into_ring = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, evidence.points, rectifier)
-    ends = evidence.kind < WitnessKind.OUTERMOST
-    left = evidence.points[ends & ~inlier & (into_ring < -_OUTSIDE_CORNER_PITCHES * pitch_px)]
+    missed = evidence.points[~inlier & (evidence.kind < WitnessKind.OUTERMOST)]
+    if not len(missed):
+        return missed
+    into_ring = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, missed, rectifier)
+    left = missed[into_ring < -_OUTSIDE_CORNER_PITCHES * pitch_px]
     if not len(left):
         return left
     flat = rectified(ring, rectifier)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -150,8 +151,14 @@ def _wide(found: Trace, walls: SeenWalls) -> EdgePart | None:
     """The longest line along a cut outline that is wider than its walls."""
     if found.evidence is None or found.pitch_px is None:
         return None
-    sizes = {"pitch_px": found.pitch_px, "wall_px": walls.cells.wall_px}
-    return wide_line(walls.mask.mask, found.contour, found.evidence, **sizes, scale=walls.scale)
+    return wide_line(
+        walls.mask.mask,
+        found.contour,
+        found.evidence,
+        pitch_px=found.pitch_px,
+        wall_px=walls.cells.wall_px,
+        scale=walls.scale,
+    )
 
 
 def _cut_or_mirrored(
@@ -267,20 +274,30 @@ def _cut(
             check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     lit = light if relief is None else grey(picture)
-    untold = next(((float(x), float(y)) for one in visible for x, y in _untold(one, lit, seen)), None)
-    outside = next(((float(x), float(y)) for one in visible for x, y in _outside(one, seen, rectifier)), None)
+    untold = _first(_untold(one, lit, seen) for one in visible)
+    outside = _first(
+        ends_outside_corners(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
+        for one in visible
+    )
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
     # What fills cells hides walls, too; but what is dark may be a hole in the block's shade.
     middles = seen.openings[:, :2]
     clear = (look.foreign_at(middles) > 0.0) | ~look.lighter_at(middles)
     opening = next(((float(x), float(y), 2.0 * float(radius)) for x, y, radius in seen.openings[clear]), None)
-    found = replace(found, untold_px=untold, outside_px=outside, opening_px=opening)
-    return replace(found, edge="cut", evidence=evidence, look=look)
+    return replace(
+        found,
+        edge="cut",
+        evidence=evidence,
+        look=look,
+        untold_px=untold,
+        outside_px=outside,
+        opening_px=opening,
+    )
 
 
-def _outside(one: VisibleRing, seen: BlockEvidence, rectifier: Rectifier | None) -> Float64s:
-    """Ends of walls outside of a ring beside its corners, (K, 2), pixels."""
-    return ends_outside_corners(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
+def _first(rings: Iterable[Float64s]) -> tuple[float, float] | None:
+    """The first of the places (x, y) told of rings one by one, (K, 2) each; None without any."""
+    return next(((float(x), float(y)) for places in rings for x, y in places), None)
 
 
 def _untold(one: VisibleRing, light: Bytes, seen: BlockEvidence) -> Float64s:

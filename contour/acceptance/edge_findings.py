@@ -91,8 +91,8 @@ def border_goes_on(traced: CheckedTrace | None, to_mm: ToMillimetres | None) -> 
         traced.runs_on,
         traced.trace,
         f"An edge of the contour goes on past its corner near {_place(traced.runs_on.place_px, to_mm)} as a border on "
-        "the table: walls may end there because something lies over them. Take it away, or turn the block off lines on the "
-        "table.",
+        "the table: walls may end there because something lies over them. Take it away, or turn the block off lines on "
+        "the table.",
     )
 
 

@@ -18,6 +18,7 @@ from contour.image.opencv import (
 )
 from contour.image.pixel_grid import averaged, coarse_step, pixels_of
 from contour.walls.coarse_rings import PAD, CoarseBlock, sides, walls_at_frame, with_rings
+from contour.walls.faint_links import FadedWalls
 
 # A disc of 0.72 pitch bridges an open cell (1.15 pitches across its corners) and a wall broken out of it.
 CLOSING_PITCHES = 0.72
@@ -78,19 +79,23 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float, small: Bytes | None
     return with_rings(filled, kept, _strands(walls & (1 - kept), samples), step, samples, leaves=bool(left))
 
 
-def small_openings(block: CoarseBlock, pitch_px: float, scale: int) -> Float64s:
+def small_openings(block: CoarseBlock, light: Bytes, pitch_px: float, scale: int) -> Float64s:
     """The middles x and y of openings between a block's walls that may be holes or missing cells, and radii of discs
-    that fit there, pixels of a picture `scale` times as large as the mask, (K, 3); `pitch_px` in mask pixels.
+    that fit there, pixels of a picture `scale` times as large as the mask and `light`, (K, 3); `pitch_px` in mask
+    pixels. Cells whose walls have faded, but show in `light`, (H, W), uint8, are none.
     """
     away = np.asarray(cv2.distanceTransform(1 - block.walls, cv2.DIST_L2, 5), np.float64) * block.step
     # Told from the middles of samples, the outermost lie half a one within.
     well_within = block.depth > _WELL_WITHIN_PITCHES * pitch_px - 0.5 * block.step
     count, pieces = pieces_of((away > _OPENING_RADIUS_PITCHES * pitch_px) & well_within, 8)
     found = []
+    faded = FadedWalls.of(light, block.step, block.filled, pitch_px / block.step) if count > 1 else None
     for number in range(1, count):
         radius = np.where(pieces == number, away, 0.0)
         row, column = np.unravel_index(radius.argmax(), radius.shape)
-        if radius[row, column] <= _HOLE_RADIUS_PITCHES * pitch_px:
+        if radius[row, column] > _HOLE_RADIUS_PITCHES * pitch_px:
+            continue
+        if faded is None or not faded.in_small(float(column), float(row), float(radius[row, column]) / block.step):
             x, y = pixels_of(np.array([column - PAD, row - PAD], np.float64), block.step * scale)
             found.append((x, y, radius[row, column] * scale))
     return np.array(found, np.float64).reshape(-1, 3)
@@ -172,7 +177,8 @@ def _padded(grid: Bytes, border: int) -> Bytes:
 
 
 def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], radius: float) -> Bytes:
-    """The block with every inner opening filled in which no disc of `radius` fits, or that is as dark as dark walls.
+    """The block with every inner opening filled in which no disc of `radius` fits, that is as dark as dark walls, or in
+    which walls have faded.
 
     Looked into at a slant, black cells show nothing but wall: no mask of walls against cells, and no hole either.
     `seen`: the picture, and its pixels a sample.
@@ -191,6 +197,9 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], ra
             # Lighter than a light block's walls and cells together is the table in a hole, or a lamp's spot on it.
             lighter = half > _LIGHTER_THAN_WALLS * (table - wall) or quarter > _A_QUARTER_LIGHTER * (table - wall)
             opening[number] = table < wall or lighter or table - wall < _LEAST_SHADE
+        faded = FadedWalls.of(*seen, filled, radius / _HOLE_RADIUS_PITCHES)
+        for number in np.flatnonzero(opening):
+            opening[number] = not faded.in_hole(labels == number)
     opening[outside] = True
     return (~opening).astype(np.uint8).take(labels)
 

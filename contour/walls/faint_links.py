@@ -1,21 +1,98 @@
-"""Strands of wall that hang together with the block by walls too faint for the wall mask."""
+"""Walls too faint for the wall mask: those that strands hang on, and those that have faded."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes
+from contour.geometry.arrays import Bools, Bytes, Float32s, median, quantile
 from contour.image.opencv import pieces_and_boxes, within
 from contour.image.pixel_grid import averaged, coarse_step, enlarged
+from contour.walls.coarse_rings import PAD
 
 _COVERAGE = 0.12
 # A wall is 0.58 pitch long: a strand any farther off hangs by more than one faint wall, or is a chip.
 _REACH_PITCHES = 0.7
 # Smaller pieces are specks, larger ones blocks of their own that lie against this one.
 _STRAND_PITCHES = (0.8, 6.0)
+
+# Light differs from its mean over a cell, and changes by that over another. Beside a block as much of the table counts.
+_CHANGE_PITCHES, _ABOUT_PITCHES, _BESIDE_PITCHES = 0.7, 0.9, 2.5
+# Where walls have faded, those about the place have too: at four of five samples up to so far from it light changes by
+# less than this share of what it does in the block. At the borders of 700 holes it does by 0.5 and more.
+_RIM_PITCHES, _MOSTLY, _FADED = 1.0, 0.8, 0.45
+# So far from its border a hole's own walls count no more. There light changes at nine of ten samples by so many times
+# what it does at most places of the table (holes up to 0.9 times), and in a smaller opening somewhere by so many times.
+_CLEAR_PITCHES, _CLEAR_IN_SMALL, _TENTH, _BUSIER, _STANDS_OUT = 0.6, 0.35, 0.1, 1.6, 1.8
+_NEARLY_ALL = 0.98
+
+
+@dataclass(frozen=True, eq=False)
+class FadedWalls:
+    """What light still shows of walls in a block's openings: seen from straight above, or between lamps, they fade.
+
+    change, busy: by how much light differs from its mean over a cell, and how much that is about each sample, grey
+    levels and their squares, on the padded coarse grid, (H, W). filled: 1 in the block. samples: the pitch there.
+    """
+
+    change: Float32s
+    busy: Float32s
+    filled: Bytes
+    samples: float
+
+    @classmethod
+    def of(cls, light: Bytes, step: int, filled: Bytes, samples: float) -> FadedWalls:
+        """Of a picture, (h, w), uint8, with so many pixels a sample."""
+        high, wide = filled.shape[0] - 2 * PAD, filled.shape[1] - 2 * PAD
+        missing = max(0, high * step - light.shape[0]), max(0, wide * step - light.shape[1])
+        even = cv2.copyMakeBorder(light, 0, missing[0], 0, missing[1], cv2.BORDER_REPLICATE)
+        # Not in bytes: walls that have all but gone change it by less than a grey level.
+        mean = np.asarray(cv2.resize(even.astype(np.float32), (wide, high), interpolation=cv2.INTER_AREA), np.float32)
+        cell, about = (2 * round(0.5 * pitches * samples) + 1 for pitches in (_CHANGE_PITCHES, _ABOUT_PITCHES))
+        change = np.abs(mean - np.asarray(cv2.blur(mean, (cell, cell)), np.float32))
+        return cls(
+            _padded(change), _padded(np.asarray(cv2.blur(change**2, (about, about)), np.float32)), filled, samples
+        )
+
+    def in_hole(self, hole: Bools) -> bool:
+        """Whether an opening in the block, (H, W), is none of its holes but cells whose walls have faded."""
+        rim = (self.filled > 0) & (within(hole, _RIM_PITCHES * self.samples) > 0)
+        inner = self.busy[hole & (within(self.filled, _CLEAR_PITCHES * self.samples) == 0)]
+        table = self.busy[self._table()]
+        return bool(
+            self._have_faded(rim)
+            and min(inner.size, table.size)
+            and quantile(inner, _TENTH) > _BUSIER * quantile(table, _MOSTLY)
+        )
+
+    def in_small(self, column: float, row: float, radius: float) -> bool:
+        """Whether cells whose walls have faded lie where a disc of so many samples fits between walls."""
+        rows, columns = np.ogrid[: self.filled.shape[0], : self.filled.shape[1]]
+        away = np.hypot(rows - row, columns - column)
+        inner = self.change[away < max(1.0, radius - _CLEAR_IN_SMALL * self.samples)]
+        table = self.change[self._table()]
+        return bool(
+            self._have_faded((away > radius) & (away < radius + _RIM_PITCHES * self.samples))
+            and table.size
+            and inner.max() > _STANDS_OUT * quantile(table, _NEARLY_ALL)
+        )
+
+    def _have_faded(self, rim: Bools) -> bool:
+        of_block = median(self.busy[self.filled > 0])
+        return bool(rim.any()) and quantile(self.busy[rim], _MOSTLY) < _FADED * of_block
+
+    def _table(self) -> Bools:
+        """The table beside the block."""
+        _, labels = cv2.connectedComponents(1 - self.filled, connectivity=4)
+        away = np.asarray(cv2.distanceTransform(1 - self.filled, cv2.DIST_L2, 5), np.float32) / self.samples
+        return np.asarray((labels == labels[0, 0]) & (away > _CLEAR_PITCHES) & (away < _BESIDE_PITCHES))
+
+
+def _padded(values: cv2.typing.MatLike) -> Float32s:
+    return np.asarray(cv2.copyMakeBorder(values, PAD, PAD, PAD, PAD, cv2.BORDER_REPLICATE), np.float32)
 
 
 def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float, small: Bytes | None = None) -> Bytes:

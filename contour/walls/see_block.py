@@ -132,7 +132,7 @@ def see_block(
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))
     evidence = replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose, mask=seen.mask)
-    return replace(evidence, openings=small_openings(coarse, pitch_px, scale))
+    return replace(evidence, openings=small_openings(coarse, small, pitch_px, scale))
 
 
 def _scale(light: Bytes, cells: CellScale) -> int:

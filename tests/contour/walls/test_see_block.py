@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import cv2
@@ -15,6 +16,7 @@ from contour.synthetic import (
     CameraModel,
     CellGeometry,
     Clutter,
+    Fade,
     Light,
     Material,
     Rendered,
@@ -41,6 +43,10 @@ def camera() -> CameraModel:
 
 
 BLOCK = rectangle((150.0, 112.0), 190.0, 130.0, 9.0)
+
+
+def plain_scene() -> Scene:
+    return Scene(BLOCK, camera(), CellGeometry(pitch_mm=8.0, wall_mm=0.6), table=Table(texture=0.004))
 
 
 @cache
@@ -203,6 +209,21 @@ def test_outermost_walls_of_a_thick_dark_block_are_not_drawn_in_by_the_sides_it_
     ring = seen_in(rendered.picture, "dark").rings[0]
     outermost = ring.points[ring.kind == WitnessKind.OUTERMOST]
     assert abs(np.median(signed_distance(rendered.truth_px, outermost))) < 0.6
+
+
+@pytest.mark.parametrize("size_mm", [10.0, 30.0, 50.0])
+def test_where_walls_fade_there_are_cells_and_no_hole(size_mm: float) -> None:
+    faded = replace(plain_scene(), things=(Fade((150.0, 112.0), 0.92, size_mm),))
+    seen = seen_in(render(faded).picture, "auto")
+    assert (len(seen.rings), len(seen.openings)) == (1, 0)
+
+
+@pytest.mark.parametrize("radius_mm", [11.0, 26.0])
+def test_a_hole_in_faded_walls_stays_one(radius_mm: float) -> None:
+    outline = with_holes(BLOCK, disc_ring((150.0, 112.0), radius_mm))
+    faded = replace(plain_scene(), outline=outline, things=(Fade((130.0, 112.0), 0.9, 30.0),))
+    seen = seen_in(render(faded).picture, "auto")
+    assert [ring.is_hole for ring in seen.rings] == [False, True]
 
 
 def test_an_empty_mask_is_no_block() -> None:

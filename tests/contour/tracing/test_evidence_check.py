@@ -235,6 +235,17 @@ def test_a_short_edge_that_passes_an_end_inside_needs_more_of_its_own(own: int, 
         check_own_ends(seen, fitted, PITCH, None)
 
 
+@pytest.mark.parametrize(("is_hole", "unseen", "refused"), [(True, 0.3, True), (True, 0.1, False), (False, 0.3, False)])
+def test_a_hole_of_which_a_fifth_has_no_ends_may_have_another_shape(
+    is_hole: bool, unseen: float, refused: bool
+) -> None:
+    evidence = replace(witnesses(BLOCK, seed=2), is_hole=is_hole)
+    on_it = np.zeros(len(evidence.points))
+    fitted = FittedRing(BLOCK, on_it == 0.0, on_it, 0.2, unseen, np.full(len(BLOCK), 0.1), 4, np.empty((0, 2)))
+    with pytest.raises(NoBlockFound, match="70 % of the hole") if refused else nullcontext():
+        check_own_ends(evidence, fitted, PITCH, None)
+
+
 @pytest.mark.parametrize(
     ("long", "height", "refused"),
     [(0.8, 1.0, True), (0.8, 0.5, False), (1.2, 0.5, True), (1.2, 0.3, False), (0.2, 1.5, False)],

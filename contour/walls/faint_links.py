@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -60,30 +61,31 @@ class FadedWalls:
     def in_hole(self, hole: Bools) -> bool:
         """Whether an opening in the block, (H, W), is none of its holes but cells whose walls have faded."""
         rim = (self.filled > 0) & (within(hole, _RIM_PITCHES * self.samples) > 0)
+        if not self._have_faded(rim):
+            return False
         inner = self.busy[hole & (within(self.filled, _CLEAR_PITCHES * self.samples) == 0)]
-        table = self.busy[self._table()]
-        return bool(
-            self._have_faded(rim)
-            and min(inner.size, table.size)
-            and quantile(inner, _TENTH) > _BUSIER * quantile(table, _MOSTLY)
-        )
+        table = self.busy[self._table]
+        return min(inner.size, table.size) > 0 and quantile(inner, _TENTH) > _BUSIER * quantile(table, _MOSTLY)
 
     def in_small(self, column: float, row: float, radius: float) -> bool:
         """Whether cells whose walls have faded lie where a disc of so many samples fits between walls."""
         rows, columns = np.ogrid[: self.filled.shape[0], : self.filled.shape[1]]
         away = np.hypot(rows - row, columns - column)
+        if not self._have_faded((away > radius) & (away < radius + _RIM_PITCHES * self.samples)):
+            return False
         inner = self.change[away < max(1.0, radius - _CLEAR_IN_SMALL * self.samples)]
-        table = self.change[self._table()]
-        return bool(
-            self._have_faded((away > radius) & (away < radius + _RIM_PITCHES * self.samples))
-            and table.size
-            and inner.max() > _STANDS_OUT * quantile(table, _NEARLY_ALL)
-        )
+        table = self.change[self._table]
+        return table.size > 0 and float(inner.max()) > _STANDS_OUT * quantile(table, _NEARLY_ALL)
 
     def _have_faded(self, rim: Bools) -> bool:
-        of_block = median(self.busy[self.filled > 0])
-        return bool(rim.any()) and quantile(self.busy[rim], _MOSTLY) < _FADED * of_block
+        return bool(rim.any()) and quantile(self.busy[rim], _MOSTLY) < _FADED * self._of_block
 
+    @cached_property
+    def _of_block(self) -> float:
+        """How busy the block is."""
+        return median(self.busy[self.filled > 0])
+
+    @cached_property
     def _table(self) -> Bools:
         """The table beside the block."""
         _, labels = cv2.connectedComponents(1 - self.filled, connectivity=4)

@@ -40,7 +40,7 @@ _FAR_INSIDE_PITCHES, _FAINTEST, _FAINTEST_IN_HOLES = 3.0, 0.12, 0.06
 _RIM_PITCHES = 1.5
 # A corner is cut off where both turns are more than the first, and together less than the second; and the edges on both
 # sides so long. A piece so wide lies there, so near the tip; the contour is followed so closely.
-_BEVEL, _SIDE_PITCHES, _EVEN_PITCHES = (np.radians(15.0), np.radians(125.0)), 3.0, 0.3
+_BEVEL, _SIDE_PITCHES, _EVEN_PITCHES = (np.radians(15.0), np.radians(125.0)), 1.5, 0.3
 _LEAST_PIECE, _TIP_PITCHES = 0.8, 2.0
 # What a step aside and down counts for in a distance.
 _DIAGONAL = 1.37

@@ -42,6 +42,7 @@ from contour.tracing.edge_kind import (
 from contour.tracing.evidence_check import (
     check_against_evidence,
     check_against_relief,
+    check_corners,
     check_on_walls,
     check_own_ends,
     check_reached,
@@ -117,8 +118,10 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
         return plate
     if plate is not None:
         seen = plate
-    # Webs end all around a sheet that was cut along more than one line, or show no ends.
-    closed, kind = _if_closed(solid, seen) if plate is None and may_be_closed(seen) else (None, None)
+    # Webs end all around a sheet that was cut along more than one line, or show no ends. Nor do fainter walls where
+    # these are left out: a cut border was drawn along its closed cells so.
+    ends_tell = plate is None and not walls.strong
+    closed, kind = _if_closed(solid, seen) if ends_tell and may_be_closed(seen) else (None, None)
     # Where something hides the border no walls end either.
     if kind is not None and (kind != "mixed" or not doubtful(seen.rings[0], look).any()):
         check_promise(promise, kind, traced=closed is not None)
@@ -139,7 +142,7 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
         return replace(found, parted=parted_by_seam(walls, seen), wide=_wide(found, walls))
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
-        if kind is None and promise != "cut" and plate is None:
+        if kind is None and promise != "cut" and ends_tell:
             closed, _ = _if_closed(solid, seen)
         if promise == "cut" or closed is None:
             error.edge = "cut"
@@ -272,6 +275,7 @@ def _cut(
                 check_on_walls(one.evidence, one.fitted.inlier, light, seen.pitch_px)
             check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
             check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
+            check_corners(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     lit = light if relief is None else grey(picture)
     untold = _first(_untold(one, lit, seen) for one in visible)

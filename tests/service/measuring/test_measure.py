@@ -291,6 +291,19 @@ def test_what_lies_over_an_edge_is_not_looked_past_nor_what_few_walls_tell(
     assert asked == looks
 
 
+@pytest.mark.parametrize(
+    ("scene", "reason"),
+    [
+        # A dark cable parts a corner from the block, whose other side is a cell and a half long.
+        (("hand_or_cable", 2_400_004), Reason.METHODS_DISAGREE),
+        # By its high walls alone the cut block has a border that closes its cells.
+        (("compound", 2_400_034), Reason.METHODS_DISAGREE),
+    ],
+)
+def test_outlines_that_were_drawn_wrongly_are_refused(scene: tuple[str, int], reason: Reason) -> None:
+    assert reason in measured(render(shop_floor_scene(*scene).scene)).reasons
+
+
 def test_a_table_without_any_cells_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[TraceSettings] = []
     monkeypatch.setattr(

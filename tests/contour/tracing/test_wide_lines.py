@@ -57,6 +57,13 @@ def test_a_wider_one_over_two_cells_is_told_with_its_length_and_place(long: floa
         assert one.place_px == pytest.approx((800, 400), abs=0.5 * PITCH)
 
 
+def test_where_walls_are_as_wide_all_over_the_block_a_line_as_wide_is_one_of_them() -> None:
+    mask = walls(((400, 168), (400, 232), 9))
+    assert found(np.asarray(cv2.dilate(mask, np.ones((5, 5), np.uint8)), np.uint8)) is not None
+    crossed = [((80 + 16 * step, 80), (80 + 16 * step, 335), 9) for step in range(20)]
+    assert found(walls(((400, 168), (400, 232), 9), *crossed)) is None
+
+
 def test_what_the_evidence_tells_is_left_out() -> None:
     mask = walls(((400, 168), (400, 232), 9))
     length = float(shapely.LinearRing(BLOCK.exterior).length)

@@ -44,9 +44,6 @@ _LONG_AND_LIKE_WALLS = ((0.5, 0.75), (0.9, 0.4))
 # Of 160 right cut lattices and 180 blocks on the shop floor no edge between two corners passes ends so far inside and
 # has as few of its own, which lie no nearer to the edges beside it; but chords of curves do.
 _PASSED_PITCHES, _LONG_PITCHES, _SHARED_PITCHES, _SHARED_SPREADS = 0.25, 1.5, 0.06, 3.0
-# Of 450 right outlines two have an obtuse corner with so few ends on it and as many inside, of nine wrong ones two:
-# along a joint of planks, and along ink.
-_BESIDE_CORNER_PITCHES, _BESIDE_CORNER_INSIDE, _FEW_BESIDE_CORNER, _OBTUSE = 2.5, 0.15, 2, np.radians(75.0)
 # Where walls lie farthest out, light changes by 0.28 of what it does at their ends at least (60 right outlines, in deep
 # shadow, else 0.69) over three of them in a row; along glare that was taken for walls by 0.15.
 _FLAT, _FLAT_IN_A_ROW, _PATCH_PITCHES, _BLUR_PX, _BLUR_REACHES_PX = 0.2, 4, 0.06, 1.0, 3
@@ -183,32 +180,6 @@ def check_own_ends(evidence: RingEvidence, fitted: FittedRing, pitch_px: float, 
             raise NoBlockFound(
                 f"no block found: the outline passes wall ends near ({x:.0f}, {y:.0f}) px inside, along an edge with "
                 f"{len(own)} of its own. Check that nothing lies against the block, and that its edge is in focus"
-            )
-
-
-def check_corners(evidence: RingEvidence, fitted: FittedRing, pitch_px: float, rectifier: Rectifier | None) -> None:
-    """Raise NoBlockFound where an obtuse corner stands out of what was seen: no clean end beside it lies on the ring,
-    and of others no more than lie inside, two or more.
-
-    For rings of which nothing is hidden.
-    """
-    ring, points = rectified(fitted.ring, rectifier), rectified(evidence.points, rectifier)
-    lengths = RingLengths.of(ring)
-    turns = lengths.turns(lengths.starts, _TURN_PITCHES * pitch_px)
-    ends, feet = evidence.kind != WitnessKind.OUTERMOST, lengths.feet(points)
-    passed = ends & ~fitted.inlier & (fitted.residual < -_BESIDE_CORNER_INSIDE * pitch_px)
-    for corner in np.flatnonzero((turns > _CORNER) & (turns < _OBTUSE)):
-        away = np.abs(feet - lengths.starts[corner])
-        beside = np.minimum(away, lengths.length - away) < _BESIDE_CORNER_PITCHES * pitch_px
-        own = beside & ends & fitted.inlier
-        inside = int(np.count_nonzero(beside & passed))
-        clean = np.any(evidence.kind[own] == WitnessKind.CLEAN)
-        if not clean and inside >= max(_FEW_BESIDE_CORNER, int(np.count_nonzero(own))):
-            x, y = fitted.ring[corner]
-            raise NoBlockFound(
-                f"no block found: {inside} wall ends lie inside of the outline beside its corner near ({x:.0f}, "
-                f"{y:.0f}) px, and hardly any on it. Check that nothing lies against the block, and that its edge is "
-                "in focus"
             )
 
 

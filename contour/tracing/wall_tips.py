@@ -42,7 +42,6 @@ from contour.tracing.edge_kind import (
 from contour.tracing.evidence_check import (
     check_against_evidence,
     check_against_relief,
-    check_corners,
     check_on_walls,
     check_own_ends,
     check_reached,
@@ -275,7 +274,6 @@ def _cut(
                 check_on_walls(one.evidence, one.fitted.inlier, light, seen.pitch_px)
             check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
             check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
-            check_corners(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     lit = light if relief is None else grey(picture)
     untold = _first(_untold(one, lit, seen) for one in visible)

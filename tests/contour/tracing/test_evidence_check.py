@@ -18,7 +18,6 @@ from contour.synthetic import render
 from contour.tracing.evidence_check import (
     check_against_evidence,
     check_against_relief,
-    check_corners,
     check_on_walls,
     check_own_ends,
     check_unseen,
@@ -234,30 +233,6 @@ def test_a_short_edge_that_passes_an_end_inside_needs_more_of_its_own(own: int, 
             check_own_ends(seen, fitted, PITCH, None)
     else:
         check_own_ends(seen, fitted, PITCH, None)
-
-
-@pytest.mark.parametrize(
-    ("corners", "kind", "inside", "refused"),
-    [
-        (6, WitnessKind.BLUNT, 3, True),
-        (6, WitnessKind.CLEAN, 3, False),
-        (6, WitnessKind.BLUNT, 1, False),
-        (4, WitnessKind.BLUNT, 3, False),
-    ],
-)
-def test_an_obtuse_corner_that_passes_the_ends_beside_it_is_a_thing_or_a_line_beside_the_block(
-    corners: int, kind: WitnessKind, inside: int, refused: bool
-) -> None:
-    turn = 2.0 * np.pi * np.arange(corners) / corners
-    ring = 300.0 + 12.0 * PITCH * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    seen = witnesses(ring, seed=4)
-    around = np.argsort(np.hypot(*(seen.points - ring[2]).T))[:10]
-    seen.kind[around] = kind
-    residual = np.zeros(len(seen.points))
-    residual[around[:inside]] = -0.3 * PITCH
-    fitted = FittedRing(ring, residual == 0.0, residual, 0.2, 0.0, np.full(corners, 0.1), corners, np.empty((0, 2)))
-    with pytest.raises(NoBlockFound, match="inside of the outline beside its corner") if refused else nullcontext():
-        check_corners(seen, fitted, PITCH, None)
 
 
 @pytest.mark.parametrize(("is_hole", "unseen", "refused"), [(True, 0.3, True), (True, 0.1, False), (False, 0.3, False)])

@@ -5,7 +5,8 @@ Pixel (0, 0) and sample (0, 0) are centres: sample 0 covers pixels 0 to step −
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Sequence
+from typing import TypeVar, cast
 
 import cv2
 import numpy as np
@@ -18,6 +19,7 @@ _BLURRED = (3, 5)
 """Means over so many pixels are had from those about all of them in half the time, and of odd numbers round alike."""
 
 Values = TypeVar("Values", Bytes, Bools, Float32s)
+Grey = TypeVar("Grey", Bytes, Float32s)
 
 
 def coarse_step(pitch_px: float) -> int:
@@ -40,7 +42,14 @@ def fill(mask: Bytes, ring: Float64s, step: int, value: int = 1) -> None:
     cv2.fillPoly(mask, [np.rint(samples_of(ring, step)).astype(np.int32)], value)
 
 
-def averaged(picture: Bytes, step: int, border: int = cv2.BORDER_CONSTANT) -> Bytes:
+def drawn(rings: Sequence[Float64s], shape: tuple[int, ...], step: int) -> Bytes:
+    """A mask of `shape` (h, w) of samples, 1 inside of rings, (N, 2) each, pixels, and outside of those within them."""
+    mask = np.zeros(shape[:2], np.uint8)
+    cv2.fillPoly(mask, [np.rint(samples_of(ring, step)).astype(np.int32) for ring in rings], 1)
+    return mask
+
+
+def averaged(picture: Grey, step: int, border: int = cv2.BORDER_CONSTANT) -> Grey:
     """Mean over the pixels of each sample, (H, W); the last ones are filled up by a border of OpenCV's, constant 0."""
     if step == 1:
         return picture
@@ -55,10 +64,10 @@ def averaged(picture: Bytes, step: int, border: int = cv2.BORDER_CONSTANT) -> By
     return np.vstack(rows)
 
 
-def _filled_averaged(part: Bytes, step: int, border: int) -> Bytes:
+def _filled_averaged(part: Grey, step: int, border: int) -> Grey:
     wide, high = -part.shape[1] % step, -part.shape[0] % step
     even = cv2.copyMakeBorder(part, 0, high, 0, wide, border, value=0) if wide or high else part
-    return _averaged(np.asarray(even, np.uint8), step)
+    return _averaged(cast(Grey, even), step)
 
 
 def whole_averaged(picture: Bytes, step: int) -> Bytes:
@@ -70,11 +79,12 @@ def whole_averaged(picture: Bytes, step: int) -> Bytes:
     return _averaged(picture[: size[1] * step, : size[0] * step], step)
 
 
-def _averaged(even: Bytes, step: int) -> Bytes:
+def _averaged(even: Grey, step: int) -> Grey:
     size = (max(1, even.shape[1] // step), max(1, even.shape[0] // step))
     if step in _BLURRED and min(even.shape[:2]) >= step:
-        return np.ascontiguousarray(cv2.blur(even, (step, step))[step // 2 :: step, step // 2 :: step], np.uint8)
-    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
+        blurred = cv2.blur(even, (step, step))
+        return cast(Grey, np.ascontiguousarray(blurred[step // 2 :: step, step // 2 :: step]))
+    return cast(Grey, cv2.resize(even, size, interpolation=cv2.INTER_AREA))
 
 
 def enlarged(grid: Values, step: int, shape: tuple[int, ...]) -> Values:

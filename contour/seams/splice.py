@@ -6,15 +6,12 @@ there and unlike the table touches both.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, median
-from contour.geometry.rings import Ring
 from contour.image.opencv import pieces_of, within
-from contour.image.pixel_grid import samples_of
+from contour.image.pixel_grid import drawn
 from contour.walls.pieces import STRIP_PITCHES, Piece
 from contour.walls.wall_evidence import BlockEvidence
 
@@ -35,13 +32,13 @@ def spliced(flat: Bools, table: Bools, light: Bytes, seen: BlockEvidence, step: 
         return None
     level = median(light[table])
     samples = seen.pitch_px / step
-    own = _drawn([ring.coarse for ring in seen.rings[:1]], flat.shape, step)
+    own = drawn([ring.coarse for ring in seen.rings[:1]], flat.shape, step)
     reach = _NEAR * samples
     joining, parts = np.zeros_like(flat), np.zeros_like(flat)
     for piece in seen.others:
         if not _is_block(piece, seen.pitch_px, cv2.contourArea(seen.rings[0].coarse.astype(np.float32))):
             continue
-        other = _drawn([piece.outline_px], flat.shape, step)
+        other = drawn([piece.outline_px], flat.shape, step)
         count, between = pieces_of(flat & (own == 0) & (other == 0), 8)
         beside = [
             np.bincount(between[(within(part, reach) > 0) & (part == 0)], minlength=count) for part in (own, other)
@@ -59,10 +56,3 @@ def spliced(flat: Bools, table: Bools, light: Bytes, seen: BlockEvidence, step: 
 def _is_block(piece: Piece, pitch_px: float, area_px2: float) -> bool:
     wide = np.isfinite(piece.width_px) and piece.width_px > STRIP_PITCHES * pitch_px
     return len(piece.outline_px) > 0 and (wide or piece.area_px2 > _LARGE * area_px2)
-
-
-def _drawn(rings: Sequence[Ring], shape: tuple[int, ...], step: int) -> Bytes:
-    """1 inside of rings, pixels, (h, w)."""
-    drawn = np.zeros(shape[:2], np.uint8)
-    cv2.fillPoly(drawn, [np.rint(samples_of(ring, step)).astype(np.int32) for ring in rings], 1)
-    return drawn

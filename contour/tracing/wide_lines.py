@@ -16,7 +16,7 @@ from contour.edge.stretches import Stretch, hidden_or_filled
 from contour.geometry.arrays import Bytes, quantile
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, signed_area
-from contour.image.pixel_grid import samples_of
+from contour.image.pixel_grid import drawn, samples_of
 from contour.image.pixel_sampling import light_beside
 
 # Walls measure wider by less than this where three of them meet, nineteen of twenty places of them by less than 1.2.
@@ -34,10 +34,8 @@ def wide_line(
     """The longest line along a contour, pixels, that is wider than walls in their mask, (h, w), of samples of `scale`
     pixels; None where none is long. What its evidence tells as hidden or filled is left out.
     """
-    deep = np.asarray(cv2.distanceTransform((mask > 0).astype(np.uint8), cv2.DIST_L2, 5), np.float32)
-    block = np.zeros_like(mask)
-    cv2.fillPoly(block, [np.rint(samples_of(ring, scale)).astype(np.int32) for ring in contour.rings], 255)
-    own = deep[(block & mask) > 0]
+    deep = np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, 5), np.float32)
+    own = deep[(drawn(contour.rings, mask.shape, scale) & mask) > 0]
     usual = quantile(own, _NEARLY_ALL) if own.size else 0.0
     wide = np.asarray((deep > max(_WIDER * 0.5 * wall_px / scale, usual)) * np.uint8(_WIDE), np.uint8)
     out_px = float(np.sign(signed_area(contour.exterior))) * pitch_px

@@ -17,7 +17,7 @@ from contour.image.opencv import (
     within,
 )
 from contour.image.pixel_grid import averaged, coarse_step, pixels_of
-from contour.walls.coarse_rings import PAD, CoarseBlock, sides, walls_at_frame, with_rings
+from contour.walls.coarse_rings import PAD, CoarseBlock, padded, sides, walls_at_frame, with_rings
 from contour.walls.faint_links import FadedWalls
 
 # A disc of 0.72 pitch bridges an open cell (1.15 pitches across its corners) and a wall broken out of it.
@@ -62,7 +62,7 @@ def coarse_block(mask: Bytes, light: Bytes, pitch_px: float, small: Bytes | None
     step = coarse_step(pitch_px)
     small = averaged(mask, step) if small is None else small
     walls = (small > 255 * _WALL_COVERAGE).astype(np.uint8)
-    walls = _padded(walls, cv2.BORDER_CONSTANT)
+    walls = padded(walls, cv2.BORDER_CONSTANT)
     samples = pitch_px / step
     pieces = pieces_and_boxes(walls, 8)
     kept = _main_piece(pieces, samples)
@@ -88,14 +88,16 @@ def small_openings(block: CoarseBlock, light: Bytes, pitch_px: float, scale: int
     # Told from the middles of samples, the outermost lie half a one within.
     well_within = block.depth > _WELL_WITHIN_PITCHES * pitch_px - 0.5 * block.step
     count, pieces = pieces_of((away > _OPENING_RADIUS_PITCHES * pitch_px) & well_within, 8)
+    if count == 1:
+        return np.empty((0, 3))
     found = []
-    faded = FadedWalls.of(light, block.step, block.filled, pitch_px / block.step) if count > 1 else None
+    faded = FadedWalls.of(light, block.step, block.filled, pitch_px / block.step)
     for number in range(1, count):
         radius = np.where(pieces == number, away, 0.0)
         row, column = np.unravel_index(radius.argmax(), radius.shape)
         if radius[row, column] > _HOLE_RADIUS_PITCHES * pitch_px:
             continue
-        if faded is None or not faded.in_small(float(column), float(row), float(radius[row, column]) / block.step):
+        if not faded.in_small(float(column), float(row), float(radius[row, column]) / block.step):
             x, y = pixels_of(np.array([column - PAD, row - PAD], np.float64), block.step * scale)
             found.append((x, y, radius[row, column] * scale))
     return np.array(found, np.float64).reshape(-1, 3)
@@ -172,10 +174,6 @@ def _largest(filled: Bytes) -> Bytes:
     return np.asarray(labels == int(np.argmax(area)), np.uint8) if len(area) > 2 else filled
 
 
-def _padded(grid: Bytes, border: int) -> Bytes:
-    return np.asarray(cv2.copyMakeBorder(grid, PAD, PAD, PAD, PAD, border, value=0), np.uint8)
-
-
 def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], radius: float) -> Bytes:
     """The block with every inner opening filled in which no disc of `radius` fits, that is as dark as dark walls, or in
     which walls have faded.
@@ -189,7 +187,7 @@ def _fill_missing_cells(filled: Bytes, walls: Bytes, seen: tuple[Bytes, int], ra
     outside = labels[0, 0]
     opening[[0, outside]] = False
     if opening.any():
-        shade = _padded(averaged(*seen, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
+        shade = padded(averaged(*seen, cv2.BORDER_REPLICATE), cv2.BORDER_REPLICATE)
         table = median_where(shade, labels == outside)
         wall = median_where(shade, walls)
         for number in np.flatnonzero(opening):

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bytes, Float32s, Float64s, Int32s, Int64s, rolled
 from contour.geometry.rings import Ring
-from contour.image.pixel_grid import enlarged, pixels_of, samples_of
+from contour.image.pixel_grid import Grey, enlarged, pixels_of, samples_of
 from contour.image.pixel_sampling import sample_at
 
 PAD = 8
 """Samples of margin around the coarse grid."""
 _FRAME_PX = 2
+
+
+def padded(grid: Grey, border: int) -> Grey:
+    """A grid with its margin, filled by a border of OpenCV's, constant 0."""
+    return cast(Grey, cv2.copyMakeBorder(grid, PAD, PAD, PAD, PAD, border, value=0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float32s, median, quantile
-from contour.image.opencv import pieces_and_boxes, within
+from contour.image.opencv import pieces_and_boxes, pieces_of, within
 from contour.image.pixel_grid import averaged, coarse_step, enlarged
-from contour.walls.coarse_rings import PAD
+from contour.walls.coarse_rings import padded
 
 _COVERAGE = 0.12
 # A wall is 0.58 pitch long: a strand any farther off hangs by more than one faint wall, or is a chip.
@@ -47,16 +47,12 @@ class FadedWalls:
     @classmethod
     def of(cls, light: Bytes, step: int, filled: Bytes, samples: float) -> FadedWalls:
         """Of a picture, (h, w), uint8, with so many pixels a sample."""
-        high, wide = filled.shape[0] - 2 * PAD, filled.shape[1] - 2 * PAD
-        missing = max(0, high * step - light.shape[0]), max(0, wide * step - light.shape[1])
-        even = cv2.copyMakeBorder(light, 0, missing[0], 0, missing[1], cv2.BORDER_REPLICATE)
         # Not in bytes: walls that have all but gone change it by less than a grey level.
-        mean = np.asarray(cv2.resize(even.astype(np.float32), (wide, high), interpolation=cv2.INTER_AREA), np.float32)
+        mean = averaged(light.astype(np.float32), step, cv2.BORDER_REPLICATE)
         cell, about = (2 * round(0.5 * pitches * samples) + 1 for pitches in (_CHANGE_PITCHES, _ABOUT_PITCHES))
         change = np.abs(mean - np.asarray(cv2.blur(mean, (cell, cell)), np.float32))
-        return cls(
-            _padded(change), _padded(np.asarray(cv2.blur(change**2, (about, about)), np.float32)), filled, samples
-        )
+        busy = np.asarray(cv2.blur(change**2, (about, about)), np.float32)
+        return cls(padded(change, cv2.BORDER_REPLICATE), padded(busy, cv2.BORDER_REPLICATE), filled, samples)
 
     def in_hole(self, hole: Bools) -> bool:
         """Whether an opening in the block, (H, W), is none of its holes but cells whose walls have faded."""
@@ -88,13 +84,9 @@ class FadedWalls:
     @cached_property
     def _table(self) -> Bools:
         """The table beside the block."""
-        _, labels = cv2.connectedComponents(1 - self.filled, connectivity=4)
-        away = np.asarray(cv2.distanceTransform(1 - self.filled, cv2.DIST_L2, 5), np.float32) / self.samples
-        return np.asarray((labels == labels[0, 0]) & (away > _CLEAR_PITCHES) & (away < _BESIDE_PITCHES))
-
-
-def _padded(values: cv2.typing.MatLike) -> Float32s:
-    return np.asarray(cv2.copyMakeBorder(values, PAD, PAD, PAD, PAD, cv2.BORDER_REPLICATE), np.float32)
+        _, labels = pieces_of(1 - self.filled, 4)
+        close, near = (within(self.filled, reach * self.samples, 5) > 0 for reach in (_CLEAR_PITCHES, _BESIDE_PITCHES))
+        return np.asarray((labels == labels[0, 0]) & near & ~close)
 
 
 def with_faint_links(mask: Bytes, faint: Callable[[], Bytes], pitch_px: float, small: Bytes | None = None) -> Bytes:

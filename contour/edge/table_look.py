@@ -47,8 +47,8 @@ _BESIDE_PITCHES = 0.6
 _QUIET, _SMOOTH, _GOOD_SHARE = 0.45, 0.3, 0.3
 _MOST = 0.5
 # What fills a hole ends where it is half as light. Pitches into it: its rim, and its middle (or so much of the
-# deepest); how light that rim is. Where light is blown out no shade shows.
-_HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT, _BLOWN_OUT = (0.2, 0.5), (1.0, 0.6), 0.93, 250.0
+# deepest); how light that rim is, and how light where the block plainly shades it. Blown out light shows no shade.
+_HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT, _SHADED_RIM, _BLOWN_OUT = (0.2, 0.5), (1.0, 0.6), 0.93, 0.85, 250.0
 # Shadows, sides of the block and its mirror image make a band beside it that has no room for a disc of this radius, or
 # for few here and there; where walls are lost in a cell or two, the cells are flat.
 _BAND, _LONG_PITCHES = 0.55, 2.0
@@ -140,21 +140,46 @@ class TableLook:
         """Whether a hole is none: most of it is foreign, lighter than the table ever is in a block's shade, and nearly
         as light along its rim as amidst it. A block shades the table along a hole's rim, also where a lamp lights it.
         """
+        inside = _eroded(self._drawn(hole))
+        return self._lit(inside) and not self._rim_light(inside) <= _RIM_LIGHT
+
+    def without_lit_floors(self, holes: Sequence[RingEvidence]) -> TableLook:
+        """The same without what is foreign in holes that show the table under a lamp: it lies wholly within the hole,
+        and the block shades it along the rim.
+        """
+        floors = np.zeros_like(self.foreign)
+        for hole in holes:
+            whole = self._drawn(hole)
+            inside = _eroded(whole)
+            if self._lit(inside) and 0.0 < self._rim_light(inside) < _SHADED_RIM:
+                floors |= whole > 0
+        if not floors.any():
+            return self
+        count, pieces = pieces_of(self.foreign, 8)
+        beyond = np.bincount(pieces[~floors], minlength=count) > 0
+        return self.without(floors & ~beyond.take(pieces))
+
+    def _drawn(self, hole: RingEvidence) -> Bytes:
         drawn = np.zeros(self.foreign.shape[:2], np.uint8)
         fill(drawn, hole.coarse, self.step)
-        inside = cv2.erode(drawn, np.ones((3, 3), np.uint8)) > 0
+        return drawn
+
+    def _lit(self, inside: Bools) -> bool:
+        """Whether most of it is foreign and lighter than the table."""
+        return np.count_nonzero(self.foreign & self.lighter & inside) > _MOST * np.count_nonzero(inside)
+
+    def _rim_light(self, inside: Bools) -> float:
+        """How light the rim of what is lit there is, of its middle; 0 where that is blown out, NaN without room."""
         filled = self.foreign & self.lighter & inside
-        if np.count_nonzero(filled) <= _MOST * np.count_nonzero(inside):
-            return False
         body = (inside & (self.light > 0.5 * median(self.light[filled]))).astype(np.uint8)
         away = cv2.distanceTransform(cv2.morphologyEx(body, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), cv2.DIST_L2, 3)
         deep = np.asarray(away, np.float64) * (self.step / self.pitch_px)
         rim = (deep > _HOLE_RIM[0]) & (deep < _HOLE_RIM[1])
         middle = deep > max(_HOLE_MIDDLE[0], _HOLE_MIDDLE[1] * float(deep.max()))
         if not (rim.any() and middle.any()):
-            return True
+            return np.nan
         amidst = median(self.light[middle])
-        return bool(amidst < _BLOWN_OUT and median(self.light[rim]) > _RIM_LIGHT * amidst)
+        return 0.0 if amidst >= _BLOWN_OUT else median(self.light[rim]) / amidst
 
 
 def beside(look: TableLook) -> float:
@@ -176,7 +201,7 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     slope = _slope(small)
     whole = _drawn(seen.rings[:1], small.shape, step)
     border = _borders(small, slope, (block, whole), samples)
-    inside = cv2.erode(block, np.ones((3, 3), np.uint8)) > 0
+    inside = _eroded(block)
     reach = _CELL_ROOM * samples - _RIM, _GAP * samples
     roomy = deep(1 - border, reach[0])
     room = (roomy & inside) | (deep(1 - border, reach[1]) & ~inside)
@@ -200,7 +225,7 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     shade = light.shade
     shade &= ~_opened(every & shade & (block == 0), _WIDEST_SHADE * samples)
     maps = light.lighter, shade, _away(every, step), mean, loose
-    look = TableLook(table, every, every, step, pitch_px, *maps)
+    look = TableLook(table, every, every, step, pitch_px, *maps).without_lit_floors(seen.rings[1:])
     if mirrored:
         within = foreign & inside
         return replace(look, foreign=within, away=_away(within, step), plain=False)
@@ -248,6 +273,10 @@ def _drawn(rings: Sequence[RingEvidence], shape: tuple[int, ...], step: int) -> 
     for ring in rings:
         fill(block, ring.coarse, step, 0 if ring.is_hole else 1)
     return block
+
+
+def _eroded(part: Bytes) -> Bools:
+    return np.asarray(cv2.erode(part, np.ones((3, 3), np.uint8)) > 0)
 
 
 def _slope(small: Bytes) -> NDArray[np.int16]:

@@ -171,3 +171,15 @@ def test_each_corner_is_one_whatever_the_last_bits(degrees: float) -> None:
     for corners in found:
         assert len(corners) == 2 * len(ring)
         assert np.abs(corners - found[0]).max() < 1e-6
+
+
+def test_grain_of_a_table_is_seldom_taken_for_a_border() -> None:
+    """Grain up to as wide as cells, with nothing on it: of 160 tables 18 had something like a border at a corner."""
+    light, contour = block_on_table()
+    told = 0
+    for seed in range(160):
+        size = (0.3, 0.45, 0.6, 0.9)[seed % 4] * PITCH_PX
+        grain = cv2.GaussianBlur(np.random.default_rng(seed).normal(0, 1, (480, 640)), (0, 0), size)
+        mottled = np.where(light > 100, light, light + 4.0 / grain.std() * grain)
+        told += border_beyond([np.rint(mottled).astype(np.uint8)], contour, PITCH_PX) is not None
+    assert told < 8

@@ -151,7 +151,7 @@ def test_a_hole_with_the_table_in_it_is_one_and_a_filled_one_is_none() -> None:
         assert not look_at(lamp, "holed").fills(hole)
     lit = look_at(partial(lit_by_a_lamp, hole=ring, shade_px=20.0, level=150.0), "holed")
     assert (lit.foreign_at(hole.points) > PITCH).all(), "what the block shades along the rim is the table under a lamp"
-    part = look_at(lambda picture: painted(picture, ring + [0.3 * PITCH, 0.0], 150), "holed")
+    part = look_at(lambda picture: painted(picture, ring + np.array([0.3 * PITCH, 0.0]), 150), "holed")
     assert (part.foreign_at(hole.points) < PITCH).any(), "a thing in a hole lies at its edge"
 
 

@@ -24,7 +24,8 @@ test: install
 # A real kernel's camera: the tests run in a virtual machine that this boots (QEMU and kernel from Debian's packages).
 test-camera: install
 	$(BIN)/python tests/camera_guest/guest.py --timeout 3000 -- env COMBTRACE_CAMERA_GUEST=1 \
-		$(BIN)/python -m pytest tests/camera_guest tests/contracts/test_camera_contract.py -p no:cacheprovider
+		$(BIN)/python -m pytest tests/camera_guest tests/contracts/test_camera_contract.py -p no:cacheprovider \
+		-o faulthandler_timeout=900 -o faulthandler_exit_on_timeout=true
 
 # Contours driven by a real CNC controller, in simulation (Debian's linuxcnc-uspace).
 test-linuxcnc: install

@@ -166,7 +166,7 @@ class TableLook:
 
     def _lit(self, inside: Bools) -> bool:
         """Whether most of it is foreign and lighter than the table."""
-        return np.count_nonzero(self.foreign & self.lighter & inside) > _MOST * np.count_nonzero(inside)
+        return int(np.count_nonzero(self.foreign & self.lighter & inside)) > _MOST * int(np.count_nonzero(inside))
 
     def _rim_light(self, inside: Bools) -> float:
         """How light the rim of what is lit there is, of its middle; 0 where that is blown out, NaN without room."""

@@ -200,15 +200,19 @@ def run(command: list[str], timeout_s: float, memory_mb: int, vivid: str, out: P
                 machine.wait(timeout_s)
             except subprocess.TimeoutExpired:
                 machine.kill()
-                print(f"guest: not done within {timeout_s:g} s", file=sys.stderr)
+                print(f"guest: not done within {timeout_s:g} s; {_end_of_console(shared)}", file=sys.stderr)
                 return TIMED_OUT
             except BaseException:
                 machine.kill()
                 raise
         if status.exists():
             return int(status.read_text(encoding="ascii"))
-        console = (shared / "console").read_text(encoding="utf-8", errors="replace")
-        raise GuestError("it died before it was done; the end of its console:\n" + console[-3000:])
+        raise GuestError(f"it died before it was done; {_end_of_console(shared)}")
+
+
+def _end_of_console(shared: Path) -> str:
+    console = (shared / "console").read_text(encoding="utf-8", errors="replace")
+    return "the end of its console:\n" + console[-3000:]
 
 
 def _handed_on() -> dict[str, str]:

@@ -31,6 +31,7 @@ journal: {path: /var/lib/combtrace/journal.sqlite}
 archive: {path: /var/lib/combtrace/archive, min_free_bytes: 0}
 """
 LOG = Path("/var/log/combtrace")
+BOUND_S = 400.0  # more than a start may take
 DROP_IN = f"""\
 [Unit]
 DefaultDependencies=no
@@ -46,12 +47,17 @@ StandardError=append:{LOG}
 
 def done(*command: str | Path) -> str:
     """What a command says; it must succeed."""
-    found = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    try:
+        found = subprocess.run(
+            [str(part) for part in command], capture_output=True, text=True, check=False, timeout=BOUND_S
+        )
+    except subprocess.TimeoutExpired as hung:
+        pytest.fail(f"{command} hangs: {hung.stdout} {hung.stderr} {LOG.read_text() if LOG.exists() else ''}")
     assert found.returncode == 0, f"{command}: {found.stdout}{found.stderr}"
     return found.stdout.strip()
 
 
-def until(condition: Callable[[], object], what: str, bound_s: float = 300.0) -> None:
+def until(condition: Callable[[], object], what: str, bound_s: float = BOUND_S) -> None:
     give_up_at = time.monotonic() + bound_s
     while not condition():
         assert time.monotonic() < give_up_at, f"no {what}: {LOG.read_text() if LOG.exists() else ''}"

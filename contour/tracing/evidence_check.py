@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, median, rolled
+from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, median, quantile, rolled
 from contour.geometry.rectifier import Rectifier, rectified
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
@@ -35,6 +35,9 @@ _OUTSIDE_CORNER_PITCHES, _AT_CORNER_PITCHES = 0.3, 1.5
 # Of 290 right outlines none lies so far from all that it was laid through where the coarse edge is so deep inside (0.57
 # pitches at most), but at corners of which cells are missing.
 _DEEP_PITCHES, _FAR_PITCHES, _NEAR_PITCHES = 0.6, 1.0, 0.25
+# Over comb light changes within so many pitches each way, or that share of the coarse edge's depth, by more than so many
+# times what it does at most places so far beside the block.
+_CELL_PITCHES, _OF_DEPTH, _BUSIER, _BESIDE_PITCHES, _MOSTLY = 0.4, 0.3, 1.6, 1.5, 0.8
 _CORNER, _TURN_PITCHES = np.radians(35.0), 0.5
 # What stands out of a known table as walls do, and as far along, is one: of 288 outlines one leaves such outside, off
 # by 0.58 of a cell. Beside right ones lie streaks, 0.7 as high as walls at most, and specks, 0.4 pitches long.
@@ -118,13 +121,15 @@ def _at_corners(lengths: RingLengths, pitch_px: float) -> Bools:
 
 
 def check_unseen(
-    evidence: RingEvidence, ring: Ring, inlier: Bools, pitch_px: float, rectifier: Rectifier | None
+    evidence: RingEvidence, ring: Ring, inlier: Bools, light: Bytes, pitch_px: float, rectifier: Rectifier | None
 ) -> None:
     """Raise NoBlockFound where the ring leads over the table: far from all that it was laid through, from other
-    material, and from its corners, with the coarse edge deep inside.
+    material, and from its corners, with the coarse edge deep inside, and light between them as even as beside the
+    block: in shade or glare the coarse edge leaves out cells.
 
     For rings of which nothing is hidden.
     """
+    picture_ring = ring
     ring, coarse = rectified(ring, rectifier), rectified(evidence.coarse, rectifier)
     inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, coarse)
     deep = np.flatnonzero(inside > _DEEP_PITCHES * pitch_px)
@@ -140,6 +145,14 @@ def check_unseen(
     away = np.abs(feet[:, None] - known)
     away = np.minimum(away, lengths.length - away).min(axis=1, initial=lengths.length)
     over = deep[away > _FAR_PITCHES * pitch_px]
+    if len(over):
+        feet = RingLengths.of(picture_ring)
+        between = 0.5 * (evidence.coarse[over] + feet.at(feet.feet(evidence.coarse[over])))
+        beside = evidence.points[inlier] + _BESIDE_PITCHES * pitch_px * evidence.normal[inlier]
+        # Where nothing but the table can lie between both.
+        half = max(1, round(min(_CELL_PITCHES * pitch_px, _OF_DEPTH * float(inside[over].min()))))
+        table = quantile(_changes(light, beside, half), _MOSTLY)
+        over = over[_changes(light, between, half) <= _BUSIER * table]
     if len(over):
         x, y = evidence.coarse[over[inside[over].argmax()]]
         raise NoBlockFound(

@@ -272,7 +272,7 @@ def _cut(
         for one in visible:
             if relief is None:
                 check_on_walls(one.evidence, one.fitted.inlier, light, seen.pitch_px)
-            check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
+            check_unseen(one.evidence, one.fitted.ring, one.fitted.inlier, light, seen.pitch_px, rectifier)
             check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     lit = light if relief is None else grey(picture)

@@ -195,7 +195,9 @@ def test_an_outline_that_cuts_off_the_end_of_an_edge_that_it_was_laid_through_is
 def test_an_outline_far_over_the_table_and_far_from_all_it_was_laid_through_is_refused(
     wide: float, deep: float, refused: bool
 ) -> None:
-    """Across a bay of so many pitches in the first edge; a cell or two that are lost leave no more than that."""
+    """Across a bay of so many pitches in the first edge; a cell or two that are lost leave no more than that. Walls in
+    shade are no table.
+    """
     first, along = BLOCK[0], (BLOCK[1] - BLOCK[0]) / np.hypot(*(BLOCK[1] - BLOCK[0]))
     inwards = np.array([-along[1], along[0]])
     begin, stop = 450.0 - 0.5 * wide * PITCH, 450.0 + 0.5 * wide * PITCH
@@ -205,11 +207,17 @@ def test_an_outline_far_over_the_table_and_far_from_all_it_was_laid_through_is_r
     coarse = densified(np.concatenate([BLOCK[:1], bay, BLOCK[1:]]), 5.0)
     seen = replace(ends.take((at < begin) | (at > stop) | (off > 5.0)), coarse=coarse)
     on_line = np.ones(len(seen.points), np.bool_)
+    table = np.random.default_rng(3).integers(40, 44, (1200, 1600)).astype(np.uint8)
+    shaded = table.copy()
+    shaded[:: int(0.4 * PITCH)] += 20
+    outside = cv2.fillPoly(np.zeros_like(table), [np.rint(BLOCK).astype(np.int32)], 1) == 0
+    shaded[outside] = table[outside]
+    check_unseen(seen, BLOCK, on_line, shaded, PITCH, None)
     if refused:
         with pytest.raises(NoBlockFound, match="leads over the table near"):
-            check_unseen(seen, BLOCK, on_line, PITCH, None)
+            check_unseen(seen, BLOCK, on_line, table, PITCH, None)
     else:
-        check_unseen(seen, BLOCK, on_line, PITCH, None)
+        check_unseen(seen, BLOCK, on_line, table, PITCH, None)
 
 
 @pytest.mark.parametrize(("own", "refused"), [(0, True), (1, True), (2, False)])

@@ -36,6 +36,7 @@ from contour.walls.lightness import light_from_table, wall_light
 from contour.walls.see_block import see_block, see_walls
 from contour.walls.wall_evidence import BlockEvidence, WitnessKind
 from contour.walls.wall_mask import wall_mask
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 
 def camera() -> CameraModel:
@@ -216,6 +217,11 @@ def test_where_walls_fade_there_are_cells_and_no_hole(size_mm: float) -> None:
     faded = replace(plain_scene(), things=(Fade((150.0, 112.0), 0.92, size_mm),))
     seen = seen_in(render(faded).picture, "auto")
     assert (len(seen.rings), len(seen.openings)) == (1, 0)
+
+
+def test_where_glare_drowns_walls_of_the_mask_there_are_cells_and_no_hole() -> None:
+    rendered = render(shop_floor_scene("glare", 2600001, alone=True).scene)
+    assert [ring.is_hole for ring in seen_in(rendered.picture, "auto").rings] == [False]
 
 
 @pytest.mark.parametrize("radius_mm", [11.0, 26.0])

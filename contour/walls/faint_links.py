@@ -29,8 +29,8 @@ _RIM_PITCHES, _MOSTLY, _FADED = 1.0, 0.8, 0.45
 # what it does at most places of the table (holes up to 0.9 times), and in a smaller opening somewhere by so many times.
 _CLEAR_PITCHES, _CLEAR_IN_SMALL, _TENTH, _BUSIER, _STANDS_OUT = 0.6, 0.35, 0.1, 1.6, 1.8
 _NEARLY_ALL = 0.98
-# In glare walls about the place stand out. What changes by so many times what the table does, and at most places by this
-# share of what the block does, is comb all the same: 34 holes have 0.36 at most, things that fill them 0.37.
+# In glare walls about the place stand out. What changes by so many times what the table does, and at most places by
+# this share of what the block does, is comb all the same: 34 holes have 0.36 at most, things that fill them 0.37.
 _FAR_BUSIER, _AS_COMB = 4.0, 0.45
 
 

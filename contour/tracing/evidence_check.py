@@ -129,7 +129,7 @@ def check_unseen(
 
     For rings of which nothing is hidden.
     """
-    picture_ring = ring
+    in_picture = ring
     ring, coarse = rectified(ring, rectifier), rectified(evidence.coarse, rectifier)
     inside = (-1.0 if evidence.is_hole else 1.0) * depth_inside(ring, coarse)
     deep = np.flatnonzero(inside > _DEEP_PITCHES * pitch_px)
@@ -146,8 +146,8 @@ def check_unseen(
     away = np.minimum(away, lengths.length - away).min(axis=1, initial=lengths.length)
     over = deep[away > _FAR_PITCHES * pitch_px]
     if len(over):
-        feet = RingLengths.of(picture_ring)
-        between = 0.5 * (evidence.coarse[over] + feet.at(feet.feet(evidence.coarse[over])))
+        drawn = RingLengths.of(in_picture)
+        between = 0.5 * (evidence.coarse[over] + drawn.at(drawn.feet(evidence.coarse[over])))
         beside = evidence.points[inlier] + _BESIDE_PITCHES * pitch_px * evidence.normal[inlier]
         # Where nothing but the table can lie between both.
         half = max(1, round(min(_CELL_PITCHES * pitch_px, _OF_DEPTH * float(inside[over].min()))))

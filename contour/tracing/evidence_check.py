@@ -36,8 +36,8 @@ _OUTSIDE_CORNER_PITCHES, _AT_CORNER_PITCHES = 0.3, 1.5
 # pitches at most), but at corners of which cells are missing.
 _DEEP_PITCHES, _FAR_PITCHES, _NEAR_PITCHES = 0.6, 1.0, 0.25
 # Over comb light changes within so many pitches each way, or that share of the coarse edge's depth, by more than so
-# many times what it does at most places so far beside the block.
-_CELL_PITCHES, _OF_DEPTH, _BUSIER, _BESIDE_PITCHES, _MOSTLY = 0.4, 0.3, 1.6, 1.5, 0.8
+# many times what it does at most places so far beside the block: by 4.7 and more in shade or glare, over table by 2.0.
+_CELL_PITCHES, _OF_DEPTH, _BUSIER, _BESIDE_PITCHES, _MOSTLY = 0.4, 0.3, 3.0, 1.5, 0.8
 _CORNER, _TURN_PITCHES = np.radians(35.0), 0.5
 # What stands out of a known table as walls do, and as far along, is one: of 288 outlines one leaves such outside, off
 # by 0.58 of a cell. Beside right ones lie streaks, 0.7 as high as walls at most, and specks, 0.4 pitches long.

@@ -141,6 +141,7 @@ class TableLook:
         as light along its rim as amidst it. A block shades the table along a hole's rim, also where a lamp lights it.
         """
         inside = _eroded(self._drawn(hole))
+        # So is what is too narrow to have a middle: NaN is no less.
         return self._lit(inside) and not self._rim_light(inside) <= _RIM_LIGHT
 
     def without_lit_floors(self, holes: Sequence[RingEvidence]) -> TableLook:

@@ -19,7 +19,7 @@ from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour, densified
 from contour.image.opencv import grey
-from contour.image.pixel_grid import fill
+from contour.image.pixel_grid import drawn
 from contour.image.side_by_side import side_by_side
 from contour.narrow_features.feature import NarrowFeature
 from contour.narrow_features.narrow_feature import narrow_feature
@@ -85,8 +85,7 @@ def check_trace(
 
 def _flat(look: TableLook, contour: Contour) -> Bytes:
     """1 where something flat lies that is not the table, on the look's grid; within the contour no shadow is."""
-    block = np.zeros(look.things.shape, np.uint8)
-    fill(block, contour.exterior, look.step)
+    block = drawn([contour.exterior], look.things.shape, look.step)
     return np.asarray(look.lit | (look.things & (block == 0)), np.uint8)
 
 

@@ -10,8 +10,9 @@ thing's, and so is one at both ends of a notch that a sheet's corner leaves: no 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -85,6 +86,29 @@ class _Reach:
     clear: Bools
 
 
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """A plane of light, (H, W). table: makes rays anywhere on the table, which are looked along when asked for."""
+
+    light: Bytes
+    table: Callable[[], _Rays]
+    pitch_px: float
+
+    @cached_property
+    def _on_table(self) -> Float64s:
+        return _sampled(self.light, self.table(), self.pitch_px)
+
+    def usual_step(self, of_part: int) -> float:
+        """What most borders by chance keep below, so many places to a part; 0 where too little of the table shows."""
+        rays = self.table()
+        if len(rays.begin) < _FEWEST_LINES:
+            return 0.0
+        parts = _parts(self._on_table, of_part)
+        clear = np.ones(parts.shape, np.bool_)
+        steps, *_ = _clearest(parts, clear, _middles(_ahead(rays, of_part, self.pitch_px)) / self.pitch_px)
+        return quantile(steps, _DECILE)
+
+
 def border_beyond(
     planes: Sequence[Bytes], contour: Contour, pitch_px: float, *, of_any_light: bool = False
 ) -> EdgePart | None:
@@ -95,31 +119,33 @@ def border_beyond(
     The contour's holes run the other way around than its exterior.
     """
     side = float(np.sign(signed_area(contour.exterior)))
-    table = _rays_on_table(planes[0].shape, contour.exterior, pitch_px)
-    found = [one for ring in contour.rings for one in _borders(planes, ring, side, pitch_px, table, of_any_light)]
+    table = cache(lambda: _rays_on_table(planes[0].shape, contour.exterior, pitch_px))
+    shown = [_Plane(light, table, pitch_px) for light in planes]
+    found = [one for ring in contour.rings for one in _borders(shown, ring, side, pitch_px, of_any_light)]
     if not found:
         return None
     return EdgePart(_SPACING * _PARTS * _OF_PART, max(found)[1])
 
 
 def _borders(
-    planes: Sequence[Bytes], ring: Ring, side: float, pitch_px: float, table: _Rays, of_any_light: bool
+    planes: Sequence[_Plane], ring: Ring, side: float, pitch_px: float, of_any_light: bool
 ) -> list[tuple[float, tuple[float, float]]]:
-    """How far borders past corners of a ring stand out of the noise, and the corners. table: rays anywhere on it."""
+    """How far borders past corners of a ring stand out of the noise, and the corners."""
     rays = _rays(ring, side, pitch_px)
     if not len(rays.begin):
         return []
     hole = float(np.sign(signed_area(ring))) != side
     whole, short = (_reach(rays, ring, each, pitch_px, inside=hole) for each in (_OF_PART, _OF_SHORT_PART))
     found = []
-    for light in planes:
+    for plane in planes:
+        light = plane.light
         sampled = _sampled(light, rays, pitch_px)
-        over, lines = _over(sampled, whole, light, table, pitch_px)
+        over, lines = _over(sampled, whole, plane)
         chosen = over > 1.0
         if chosen.any() and not of_any_light:
             usual = _usual_light(light, ring, side * pitch_px)
             chosen = _of_things(light, rays, over, lines, usual, pitch_px)
-        shorter, lines = _over(sampled, short, light, table, pitch_px)
+        shorter, lines = _over(sampled, short, plane)
         clear = shorter > _SHORT_MORE
         if clear.any():
             outer, inner = _both_sides(light, rays, lines, pitch_px)
@@ -143,23 +169,18 @@ def _ahead(rays: _Rays, of_part: int, pitch_px: float) -> Float64s:
     return np.asarray(rays.begin[:, None] + _SPACING * pitch_px * np.arange(_PARTS * of_part))
 
 
-def _over(
-    sampled: Float64s, reach: _Reach, light: Bytes, table: _Rays, pitch_px: float
-) -> tuple[Float64s, tuple[Float64s, Float64s]]:
+def _over(sampled: Float64s, reach: _Reach, plane: _Plane) -> tuple[Float64s, tuple[Float64s, Float64s]]:
     """How many times the noise, or other borders, the clearest one near each ray is, (R,), with its places ahead and
     out, pixels; less where there are as clear ones anywhere on the table. sampled: light along the rays and farther on.
     """
     of_part = reach.ahead.shape[1] // _PARTS
     parts = _parts(sampled, of_part)
-    step, at, turn, other = _clearest(parts, reach.clear, _middles(reach.ahead) / pitch_px)
+    step, at, turn, other = _clearest(parts, reach.clear, _middles(reach.ahead) / plane.pitch_px)
     noise = np.abs(np.diff(parts, axis=1)).mean(axis=(1, 2))
     over = step / np.maximum(np.maximum(_OVER_OTHERS * other, _OVER_NOISE * noise), _LEAST)
-    if (over > 1.0).any() and len(table.begin) >= _FEWEST_LINES:
-        anywhere = _parts(_sampled(light, table, pitch_px), of_part)
-        clear = np.ones((*anywhere.shape[:2], _PARTS), np.bool_)
-        steps, *_ = _clearest(anywhere, clear, _middles(_ahead(table, of_part, pitch_px)) / pitch_px)
-        over *= np.minimum(step / max(_OVER_TABLE * quantile(steps, _DECILE), _LEAST), 1.0)
-    return over, (reach.ahead, at[:, None] * pitch_px + turn[:, None] * reach.ahead)
+    if (over > 1.0).any():
+        over *= np.minimum(step / max(_OVER_TABLE * plane.usual_step(of_part), _LEAST), 1.0)
+    return over, (reach.ahead, at[:, None] * plane.pitch_px + turn[:, None] * reach.ahead)
 
 
 def _of_things(

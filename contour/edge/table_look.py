@@ -19,7 +19,7 @@ from contour.edge.table_light import table_light
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
 from contour.image import channels
 from contour.image.opencv import deep, pieces_and_boxes, pieces_of, within
-from contour.image.pixel_grid import fill, samples_of, whole_averaged
+from contour.image.pixel_grid import drawn, fill, samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
 
@@ -124,8 +124,7 @@ class TableLook:
         """Where everything is lighter than the table, and neither flat nor walls around dark cells: grain of what fills
         cells.
         """
-        lighter = cv2.erode(self.lighter.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-        return np.asarray(lighter & ~self.table & ~self.things)
+        return np.asarray(_eroded(self.lighter.view(np.uint8)) & ~self.table & ~self.things)
 
     def solid_at(self, points: Float64s) -> Bools:
         """Which points (N, 2), pixels, lie in such grain, shape (N,)."""
@@ -140,9 +139,8 @@ class TableLook:
         """Whether a hole is none: most of it is foreign, lighter than the table ever is in a block's shade, and nearly
         as light along its rim as amidst it. A block shades the table along a hole's rim, also where a lamp lights it.
         """
-        inside = _eroded(self._drawn(hole))
-        # So is what is too narrow to have a middle: NaN is no less.
-        return self._lit(inside) and not self._rim_light(inside) <= _RIM_LIGHT
+        rim = self._rim_light(hole)
+        return rim is not None and rim > _RIM_LIGHT
 
     def without_lit_floors(self, holes: Sequence[RingEvidence]) -> TableLook:
         """The same without what is foreign in holes that show the table under a lamp: it lies wholly within the hole,
@@ -150,35 +148,30 @@ class TableLook:
         """
         floors = np.zeros_like(self.foreign)
         for hole in holes:
-            whole = self._drawn(hole)
-            inside = _eroded(whole)
-            if self._lit(inside) and 0.0 < self._rim_light(inside) < _SHADED_RIM:
-                floors |= whole > 0
+            rim = self._rim_light(hole)
+            if rim is not None and 0.0 < rim < _SHADED_RIM:
+                floors |= drawn([hole.coarse], floors.shape, self.step) > 0
         if not floors.any():
             return self
         count, pieces = pieces_of(self.foreign, 8)
         beyond = np.bincount(pieces[~floors], minlength=count) > 0
         return self.without(floors & ~beyond.take(pieces))
 
-    def _drawn(self, hole: RingEvidence) -> Bytes:
-        drawn = np.zeros(self.foreign.shape[:2], np.uint8)
-        fill(drawn, hole.coarse, self.step)
-        return drawn
-
-    def _lit(self, inside: Bools) -> bool:
-        """Whether most of it is foreign and lighter than the table."""
-        return int(np.count_nonzero(self.foreign & self.lighter & inside)) > _MOST * int(np.count_nonzero(inside))
-
-    def _rim_light(self, inside: Bools) -> float:
-        """How light the rim of what is lit there is, of its middle; 0 where that is blown out, NaN without room."""
+    def _rim_light(self, hole: RingEvidence) -> float | None:
+        """How light the rim of what is lit in a hole is, of its middle; 0 where that is blown out, infinite without
+        room for one. None where not most of the hole is foreign and lighter than the table.
+        """
+        inside = _eroded(drawn([hole.coarse], self.foreign.shape, self.step))
         filled = self.foreign & self.lighter & inside
+        if np.count_nonzero(filled) <= _MOST * np.count_nonzero(inside):
+            return None
         body = (inside & (self.light > 0.5 * median(self.light[filled]))).astype(np.uint8)
         away = cv2.distanceTransform(cv2.morphologyEx(body, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), cv2.DIST_L2, 3)
         deep = np.asarray(away, np.float64) * (self.step / self.pitch_px)
         rim = (deep > _HOLE_RIM[0]) & (deep < _HOLE_RIM[1])
         middle = deep > max(_HOLE_MIDDLE[0], _HOLE_MIDDLE[1] * float(deep.max()))
         if not (rim.any() and middle.any()):
-            return np.nan
+            return np.inf
         amidst = median(self.light[middle])
         return 0.0 if amidst >= _BLOWN_OUT else median(self.light[rim]) / amidst
 

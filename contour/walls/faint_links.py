@@ -59,14 +59,16 @@ class FadedWalls:
 
     def in_hole(self, hole: Bools) -> bool:
         """Whether an opening in the block, (H, W), is none of its holes but cells whose walls have faded."""
-        rim = (self.filled > 0) & (within(hole, _RIM_PITCHES * self.samples) > 0)
         inner = self.busy[hole & (within(self.filled, _CLEAR_PITCHES * self.samples) == 0)]
         table = self.busy[self._table]
         if min(inner.size, table.size) == 0:
             return False
         over = quantile(inner, _TENTH) / max(quantile(table, _MOSTLY), 1e-9)
-        as_comb = over > _FAR_BUSIER and median(inner) > _AS_COMB * self._of_block
-        return as_comb or (over > _BUSIER and self._have_faded(rim))
+        if over <= _BUSIER:
+            return False
+        if over > _FAR_BUSIER and median(inner) > _AS_COMB * self._of_block:
+            return True
+        return self._have_faded((self.filled > 0) & (within(hole, _RIM_PITCHES * self.samples) > 0))
 
     def in_small(self, column: float, row: float, radius: float) -> bool:
         """Whether cells whose walls have faded lie where a disc of so many samples fits between walls."""

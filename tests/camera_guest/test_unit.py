@@ -57,7 +57,7 @@ def done(*command: str | Path) -> str:
     return found.stdout.strip()
 
 
-def until(condition: Callable[[], object], what: str, bound_s: float = BOUND_S) -> None:
+def until(condition: Callable[[], object], what: str, bound_s: float = 300.0) -> None:
     give_up_at = time.monotonic() + bound_s
     while not condition():
         assert time.monotonic() < give_up_at, f"no {what}: {LOG.read_text() if LOG.exists() else ''}"

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ from benchmarks.page_section import put_section, table
 from contour.edge.visible_edge import VisibleRing, visible_rings
 from contour.errors import ContourError
 from contour.geometry.agreement import distances_to, rectified_edges
-from contour.outline.uncertainty import LEAST_PX, Coefficients, Stretches, bound, ring_stretches
+from contour.outline.uncertainty import LEAST_PX, Coefficients, Stretches, ring_stretches
 from contour.synthetic import Rendered, render
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
@@ -147,14 +146,12 @@ def _named(name: str) -> BenchScene:
 
 def _joined(seen: BlockEvidence, rings: Sequence[VisibleRing]) -> Stretches:
     """The stretches of all rings."""
-    each = [
-        ring_stretches(ring.evidence, ring.fitted, pitch_px=seen.pitch_px, blur_px=seen.blur_px, clipped=seen.clipped)
-        for ring in rings
-    ]
-    whole: dict[str, Any] = {
-        part.name: np.concatenate([getattr(one, part.name) for one in each]) for part in fields(Stretches)
-    }
-    return Stretches(**whole)
+    return Stretches.joined(
+        [
+            ring_stretches(one.evidence, one.fitted, pitch_px=seen.pitch_px, blur_px=seen.blur_px, clipped=seen.clipped)
+            for one in rings
+        ]
+    )
 
 
 def numbers(cases: Sequence[Case]) -> list[tuple[str, str, str, bool]]:
@@ -269,7 +266,7 @@ def _scaled(one: Coefficients, factors: Sequence[float]) -> Coefficients:
 def _judged(one: Coefficients, groups: Sequence[Sequence[Case]]) -> tuple[float, float]:
     """How bad (less is better), and the factor that makes the bounds hold in `COVERED` of each group's cases."""
     true = [np.array([case.true_px for case in cases]) for cases in groups]
-    stated = [np.array([bound(case.stretches.sigma(one), case.stretches.length) for case in cases]) for cases in groups]
+    stated = [np.array([case.stretches.bound(one) for case in cases]) for cases in groups]
     factor = max(
         1.0 / float(np.quantile(bounds / errors, 1.0 - covered))
         for bounds, errors, covered in zip(stated, true, COVERED, strict=True)

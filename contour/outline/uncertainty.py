@@ -10,7 +10,7 @@ variance that is a sum of squares:
 - gap: where no witness lies for more than a pitch, the outline is a guess that grows with the gap, if slowly: most gaps
   lie in straight edges;
 - misfit: neighbours in a row that lie off on one side, farther than scatter has them, say that the outline has left
-  the cut; and a corner of which ends on both sides lie inside may be a round one;
+  the cut; and a corner of which ends on both sides lie inside may be a round one, though most are none;
 - outside: a wall end beyond the outline is material that the outline leaves out, even if it is a single one.
 
 The bound is the length within which these normal laws together put 95 % of the outline. All terms are lengths in the
@@ -56,6 +56,9 @@ _OBTUSE, _INSIDE_PITCHES = (math.radians(20.0), math.radians(75.0)), 0.03
 _SHARP, _DEEP_PITCHES = math.radians(100.0), 0.2
 """And so may a right one, where they lie as far inside as this."""
 
+_ROUND = 0.5
+"""Of such corners so many, at most, are round ones."""
+
 _WIDEST_PITCHES = 1.0
 """A corner that an arc on a known table may pass by so much is not told: how much more it may is of no account."""
 
@@ -85,9 +88,9 @@ class Coefficients:
 class Stretches:
     """Stretches of outline between neighbouring witnesses on it, shape (S,) each, pixels.
 
-    length: along the coarse ring. inside: how far inside of the outline ends of walls tell that the edge may run.
-    corner: how far at most, on a known table, since it may be round there. The others are the causes of `Coefficients`,
-    by the same names.
+    length: along the coarse ring. blunt: how far off it may run, since a corner may be round. inside: how
+    far inside of the outline ends of walls tell that the edge may run. corner: how far at most, on a known table, since
+    it may be round there. The others are the causes of `Coefficients`, by the same names.
     """
 
     length: Float64s
@@ -97,6 +100,7 @@ class Stretches:
     gap: Float64s
     misfit: Float64s
     outside: Float64s
+    blunt: Float64s
     inside: Float64s
     corner: Float64s
 
@@ -104,6 +108,20 @@ class Stretches:
         """Standard deviation of the outline's place in each stretch."""
         terms = [getattr(coefficients, one.name) * getattr(self, one.name) for one in fields(coefficients)]
         return np.asarray(np.sqrt(np.sum(np.square(terms), axis=0)), np.float64)
+
+    def bound(self, coefficients: Coefficients) -> float:
+        """The distance within which 95 % of the outline lies. Where a corner may be round, a share of the length is
+        as unsure as that makes it, and the rest as sure as it looks.
+        """
+        sure, doubt = self.sigma(coefficients), np.maximum(self.blunt, self.corner)
+        unsure = np.hypot(sure, coefficients.misfit * doubt)
+        doubted = np.where(doubt > 0.0, _ROUND, 0.0) * self.length
+        return bound(np.concatenate([sure, unsure]), np.concatenate([self.length - doubted, doubted]))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Stretches]) -> Stretches:
+        """The stretches of several rings."""
+        return cls(*[np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(cls)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,12 +161,10 @@ def uncertainty(
         for ring, one in zip(rings, gaps, strict=True)
     ]
     causes = Coefficients()
-    sigma = [one.sigma(causes) for one in stretches]
-    corners = [causes.misfit * np.minimum(one.corner, _CAP_PITCHES * pitch_px) for one in stretches]
-    every = np.hypot(np.concatenate(sigma), np.concatenate(corners))
-    whole = max(bound(every, np.concatenate([one.length for one in stretches])), LEAST_PX)
+    whole = max(Stretches.joined(stretches).bound(causes), LEAST_PX)
     found = []
-    for (evidence, fitted), deviation, stretch in zip(rings, sigma, stretches, strict=True):
+    for (evidence, fitted), stretch in zip(rings, stretches, strict=True):
+        deviation = np.hypot(stretch.sigma(causes), causes.misfit * stretch.blunt)
         own = np.maximum(_NORMAL * deviation, whole) + _BEYOND * np.maximum(stretch.inside, stretch.corner)
         places = evidence.points[_on_line(evidence, fitted)]
         # A witness lies between two stretches.
@@ -193,11 +209,10 @@ def ring_stretches(
     blunt = _blunt_corners(evidence, fitted, on_line, pitch_px, None if unreached is None else blur_px)
     together, corner = _largest_between(np.abs(_middle_of_five(residual)), on_line), np.zeros(len(length))
     inside = _inside(evidence, fitted, on_line, _CAP_PITCHES * pitch_px)
-    if unreached is None:
-        together = np.maximum(together, blunt)
-    else:
+    if unreached is not None:
         free = _within(evidence, fitted, on_line, unreached)
-        together, inside, corner = np.where(free, together, 0.0), np.where(free, inside, 0.0), blunt
+        together, inside = np.where(free, together, 0.0), np.where(free, inside, 0.0)
+        blunt, corner = corner, blunt
     left_out = ~fitted.inlier & (evidence.kind != WitnessKind.OUTERMOST)
     return Stretches(
         length=length,
@@ -207,6 +222,7 @@ def ring_stretches(
         gap=np.maximum(length - pitch_px, 0.0),
         misfit=np.sqrt(np.maximum(together**2 - (_OF_SCATTER * fitted.spread_px) ** 2, 0.0)),
         outside=_largest_between(np.where(left_out, np.maximum(residual, 0.0), 0.0), on_line),
+        blunt=blunt,
         inside=inside,
         corner=corner,
     )

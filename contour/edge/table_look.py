@@ -46,6 +46,9 @@ _BESIDE_PITCHES = 0.6
 # Of the gradient's usual mean over a cell of comb.
 _QUIET, _SMOOTH, _GOOD_SHARE = 0.45, 0.3, 0.3
 _MOST = 0.5
+# In shade comb changes by so much less as it is darker, and by so many times what the table does.
+# Along dark things the means of comb beside them reach in, but not so far.
+_SHADED, _BUSIER_THAN_TABLE, _DARKEST, _SHADED_ROOM = 0.6, 2.5, 2.0, 0.6
 # What fills a hole ends where it is half as light. Pitches into it: its rim, and its middle (or so much of the
 # deepest); how light that rim is, and how light where the block plainly shades it. Blown out light shows no shade.
 _HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT, _SHADED_RIM, _BLOWN_OUT = (0.2, 0.5), (1.0, 0.6), 0.93, 0.85, 250.0
@@ -211,11 +214,13 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     quiet = (busy < _QUIET) & ~table
     loose = None if seen.loose is None else _loose(seen.loose, (whole == 0) & light.alike, samples)
     told = table_part if loose is None else table_part | (loose & ~quiet)  # what parts it from the block may hide some
-    foreign = _opened((flat | quiet) & ~told, _CELL_ROOM * samples)
+    mean = channels.mean(small)
+    other = (flat | quiet) & ~told
+    other &= ~_opened(other & _shaded_comb(busy, mean, block, table_part, samples), _SHADED_ROOM * samples)
+    foreign = _opened(other, _CELL_ROOM * samples)
     foreign = _long(foreign, _LONG_PITCHES * samples)
     beside_block = _long(_opened((block == 0) & ~(table | told), _BAND * samples + 0.5), _LONG_PITCHES * samples)
     every = foreign | beside_block
-    mean = channels.mean(small)
     shade = light.shade
     shade &= ~_opened(every & shade & (block == 0), _WIDEST_SHADE * samples)
     maps = light.lighter, shade, _away(every, step), mean, loose
@@ -289,6 +294,21 @@ def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
     busy = cv2.blur(np.minimum(slope.astype(np.float32), quantile(comb, 0.9)), (size, size))
     usual = median(busy[::2, ::2][block[::2, ::2] > 0])
     return np.asarray(busy / max(usual, 1e-3), np.float32)
+
+
+def _shaded_comb(busy: Float32s, mean: Bytes, block: Bytes, table: Bools, samples: float) -> Bools:
+    """Where a shadow makes comb look quiet: of its light it changes as much as comb does elsewhere, and by more than
+    the table does.
+    """
+    within = block > 0
+    if not within.any():
+        return within
+    size = 2 * round(0.5 * samples) + 1
+    light = np.maximum(cv2.blur(mean.astype(np.float32), (size, size)), _DARKEST)
+    of_light = busy / light
+    usual = median(of_light[::2, ::2][within[::2, ::2]])
+    still = quantile(busy[table], 0.9) if table.any() else 0.0
+    return np.asarray(within & (of_light > _SHADED * usual) & (busy > _BUSIER_THAN_TABLE * still), np.bool_)
 
 
 def _opened(part: Bools, radius: float) -> Bools:

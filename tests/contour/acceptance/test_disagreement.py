@@ -200,6 +200,17 @@ def test_walls_that_fade_far_inside_are_no_table() -> None:
     assert disagreement(faded, scene.truth_px, scene.pitch_px).pitches < 1.3
 
 
+def test_comb_in_a_shadow_is_no_table_and_what_is_as_dark_and_flat_may_be() -> None:
+    scene = block("rectangle")
+    left = int(scene.truth_px.exterior[:, 0].min() + 4.5 * scene.pitch_px)
+    dark, flat = scene.picture.copy(), scene.picture.copy()
+    flat[:, :left] = cv2.blur(flat, (61, 61))[:, :left]
+    for picture in (dark, flat):
+        picture[:, :left] //= 4
+    assert disagreement(dark, scene.truth_px, scene.pitch_px).pitches < LIMIT
+    assert disagreement(flat, scene.truth_px, scene.pitch_px).pitches > LIMIT
+
+
 @pytest.mark.parametrize(("left", "is_hole"), [(0.2, False), (0.0, True)])
 def test_a_hole_in_which_walls_are_faint_is_none_and_one_that_shows_the_table_is(left: float, is_hole: bool) -> None:
     scene = block("rectangle", "easy")

@@ -137,6 +137,21 @@ def test_a_sharp_shadow_on_the_table_may_be_one_and_a_lighter_thing_is_none() ->
     assert light.hiding[int((place[1] + 0.5) / light.step), int((place[0] + 0.5) / light.step)]
 
 
+def test_comb_in_a_shadow_is_comb_and_what_is_as_dark_and_flat_is_none() -> None:
+    place = middle_of_an_edge()
+
+    def shaded(picture: Picture, flat: float) -> Picture:
+        mask = np.zeros(picture.shape, np.float32)
+        cv2.fillPoly(mask, [square(place, 7.0 * PITCH).astype(np.int32)], 0.75)
+        light = 1.0 - cv2.GaussianBlur(mask, (0, 0), 8.0)
+        level = flat * cv2.blur(picture, (41, 41)) + (1.0 - flat) * picture
+        return np.rint(np.where(mask > 0, level, picture) * light).astype(np.uint8)
+
+    below = (place + np.array([0.0, 2.0 * PITCH]))[None]
+    assert look_at(partial(shaded, flat=0.0)).foreign_at(below) > PITCH
+    assert look_at(partial(shaded, flat=1.0)).foreign_at(below) < 4.0
+
+
 def test_a_hole_with_the_table_in_it_is_one_and_a_filled_one_is_none() -> None:
     _, seen = plain("holed")
     (hole,) = (ring for ring in seen.rings if ring.is_hole)

@@ -19,6 +19,8 @@ from contour.relief.relief import Relief
 from contour.walls.wall_evidence import RingEvidence, WitnessKind
 
 _FAR_OFF_PITCHES = 0.5
+# Edges that are all but parallel meet anywhere: a corner so far from all that was seen of the block is none of it.
+_AWAY_PITCHES = 10.0
 # Of 137 right rings 0.71 of the witnesses lie on the one with fewest; of a square hole that was drawn round 0.5.
 _LEAST_ON_RING = 0.58
 # Of what witnesses 82 cut holes 0.38 at least are ends of walls, of sheets with wide webs 0.26; along dark compound
@@ -59,11 +61,19 @@ def check_against_evidence(
 ) -> None:
     """Raise NoBlockFound where the ring passes four wall ends in a row by more than half a cell on one side, or leaves
     two in a row outside by more than a third, or a clean one by more than a sixth beside another one that it passes, or
-    one of those that it was laid through: `inlier`, shape (N,); and where these are hardly more than the others.
+    one of those that it was laid through: `inlier`, shape (N,); where these are hardly more than the others; and where
+    its edges meet far from the block.
 
     A ring that was fitted in the rectified plane is straight between its vertices there, and is looked at there: in the
     picture a lens bends a long edge by more than a small cell.
     """
+    away = np.maximum(evidence.coarse.min(axis=0) - ring, ring - evidence.coarse.max(axis=0)).max(axis=1)
+    if away.max() > _AWAY_PITCHES * pitch_px:
+        x, y = ring[away.argmax()]
+        raise NoBlockFound(
+            f"no block found: two edges of the outline that fits most wall ends meet at ({x:.0f}, {y:.0f}) px, far "
+            "from the block. Check that nothing lies against the block, and that its edge is in focus"
+        )
     if inlier.mean() < _LEAST_ON_RING:
         (x, y), on_it = ring.mean(axis=0), np.count_nonzero(inlier)
         raise NoBlockFound(

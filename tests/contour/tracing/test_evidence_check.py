@@ -135,6 +135,16 @@ def test_an_outline_along_glare_that_was_taken_for_walls_is_refused(soft: int, r
         check_on_walls(evidence, on_line, glare, PITCH)
 
 
+def test_edges_that_meet_far_from_the_block_are_refused() -> None:
+    evidence = witnesses(BLOCK, seed=1)
+    on_line = np.ones(len(evidence.points), np.bool_)
+    check_against_evidence(evidence, BLOCK, on_line, PITCH, None)
+    away = BLOCK.copy()
+    away[0] += 1e7 * np.array([-1.0, 0.0])
+    with pytest.raises(NoBlockFound, match="far from the block"):
+        check_against_evidence(evidence, away, on_line, PITCH, None)
+
+
 def test_three_ends_in_a_row_are_missing_cells() -> None:
     evidence = witnesses(BLOCK, seed=2)
     off = np.isin(np.arange(len(evidence.points)), np.arange(10, 13))

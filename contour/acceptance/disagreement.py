@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 
 from contour.acceptance.block_level import exclusive_levels, table_activity
+from contour.edge.table_look import shaded_comb
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median, quantile
 from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.channels import largest
@@ -36,8 +37,8 @@ _BLUR_PITCHES = 0.5
 # So far inside walls may be faint: there they are so busy of what comb is. In the middle of holes it is 0.08 of that,
 # of faded walls 0.17 or more; and nothing is a hole that is busier than the table and so much of what comb is.
 _FAR_INSIDE_PITCHES, _FAINTEST, _FAINTEST_IN_HOLES = 3.0, 0.12, 0.06
-# In shade comb is so much less busy as it is darker, and by so many times busier than the table.
-_SHADED, _BUSIER_THAN_TABLE, _DARKEST, _SHADED_ROOM = 0.6, 2.5, 2.0, 1.3
+# Comb in shade is wider: so far its means reach into dark things beside it.
+_SHADED_ROOM_PITCHES = 1.3
 # Up to so far within a hole its walls count: two windows of a pitch reach a pitch, and half as far again aslant.
 _RIM_PITCHES = 1.5
 # A corner is cut off where both turns are more than the first, and together less than the second; and the edges on both
@@ -110,8 +111,8 @@ def disagreement(
     busy = np.asarray(cv2.bitwise_or(busy, only_block), np.uint8)
     of_table, of_comb = table_activity(activity, around), median(activity[::2, ::2][ours[::2, ::2] > 0])
     fainter = (activity > max(of_table, _FAINTEST * of_comb)) & (busy == 0)
-    shaded = _but(np.asarray(_shaded(activity, level, ours, of_table) * np.uint8(255), np.uint8), busy)
-    busy = np.asarray(cv2.bitwise_or(busy, _opened(shaded, _square(_SHADED_ROOM * small_pitch_px))), np.uint8)
+    shaded = _but(np.asarray(shaded_comb(activity, largest(level), ours, of_table) * np.uint8(255), np.uint8), busy)
+    busy = np.asarray(cv2.bitwise_or(busy, _opened(shaded, _square(_SHADED_ROOM_PITCHES * small_pitch_px))), np.uint8)
     busy[_far_inside(fainter, ours, _FAR_INSIDE_PITCHES * small_pitch_px)] = 255
     # The picture's border is no block, and block ends there.
     outside = np.asarray(cv2.distanceTransform(_inverted(busy), cv2.DIST_L2, 3), np.float32)
@@ -139,13 +140,6 @@ def _activity(small: Bytes, small_pitch_px: float) -> Float32s:
     window = _odd(small_pitch_px)
     off = largest(np.asarray(cv2.absdiff(small, cv2.blur(small, (window, window))), np.uint8))
     return np.asarray(cv2.boxFilter(off, cv2.CV_32F, (window, window)), np.float32)
-
-
-def _shaded(activity: Float32s, level: Bytes, ours: Bytes, of_table: float) -> Bools:
-    """Where, within the contour, a shadow makes comb less busy: of its light it is as busy as elsewhere."""
-    of_light = activity / np.maximum(largest(level).astype(np.float32), _DARKEST)
-    usual = median(of_light[::2, ::2][ours[::2, ::2] > 0])
-    return np.asarray((ours > 0) & (of_light > _SHADED * usual) & (activity > _BUSIER_THAN_TABLE * of_table), np.bool_)
 
 
 def _far_inside(fainter: Bools, ours: Bytes, far_px: float) -> Bools:

@@ -216,8 +216,11 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     told = table_part if loose is None else table_part | (loose & ~quiet)  # what parts it from the block may hide some
     mean = channels.mean(small)
     other = (flat | quiet) & ~told
-    other &= ~_opened(other & _shaded_comb(busy, mean, block, table_part, samples), _SHADED_ROOM * samples)
     foreign = _opened(other, _CELL_ROOM * samples)
+    if foreign.any():
+        still = quantile(busy[table_part], 0.9) if table_part.any() else 0.0
+        shaded = shaded_comb(busy, _over_a_cell(mean, samples), block, still)
+        foreign = _opened(other & ~_opened(other & shaded, _SHADED_ROOM * samples), _CELL_ROOM * samples)
     foreign = _long(foreign, _LONG_PITCHES * samples)
     beside_block = _long(_opened((block == 0) & ~(table | told), _BAND * samples + 0.5), _LONG_PITCHES * samples)
     every = foreign | beside_block
@@ -290,24 +293,26 @@ def _busy(slope: NDArray[np.int16], block: Bytes, samples: float) -> Float32s:
     comb = slope[::2, ::2][block[::2, ::2] > 0]
     if not len(comb):
         return np.ones(slope.shape, np.float32)
-    size = 2 * round(0.5 * samples) + 1
-    busy = cv2.blur(np.minimum(slope.astype(np.float32), quantile(comb, 0.9)), (size, size))
+    busy = _over_a_cell(np.minimum(slope.astype(np.float32), quantile(comb, 0.9)), samples)
     usual = median(busy[::2, ::2][block[::2, ::2] > 0])
     return np.asarray(busy / max(usual, 1e-3), np.float32)
 
 
-def _shaded_comb(busy: Float32s, mean: Bytes, block: Bytes, table: Bools, samples: float) -> Bools:
-    """Where a shadow makes comb look quiet: of its light it changes as much as comb does elsewhere, and by more than
-    the table does.
+def _over_a_cell(part: NDArray[np.generic], samples: float) -> Float32s:
+    """Means over squares as wide as a cell."""
+    size = 2 * round(0.5 * samples) + 1
+    return np.asarray(cv2.blur(part.astype(np.float32), (size, size)), np.float32)
+
+
+def shaded_comb(busy: Float32s, light: NDArray[np.generic], block: Bytes, still: float) -> Bools:
+    """Where, within `block`, not 0 there, a shadow makes comb look quiet, (h, w): of its `light`, grey levels, it
+    changes as much as comb does elsewhere, and by more than the table does, `still`. `busy`: by how much light changes.
     """
     within = block > 0
     if not within.any():
         return within
-    size = 2 * round(0.5 * samples) + 1
-    light = np.maximum(cv2.blur(mean.astype(np.float32), (size, size)), _DARKEST)
-    of_light = busy / light
+    of_light = busy / np.maximum(light.astype(np.float32), _DARKEST)
     usual = median(of_light[::2, ::2][within[::2, ::2]])
-    still = quantile(busy[table], 0.9) if table.any() else 0.0
     return np.asarray(within & (of_light > _SHADED * usual) & (busy > _BUSIER_THAN_TABLE * still), np.bool_)
 
 

@@ -88,9 +88,9 @@ class Coefficients:
 class Stretches:
     """Stretches of outline between neighbouring witnesses on it, shape (S,) each, pixels.
 
-    length: along the coarse ring. blunt: how far off it may run, since a corner may be round. inside: how
-    far inside of the outline ends of walls tell that the edge may run. corner: how far at most, on a known table, since
-    it may be round there. The others are the causes of `Coefficients`, by the same names.
+    length: along the coarse ring. blunt: how far off it may run, since a corner may be round. inside: how far inside of
+    the outline ends of walls tell that the edge may run. corner: how far at most, on a known table, since it may be
+    round there. The others are the causes of `Coefficients`, by the same names.
     """
 
     length: Float64s

@@ -147,7 +147,7 @@ def test_a_picture_enlarged_and_turned_has_the_bound_enlarged(
 
 
 def test_neighbours_off_on_one_side_and_material_left_outside_are_seen() -> None:
-    """Both say that the outline runs blunt, and both in their own stretches only."""
+    """Both say that the outline runs elsewhere, and both in their own stretches only."""
     evidence = witnesses(WIDE, seed=1, sigma=0.05)
     fitted = fit_ring(evidence, pitch_px=PITCH, wall_px=PITCH / 7, rectifier=None)
     calm = ring_stretches(evidence, fitted, pitch_px=PITCH, blur_px=1.0)

@@ -41,7 +41,7 @@ WIDTH_MM, MIDDLE = 600.0, (300.0, 225.0)
 REST = "all else"
 STEPS = {
     "line noise": ("contour.tracing.tracing:without_line_noise", "service.measuring.measure:without_line_noise"),
-    "cell scale": ("contour.walls.see_block:probe",),
+    "cell scale": ("contour.tracing.wall_tips:probe",),
     "wall mask": ("contour.walls.see_block:wall_mask", "contour.walls.see_block:without_specks"),
     "faint links, loose pieces": (
         "contour.walls.see_block:with_faint_links",
@@ -52,12 +52,14 @@ STEPS = {
     "witnesses": ("contour.walls.see_block:block_evidence",),
     "what lies on the table": ("contour.tracing.wall_tips:table_look",),
     "fit": ("contour.tracing.wall_tips:visible_rings",),
+    "lines, seams": ("contour.tracing.wall_tips:wide_line", "contour.tracing.wall_tips:parted_by_seam"),
     "quality": ("contour.acceptance.trace_check:block_quality",),
     "disagreement": ("contour.acceptance.trace_check:disagreement",),
     "edge checks": (
         "contour.acceptance.trace_check:narrow_feature",
         "contour.acceptance.trace_check:alike_edge",
         "contour.acceptance.trace_check:comb_at_edge",
+        "contour.acceptance.trace_check:border_beyond",
     ),
     "polygon, verdict": ("service.measuring.measure:cutting_polygon", "service.measuring.measure:judge"),
 }
@@ -186,6 +188,9 @@ def measured(megapixels: int, rounds: int) -> tuple[list[str], str]:
     ratio = median(one / other for one, other in zip(whole, filters, strict=True))
     row = [f"{megapixels} MP", f"{1e3 * median(whole):.1f}", f"{1e3 * median(filters):.2f}", f"{ratio:.1f} ×"]
     told, lines = run(work, picture, told=True).took, []
+    idle = [name for name, step in told.items() if not step.calls]
+    if idle:
+        raise RuntimeError(f"{idle} made no array; expected steps of each trace: name in STEPS where they are called")
     for name, step in told.items():
         passes, largest = (size / picture.nbytes for size in (step.total, step.largest))
         took_ms = 1e3 * median(steps.took[name].seconds for steps in plain)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.profile import REST, STEPS, run
+from benchmarks.profile import REST, STEPS, measured, run
 
 
 def test_every_step_is_a_function_of_the_engine() -> None:
@@ -16,6 +16,12 @@ def test_every_step_is_a_function_of_the_engine() -> None:
         for place in places:
             module, name = place.split(":")
             assert callable(getattr(importlib.import_module(module), name)), place
+
+
+def test_every_step_is_one_of_a_trace() -> None:
+    row, steps = measured(2, 1)
+    assert row[0] == "2 MP"
+    assert all(f"| {name} |" in steps for name in STEPS)
 
 
 def test_every_array_made_of_a_picture_is_counted_with_its_bytes() -> None:

@@ -17,6 +17,7 @@ from contour.edge.stretches import hidden_or_filled
 from contour.geometry.arrays import Bools, Bytes, Float64s, median, with_sides
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import signed_area
+from contour.image.pixel_grid import averaged, samples_of
 from contour.image.pixel_sampling import light_beside
 from contour.tracing.trace import Trace
 
@@ -27,6 +28,8 @@ _FARTHER_IN, _BEYOND, _FARTHER_OUT = np.array([-1.5, -2.0]), np.array([0.4, 0.6,
 # No line through comb goes so far without a wall; what is finer is noise. Over how much of the edge the comb farther in
 # is taken together, and how near to what hides or fills it nothing is said.
 _CELL, _FINE, _COMB_OVER, _COMB_LEAST, _BESIDE = 1.3, 0.12, 6.0, 0.3, 1.0
+# Light without what is finer has so many samples over that.
+_SAMPLES = 3
 # In a shadow walls and cells are darker alike: light changes by that share of its brightest as it does in comb without
 # one (0.86 and more along shaded edges, 0.42 and less on compound and labels), and by so many times what it does on the
 # table beside (7.7 and more), or grey levels: what is darker tells nothing.
@@ -59,8 +62,8 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
 
     What the trace's evidence tells as hidden or filled is left out.
     """
-    light, first = _about(traced, pitch_px)
-    narrow = _narrow(light, pitch_px, dark=traced.polarity == "dark")
+    light, first, step = _about(traced, pitch_px)
+    narrow = _narrow(light, pitch_px / step, dark=traced.polarity == "dark")
     out_px = float(np.sign(signed_area(traced.contour.exterior))) * pitch_px
     bare: list[EdgePart] = []
     beyond: EdgePart | None = None
@@ -68,7 +71,8 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
         lengths = RingLengths.of(ring)
         at = np.arange(0.0, lengths.length, _SPACING * pitch_px)
         place, outward = lengths.at(at), out_px * lengths.normals(at, 5.0 * _SPACING * pitch_px)
-        changes, apart, lighter = _beside(light, place - first, outward)
+        sample, sample_out = samples_of(place - first, step), outward / step
+        changes, apart, lighter = _beside(light, sample, sample_out)
         judged = ~hidden_or_filled(traced.evidence or (), number, at, _BESIDE * pitch_px)
         for quiet, alike, long in _BARE:
             chosen = judged & (changes < quiet) & (apart < alike)
@@ -79,20 +83,24 @@ def comb_at_edge(traced: Trace, pitch_px: float) -> tuple[EdgePart | None, EdgeP
             if part is not None and part.length_pitches > long:
                 bare.append(part)
         if number == 0:
-            goes_on = _goes_on(narrow, place - first, outward) & ~_loose_beside(traced, place, outward)
+            goes_on = _goes_on(narrow, sample, sample_out) & ~_loose_beside(traced, place, outward)
             part = longest_part(judged & goes_on, lengths, at, _SPACING)
             beyond = part if part is not None and part.length_pitches > _GOES_ON else None
     return max(bare, key=lambda one: one.length_pitches) if bare else None, beyond
 
 
-def _about(traced: Trace, pitch_px: float) -> tuple[Bytes, Float64s]:
-    """Light about the contour without what is finer than a share of a cell, and its first pixel (x, y)."""
+def _about(traced: Trace, pitch_px: float) -> tuple[Bytes, Float64s, int]:
+    """Light about the contour without what is finer than a share of a cell, in samples of so many pixels, and the
+    first one's first pixel (x, y).
+    """
     fine = max(1, round(_FINE * pitch_px))
+    step = max(1, fine // _SAMPLES)
     exterior, margin = traced.contour.exterior, _AROUND * pitch_px
     left, top = np.maximum(np.floor(exterior.min(axis=0) - margin), 0).astype(int).tolist()
     right, bottom = np.maximum(np.ceil(exterior.max(axis=0) + margin), 0).astype(int).tolist()
     about = traced.light[top : bottom + 1, left : right + 1]
-    return np.asarray(cv2.blur(about, (fine, fine)), np.uint8), np.array([left, top], np.float64)
+    few, wide = averaged(about, step, cv2.BORDER_REPLICATE), max(1, round(fine / step))
+    return np.asarray(cv2.blur(few, (wide, wide)), np.uint8), np.array([left, top], np.float64), step
 
 
 def _narrow(light: Bytes, pitch_px: float, *, dark: bool) -> Bytes:

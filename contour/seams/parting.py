@@ -41,6 +41,8 @@ _ALONG, _ALONG_SHORT = 0.38, 0.6
 # directions, those on it lie; the best lines of all that are looked at; how long one is at the least, and how far one
 # is followed beyond the last place.
 _MERGED, _PLACES, _ON_LINE, _DIRECTIONS, _BEST, _LEAST_LINE, _BEYOND = 1.5, 3.0, 0.6, 60, 4, 4.0, 6.0
+# Nothing asks how far from a line a place is that lies farther, pitches.
+_ASKED = 4.0
 # In a window of so many pitches both ways most cells decide.
 _MOST_OF_PITCHES = 1.2
 # Half a step of such a line is left over at each end.
@@ -50,7 +52,7 @@ _END = 0.5
 @dataclass(frozen=True, eq=False)
 class Parted:
     """A part of the block: how much of the line that parts it from the rest runs along openings, and, kept for every so
-    manieth sample of (h, w), where it lies and the distance from that line, pitches.
+    manieth sample of (h, w), where it lies and the distance from that line, pitches, inf far from it.
     """
 
     along: float
@@ -245,7 +247,13 @@ def parted_by_order(free: Openings) -> Iterator[Parted]:
 
 def _parted(free: Openings, every: int, along: float, part: Bools, off_line: Bools) -> Parted:
     """A part and what is not the line around it, both on every so manieth sample."""
-    return Parted(along, every, free.numbers.shape, part, _away(off_line) / np.float32(free.pitch / every))
+    pitch = free.pitch / every
+    away = np.full(off_line.shape, np.float32(np.inf))
+    left, top, wide, high = cv2.boundingRect((~off_line).astype(np.uint8))
+    margin = math.ceil(_ASKED * pitch)
+    about = np.s_[max(0, top - margin) : top + high + margin, max(0, left - margin) : left + wide + margin]
+    away[about] = _away(off_line[about]) / np.float32(pitch)
+    return Parted(along, every, free.numbers.shape, part, away)
 
 
 def _pieces_and_lines(rest: Bools, inside: Bools, least: float) -> Iterator[tuple[Bools, Bools]]:

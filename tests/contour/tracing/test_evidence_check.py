@@ -109,9 +109,12 @@ def test_an_outline_that_half_of_the_ends_lie_on_is_refused(share: float, refuse
         check_against_evidence(evidence, BLOCK, on_line, PITCH, None)
 
 
-@pytest.mark.parametrize(("every", "refused"), [(3, False), (10, True)])
-def test_a_hole_along_which_hardly_any_wall_ends_was_not_cut(every: int, refused: bool) -> None:
+@pytest.mark.parametrize(
+    ("places", "every", "refused"), [(None, 3, False), (None, 10, True), (8, 3, False), (8, 4, True)]
+)
+def test_a_hole_along_which_hardly_any_wall_ends_was_not_cut(places: int | None, every: int, refused: bool) -> None:
     evidence = witnesses(BLOCK, seed=2)
+    evidence = evidence.take(np.arange(len(evidence.points))[:places])
     count = len(evidence.points)
     kind = np.where(np.arange(count) % every == 0, WitnessKind.CLEAN, WitnessKind.OUTERMOST)
     hole, on_line = replace(evidence, kind=kind, is_hole=True), np.ones(count, np.bool_)

@@ -91,18 +91,18 @@ def _flat(look: TableLook, contour: Contour) -> Bytes:
 
 def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:
     """Without what a polished table says against a trace: what it shows beyond the edge is the block once more, so both
-    sides are alike, and it is neither comb that was left out nor a border of its own.
+    sides are alike, and it is no comb that was left out.
     """
     apart = checked.disagreement
     left_out = apart is not None and not apart.claimed and apart.pitches > _LEFT_OUT_PITCHES
     outside = checked.trace.outside_px is not None
-    if checked.trace.evidence is None or not (left_out or outside or checked.bare or checked.beyond or checked.runs_on):
+    if checked.trace.evidence is None or not (left_out or outside or checked.bare or checked.beyond):
         return checked
     if not reflection(checked.trace.light, checked.trace.contour, pitch_px).whole:
         return checked
     kept = replace(apart, pitches=0.0) if apart is not None and left_out else apart
     trace = replace(checked.trace, outside_px=None)
-    return replace(checked, trace=trace, disagreement=kept, bare=None, beyond=None, runs_on=None)
+    return replace(checked, trace=trace, disagreement=kept, bare=None, beyond=None)
 
 
 def _checked_edge(

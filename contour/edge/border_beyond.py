@@ -30,23 +30,26 @@ _SPACING, _CHORD, _SKIP, _CORNER_DEG, _NEIGHBOURS, _ALIKE = 0.1, 20, 2, 25.0, 8,
 # Pitches beyond the corner at which a ray begins, where the block's next edge is so far out of the way; its parts, and
 # how many places each has. A short one counts at both ends of an edge alone: what ends at the block hardly looks out.
 _NEAREST, _FREE, _PARTS, _OF_PART, _OF_SHORT_PART = 0.6, 0.75, 5, 5, 3
-# Pitches across the ray, and how far from each place its two sides are; so near to the ray a border is the edge's own,
-# so far from it another one; by how much it may turn from the edge.
-_ACROSS, _SIDES, _OWN, _ANOTHER = 0.05 * np.arange(-38, 39), (2, 8), 0.3, 0.7
+# Pitches across the ray, and how far from each place its two sides are, so many of them: a border is sharp, shades and
+# shadows of a table are not. So near to the ray a border is the edge's own, so far from it another one; by how much it
+# may turn from the edge.
+_ACROSS, _SIDES, _OWN, _ANOTHER = 0.05 * np.arange(-38, 39), (1, 4), 0.3, 0.7
 _TURNS = np.tan(np.radians(np.arange(-8.0, 9.0, 2.0)))
 # The block is no nearer than that, pitches, looked at every so many places.
 _CLEAR, _EVERY = 0.35, 4
 # A step of light in the weakest part of a border: times the largest of others, times the noise, and grey levels.
 _OVER_OTHERS, _OVER_NOISE, _LEAST = 2.0, 2.5, 1.0
-# Less is thought of one that is not so many times the ninth decile of those along lines laid anywhere on the table: of
-# 74 right outlines 58 had no more, of 43 sheets 41 had 3.2 and more. Fewer lines than the least tell nothing.
-_OVER_TABLE, _LINES, _FEWEST_LINES, _DECILE = 2.5, 200, 20, 0.9
+# Less is thought of one that is not so many times the ninth decile of those along lines laid anywhere on the table:
+# those of 18 of 19 sheets have 5.3 and more, those by chance 3.3 mostly and once 4.1. Fewer lines than the least tell
+# nothing.
+_OVER_TABLE, _LINES, _FEWEST_LINES, _DECILE = 4.2, 200, 20, 0.9
 # Both ends of one edge run on along the same line: the cosine between them, and pitches across it; by so much more, and
 # on short ways: of 400 right outlines one has 1.07 at both ends, the others 0.7 at most; along a sheet it was 1.45.
 _STRAIGHT, _ASIDE, _MORE, _SHORT_MORE = 0.99, 0.5, 1.4, 1.25
-# Light on beside the border is that along the edge, within a share of the step, more where it is a clear one, since
-# sheets are mottled and lit unevenly; where it is looked at, pitches.
-_SAME, _SAME_IF_CLEAR, _CLEAR_BORDER = 0.3, 0.6, 2.0
+# Light on beside the border is that along the edge, within a share of the step, the more the clearer a border is, since
+# sheets are mottled and lit unevenly: by 0.17 of that at most along sheets, 0.27 and more by chance; and at most by the
+# second. Where it is looked at, pitches.
+_SAME, _MOST_ASTRAY = 0.2, 0.85
 _BESIDE, _ALONG = np.array([0.4, 0.5, 0.6]), np.arange(-3.0, -0.4, 0.1)
 
 
@@ -191,11 +194,12 @@ def _of_things(
     edge = np.broadcast_to(_ALONG * pitch_px, (len(rays.begin), len(_ALONG)))
     own = _mean_light(light, rays, edge, np.zeros_like(edge), pitch_px)
     shadow = (inner < outer) & (np.abs(inner - usual) > np.abs(outer - usual))
-    same = np.where(over > _CLEAR_BORDER, _SAME_IF_CLEAR, _SAME)
-    alone = (np.abs(outer - own) < same * np.abs(outer - inner)) & ~shadow
-    signed = np.where(over > 1.0, over * np.sign(outer - inner), 0.0)
+    # A line on the table is dark or light between sides that are alike.
+    border = (over > 1.0) & (np.abs(outer - inner) > _LEAST)
+    alone = (np.abs(outer - own) < np.minimum(_SAME * over, _MOST_ASTRAY) * np.abs(outer - inner)) & ~shadow
+    signed = np.where(border, over * np.sign(outer - inner), 0.0)
     twice = _at_both_ends(rays, signed, _MORE, pitch_px) | _around_notch(rays, signed)
-    return np.asarray(((over > 1.0) & alone) | twice)
+    return np.asarray((border & alone) | twice)
 
 
 def _both_sides(

@@ -96,10 +96,10 @@ def disagreement(
         filled = cv2.dilate(there, _disc(_BLUR_PITCHES * small_pitch_px * 2)) > 0
         busy = np.asarray(np.where(filled, ours, busy), np.uint8)
     tips = [samples_of(tip, shrink) for tip in _cut_tips(contour.exterior, pitch_px)]
-    in_tips = _beyond(busy, ours, tips, small_pitch_px)
     if loose is not None:
         beside = cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
         busy = _but(busy, _but(np.asarray(beside * np.uint8(255), np.uint8), ours))
+    in_tips = _beyond(busy, ours, tips, small_pitch_px)
     around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * small_pitch_px)), np.uint8)
     level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)

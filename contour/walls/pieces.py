@@ -42,7 +42,7 @@ class Piece:
     """A piece of comb: its area, cells filled, px², its box (left, top, right, bottom), and its outline to look at.
 
     The outline, shape (N, 2), is as coarse as the samples that the piece was found in; empty = not known. width_px: of
-    its widest place; infinite where it is not known, or goes on outside of the picture.
+    its widest place, or how much of the picture's border it lies along, if that is more; infinite where not known.
     """
 
     area_px2: float
@@ -98,7 +98,7 @@ def pieces_beside(
             whole = step * scale
             box = (x * whole, y * whole, (x + w) * whole, (y + h) * whole)
             ring = pixels_of(_outline(filled) + np.array([x, y]), whole)
-            width = np.inf if _at_border((x, y, x + w, y + h), walls.shape) else _width(filled) * whole
+            width = _width(filled, (x, y, x + w, y + h), walls.shape) * whole
             found.append(Piece(float(np.count_nonzero(filled)) * whole**2, box, ring, width))
     return tuple(sorted(found, key=lambda piece: -piece.area_px2))
 
@@ -189,16 +189,20 @@ def _boxes(places: tuple[Int64s, Int64s], piece: Int32s, count: int) -> Int64s:
     return boxes
 
 
-def _at_border(box: tuple[int, int, int, int], shape: tuple[int, ...]) -> bool:
-    """Whether a box (left, top, right, bottom) reaches the last samples but one, of so many rows and columns."""
-    left, top, right, bottom = box
-    return min(left, top) <= 1 or right >= shape[1] - 1 or bottom >= shape[0] - 1
-
-
-def _width(filled: Bools) -> float:
-    """Diameter of the largest disc inside, samples."""
+def _width(filled: Bools, box: tuple[int, int, int, int], shape: tuple[int, ...]) -> float:
+    """Diameter of the largest disc inside, samples, or how much of the picture's border it lies along: its box (left,
+    top, right, bottom) reaches the last samples but one, of so many rows and columns, where it may go on.
+    """
     framed = cv2.copyMakeBorder(filled.astype(np.uint8), 1, 1, 1, 1, cv2.BORDER_CONSTANT)
-    return 2.0 * float(cv2.distanceTransform(framed, cv2.DIST_L2, 5).max())
+    disc = 2.0 * float(cv2.distanceTransform(framed, cv2.DIST_L2, 5).max())
+    left, top, right, bottom = box
+    sides = (
+        (left <= 1, filled[:, :2], 1),
+        (top <= 1, filled[:2], 0),
+        (right >= shape[1] - 1, filled[:, -2:], 1),
+        (bottom >= shape[0] - 1, filled[-2:], 0),
+    )
+    return max(disc, float(sum(np.count_nonzero(side.any(axis=axis)) for at_border, side, axis in sides if at_border)))
 
 
 def _outline(filled: Bools) -> Ring:

@@ -71,13 +71,16 @@ def test_pieces_come_largest_first_and_in_pixels_of_the_picture() -> None:
     assert large.box_px[1] > 400
 
 
-def test_a_pieces_width_is_that_of_its_widest_place_where_all_of_it_is_in_view() -> None:
+def test_a_pieces_width_is_that_of_its_widest_place_or_of_where_it_may_go_on_outside_of_the_picture() -> None:
+    """One in view, one that the border cuts lengthwise, and one that runs out of the picture."""
     mask = empty()
     comb(mask, 300, 60, 10, 3)
     comb(mask, 300, 433, 8, 4)
-    whole, cut = sorted(pieces_beside(mask, RING, PITCH), key=lambda piece: piece.box_px[1])
+    comb(mask, 500, 200, 12, 3)
+    whole, across, cut = sorted(pieces_beside(mask, RING, PITCH), key=lambda piece: piece.box_px[1])
     assert whole.width_px == pytest.approx(2.7 * PITCH, abs=0.6 * PITCH)
-    assert np.isinf(cut.width_px)
+    assert across.width_px == pytest.approx(2.7 * PITCH, abs=0.6 * PITCH)
+    assert cut.width_px == pytest.approx(8 * PITCH, abs=PITCH)
 
 
 @pytest.mark.parametrize("cells", [(2, 2), (3, 2), (6, 1)])

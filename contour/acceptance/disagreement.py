@@ -10,6 +10,7 @@ that is too fat everywhere. One that is a cell too lean everywhere it cannot tel
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, replace
 
 import cv2
@@ -41,10 +42,13 @@ _FAR_INSIDE_PITCHES, _FAINTEST, _FAINTEST_IN_HOLES = 3.0, 0.12, 0.06
 _SHADED_ROOM_PITCHES = 1.3
 # Up to so far within a hole its walls count: two windows of a pitch reach a pitch, and half as far again aslant.
 _RIM_PITCHES = 1.5
-# A corner is cut off where both turns are more than the first, and together less than the second; and the edges on both
-# sides so long. A piece so wide lies there, so near the tip; the contour is followed so closely.
+# A corner is cut off by so many edges where both turns are more than the first, and together less than the second; and
+# the edges on both sides so long. A piece so wide lies there, so near the tip; the contour is followed so closely.
 _BEVEL, _SIDE_PITCHES, _EVEN_PITCHES = (np.radians(15.0), np.radians(125.0)), 1.5, 0.3
-_LEAST_PIECE, _TIP_PITCHES = 0.8, 2.0
+_BEVEL_SIDES, _LEAST_PIECE, _TIP_PITCHES = (1, 2), 0.8, 2.0
+# Pieces told from the block that are as large as so many square pitches are none of it even in such a tip: the cells of
+# these have been held against its rows, of smaller ones there are too few.
+_SURELY_LOOSE = 14.0
 # What a step aside and down counts for in a distance.
 _DIAGONAL = 1.37
 _FRACTION_BITS = 4
@@ -96,10 +100,13 @@ def disagreement(
         filled = cv2.dilate(there, _disc(_BLUR_PITCHES * small_pitch_px * 2)) > 0
         busy = np.asarray(np.where(filled, ours, busy), np.uint8)
     tips = [samples_of(tip, shrink) for tip in _cut_tips(contour.exterior, pitch_px)]
+    beside = np.zeros_like(busy)
     if loose is not None:
-        beside = cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
-        busy = _but(busy, _but(np.asarray(beside * np.uint8(255), np.uint8), ours))
-    in_tips = _beyond(busy, ours, tips, small_pitch_px)
+        there = cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
+        beside = there.view(np.uint8) * np.uint8(255)
+    sure = _large(beside, _SURELY_LOOSE * small_pitch_px**2)
+    in_tips = _beyond(_but(busy, sure), ours, tips, small_pitch_px)
+    busy = _but(busy, _but(beside, ours))
     around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * small_pitch_px)), np.uint8)
     level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)
@@ -184,6 +191,14 @@ def _without_small_gaps(mask: Bytes, area_px2: float, holes: Bytes) -> Bytes:
     return np.asarray(cv2.bitwise_or(mask, small.astype(np.uint8).take(labels) * np.uint8(255)), np.uint8)
 
 
+def _large(mask: Bytes, area_px2: float) -> Bytes:
+    """The pieces of a mask that are larger than that."""
+    labels, area = pieces_and_areas(mask, 8)
+    large = area > area_px2
+    large[0] = False
+    return large.astype(np.uint8).take(labels) * np.uint8(255)
+
+
 def _opened(mask: Bytes, shape: Bytes) -> Bytes:
     """The mask without what is narrower than the shape."""
     return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, shape), np.uint8)
@@ -247,21 +262,23 @@ def _beyond(busy: Bytes, ours: Bytes, tips: list[Ring], small_pitch_px: float) -
 
 
 def _cut_tips(exterior: Ring, pitch_px: float) -> list[Ring]:
-    """The tips of corners that edges bevel, where the edges on their sides meet, triangles (3, 2) in pixels: chips
-    beside a bevel lie anywhere.
+    """The tips of corners that an edge bevels, or two do, where the edges on their sides meet, triangles (3, 2) in
+    pixels: chips beside a bevel lie anywhere.
     """
     even = fewer_vertices(exterior, _EVEN_PITCHES * pitch_px)
     edges = np.roll(even, -1, axis=0) - even
     heading, long = edges[:, 0] + 1j * edges[:, 1], np.hypot(*edges.T) / pitch_px
-    turn = np.angle(np.roll(heading, -1) / heading) * np.sign(signed_area(even))
+    side = np.sign(signed_area(even))
     tips = []
-    for k in range(len(even)):
-        first, last = (k - 1) % len(even), (k + 1) % len(even)
-        turns = turn[first], turn[k]
+    for k, sides in itertools.product(range(len(even)), _BEVEL_SIDES):
+        first, last = (k - 1) % len(even), (k + sides) % len(even)
+        chord = even[last] - even[k]
+        along = chord[0] + 1j * chord[1]
+        turns = np.angle([along / heading[first], heading[last] / along]) * side
         if min(turns) < _BEVEL[0] or sum(turns) > _BEVEL[1] or min(long[first], long[last]) < _SIDE_PITCHES:
             continue
         # By the law of sines, from the first end of the bevel along the edge before it.
-        reach = long[k] * pitch_px * np.sin(turns[1]) / np.sin(sum(turns))
+        reach = abs(along) * np.sin(turns[1]) / np.sin(sum(turns))
         corner = even[k] + reach * edges[first] / (long[first] * pitch_px)
         legs = np.array([even[k], even[last]]) - corner
         legs *= np.minimum(1.0, _TIP_PITCHES * pitch_px / np.hypot(*legs.T))[:, None]

@@ -253,6 +253,30 @@ def test_comb_beside_the_contour_that_is_told_from_it_is_no_block() -> None:
     assert disagreement(scene.picture, half, scene.pitch_px, loose=loose).pitches < 1.2
 
 
+@pytest.mark.parametrize("kinked", [False, True])
+@pytest.mark.parametrize(("small", "seen"), [(True, True), (False, False)])
+def test_a_corner_beyond_a_cable_is_the_blocks_unless_it_is_surely_another_piece(
+    kinked: bool, small: bool, seen: bool
+) -> None:
+    """A band of table across a corner, along an edge of the outline or two; what lies beyond is told from the block."""
+    scene = block("rectangle")
+    whole, pitch = polygon(scene.truth_px), scene.pitch_px
+    corners = scene.truth_px.exterior
+    corner, *ends = (corners[k] for k in (0, 1, -1))
+    long = 6.0 * pitch
+    one, other = (corner + long * (end - corner) / np.hypot(*(end - corner)) for end in ends)
+    bend = 0.5 * (one + other) + (0.8 * pitch if kinked else 0.0) * (0.5 * (one + other) - corner) / long
+    beyond = shapely.Polygon([corner, one, bend, other]).buffer(0.1)
+    cut = contour(whole - beyond)
+    band = shapely.LineString([one, bend, other]).buffer(0.8 * pitch)
+    picture = scene.picture.copy()
+    y, x = np.mgrid[: picture.shape[0], : picture.shape[1]]
+    picture[shapely.contains_xy(band, x, y)] = int(np.median(scene.picture[:40, :40]))
+    loose = shapely.contains_xy(beyond if not small else beyond & shapely.Point(corner).buffer(2.0 * pitch), x, y)
+    found = disagreement(picture, cut, pitch, loose=cv2.resize(loose.astype(np.uint8), (160, 120)))
+    assert (found.pitches > LIMIT) == seen
+
+
 def test_what_is_flat_elsewhere_hides_no_disagreement() -> None:
     scene = block("rectangle")
     whole = polygon(scene.truth_px)

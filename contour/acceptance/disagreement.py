@@ -102,8 +102,7 @@ def disagreement(
     tips = [samples_of(tip, shrink) for tip in _cut_tips(contour.exterior, pitch_px)]
     beside = np.zeros_like(busy)
     if loose is not None:
-        there = cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST) > 0
-        beside = there.view(np.uint8) * np.uint8(255)
+        beside[np.asarray(cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)) > 0] = 255
     sure = _large(beside, _SURELY_LOOSE * small_pitch_px**2)
     in_tips = _beyond(_but(busy, sure), ours, tips, small_pitch_px)
     busy = _but(busy, _but(beside, ours))

@@ -9,7 +9,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Float64s, median, medians, quantile
-from contour.geometry.rings import Contour, Ring, densified
+from contour.geometry.rings import Contour, Ring, densified, signed_area
 from contour.geometry.segments import distances_to_ring
 from contour.geometry.signed_distance import depth_inside
 from contour.image.opencv import closed_by_disc, median_where, pieces_and_middles
@@ -44,6 +44,10 @@ _ARC_RADII, _ARC_OFF, _ARC_OFF_PX, _MOUTH, _MOUTH_PX, _FEWEST_ARC = 0.25, 0.04, 
 _ROUND_PITCHES = 0.2
 # Edges of webs run along the cut itself, so near and so straight.
 _WEB_PX, _ALONG = 3.0, 0.98
+# Edges as long as so many pitches are moved onto webs that lie so near, looked for twice; and run along so much of the
+# edge, and over so much of it. Corners move by less than a pitch.
+_LONG_EDGE, _NEAR_WEBS, _OF_EDGE, _SPREAD_OF_EDGE, _MOVED, _PARALLEL = 2.0, 0.4, 0.15, 0.4, 1.0, 0.2
+_STEPS_OUT, _WEB_OFF_PX = 8, 0.7
 # An opened hole is less than a pitch wide.
 _OPEN_PITCHES = 1.0
 # Holes smaller than this share of the usual are specks, and fewer make no sheet. Of noise in the floor of cells, where
@@ -182,6 +186,65 @@ def _outermost(material: MaterialEdge, corners: Float64s, normals: Float64s, rad
         if len(near):
             moved[number] = near[np.argmax(near @ out)]
     return moved
+
+
+def along_webs(material: MaterialEdge, outline: Contour, pitch_px: float) -> Contour:
+    """An outline, pixels, of a sheet that was cut on several sides, its straight edges moved onto the webs between
+    holes, which show where the sheet ends, and its corners with them.
+    """
+    rings = [densified(ring, 1.0) for ring in material.contour.rings]
+    border, ahead = np.concatenate(rings), np.concatenate([np.roll(ring, -1, axis=0) - ring for ring in rings])
+    side = -float(np.sign(signed_area(outline.exterior)))
+    exterior, *holes = (_on_webs(ring, border, ahead, pitch_px, side) for ring in outline.rings)
+    return Contour(exterior, tuple(holes))
+
+
+def _on_webs(ring: Ring, border: Float64s, ahead: Float64s, pitch_px: float, side: float) -> Ring:
+    """A ring with its straight edges moved onto what of a border, (N, 2), runs along them, by steps `ahead`."""
+    following = np.roll(ring, -1, axis=0)
+    lines = [_web_line(*edge, border, ahead, pitch_px, side) for edge in zip(ring, following, strict=True)]
+    moved = ring.copy()
+    for number, (before, line) in enumerate(zip([lines[-1], *lines[:-1]], lines, strict=True)):
+        if before is None and line is None:
+            continue
+        one = before or (ring[number - 1], ring[number] - ring[number - 1])
+        other = line or (ring[number], following[number] - ring[number])
+        corner = _meet(one, other)
+        if corner is not None and np.hypot(*(corner - ring[number])) < _MOVED * pitch_px:
+            moved[number] = corner
+    return moved
+
+
+def _web_line(
+    start: Float64s, stop: Float64s, border: Float64s, ahead: Float64s, pitch_px: float, side: float
+) -> tuple[Float64s, Float64s] | None:
+    """A place and a direction of the line along webs beside an edge; None where too little of it runs along any."""
+    long = float(np.hypot(*(stop - start)))
+    if long < _LONG_EDGE * pitch_px:
+        return None
+    along = (stop - start) / long
+    out = side * np.array([-along[1], along[0]])
+    place, off = (border - start) @ along, (border - start) @ out
+    webs = (np.abs(ahead @ along) > _ALONG * np.hypot(*ahead.T)) & (np.abs(off) < _NEAR_WEBS * pitch_px)
+    webs &= (place > 0.0) & (place < long)
+    slope = offset = 0.0
+    for _ in range(_STEPS_OUT):
+        if np.count_nonzero(webs) < _OF_EDGE * long or np.ptp(place[webs]) < _SPREAD_OF_EDGE * long:
+            return None
+        slope, offset = np.polyfit(place[webs], off[webs], 1)
+        webs &= off - offset - slope * place > -_WEB_OFF_PX
+    start, stop = start + offset * out, start + long * along + (offset + slope * long) * out
+    return start, stop - start
+
+
+def _meet(one: tuple[Float64s, Float64s], other: tuple[Float64s, Float64s]) -> Float64s | None:
+    """Where two lines meet, each by a place and a direction; None where they are all but parallel."""
+    (start, along), (place, ahead) = one, other
+    cross = float(along[0] * ahead[1] - along[1] * ahead[0])
+    if abs(cross) < _PARALLEL * np.hypot(*along) * np.hypot(*ahead):
+        return None
+    way = place - start
+    return np.asarray(start + (way[0] * ahead[1] - way[1] * ahead[0]) / cross * along)
 
 
 def check_sheet(material: MaterialEdge, outline: Contour, pitch_px: float) -> None:

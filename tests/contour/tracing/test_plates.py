@@ -74,6 +74,12 @@ def test_a_cut_sheet_of_which_faint_ends_lead_astray_is_found_by_its_strong_webs
     assert_traced(lattice(seed, "round", "cut"), "cut", within=0.15)
 
 
+@pytest.mark.parametrize("seed", [3_100_028, 3_100_027])
+def test_edges_of_a_cut_sheet_lie_on_its_webs(seed: int) -> None:
+    """Few webs end as walls do, and lines through these were off by 17 and 7 px at a corner."""
+    assert_traced(lattice(seed, "round", "cut"), "cut", within=0.05)
+
+
 def test_a_board_whose_squares_are_as_dark_as_the_table_is_none() -> None:
     picture = np.full((520, 640), TABLE, np.uint8)
     rows, columns = np.mgrid[:360, :480] // 40

@@ -23,7 +23,7 @@ _CELL_AREAS = (0.25, 6.0)
 _FEWEST_CELLS = 7
 # A strip of swarf beside the block has closed cells of its own, and broken walls have none; but of a block that seems
 # to be in two, parts as large as this may be its own. No such strip has less wall, pitches times pixels.
-_LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.25, 0.5, 3.0
+_LOOSE_CELLS, _LOOSE_SHARE, _MOST_WALLS, _LEAST_WALL = 2, 0.15, 0.5, 3.0
 _LEAST_CELL = 0.2
 # But cells that lie where the block's rows of cells go on are its own, parted from it by ink: pitches around a piece,
 # between neighbours, and rows across; of middles that lie in a cell of such a row so many, and most so near to its own.

@@ -46,9 +46,6 @@ _RIM_PITCHES = 1.5
 # the edges on both sides so long. A piece so wide lies there, so near the tip; the contour is followed so closely.
 _BEVEL, _SIDE_PITCHES, _EVEN_PITCHES = (np.radians(15.0), np.radians(125.0)), 1.5, 0.3
 _BEVEL_SIDES, _LEAST_PIECE, _TIP_PITCHES = (1, 2), 0.8, 2.0
-# Pieces told from the block that are as large as so many square pitches are none of it even in such a tip: the cells of
-# these have been held against its rows, of smaller ones there are too few.
-_SURELY_LOOSE = 14.0
 # What a step aside and down counts for in a distance.
 _DIAGONAL = 1.37
 _FRACTION_BITS = 4
@@ -100,12 +97,10 @@ def disagreement(
         filled = cv2.dilate(there, _disc(_BLUR_PITCHES * small_pitch_px * 2)) > 0
         busy = np.asarray(np.where(filled, ours, busy), np.uint8)
     tips = [samples_of(tip, shrink) for tip in _cut_tips(contour.exterior, pitch_px)]
-    beside = np.zeros_like(busy)
+    in_tips = _beyond(busy, ours, tips, small_pitch_px)
     if loose is not None:
-        beside[np.asarray(cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)) > 0] = 255
-    sure = _large(beside, _SURELY_LOOSE * small_pitch_px**2)
-    in_tips = _beyond(_but(busy, sure), ours, tips, small_pitch_px)
-    busy = _but(busy, _but(beside, ours))
+        beside = cv2.resize(loose, busy.shape[::-1], interpolation=cv2.INTER_NEAREST)
+        busy = _but(busy, _but(np.asarray(beside * np.uint8(255), np.uint8), ours))
     around = np.asarray(cv2.dilate(ours, _disc(2.0 * _BLUR_PITCHES * small_pitch_px)), np.uint8)
     level = np.asarray(cv2.blur(small, (_odd(small_pitch_px), _odd(small_pitch_px))), np.uint8)
     quiet_table = _but(_inverted(busy), around)
@@ -188,14 +183,6 @@ def _without_small_gaps(mask: Bytes, area_px2: float, holes: Bytes) -> Bytes:
     small[labels[holes > 0]] = False
     small[0] = False
     return np.asarray(cv2.bitwise_or(mask, small.astype(np.uint8).take(labels) * np.uint8(255)), np.uint8)
-
-
-def _large(mask: Bytes, area_px2: float) -> Bytes:
-    """The pieces of a mask that are larger than that."""
-    labels, area = pieces_and_areas(mask, 8)
-    large = area > area_px2
-    large[0] = False
-    return large.astype(np.uint8).take(labels) * np.uint8(255)
 
 
 def _opened(mask: Bytes, shape: Bytes) -> Bytes:

@@ -164,7 +164,3 @@ def test_a_sheet_whose_border_runs_on_is_told_beside_closed_cells_too_and_where_
 def test_dark_grooves_of_a_table_that_lead_to_the_block_are_not_left_out_of_it() -> None:
     """Slots whose sides are as busy as comb, two cells apart, and which no edge ends along."""
     assert measured(render(shop_floor_scene("slots", 1_830_036, alone=True).scene)).reasons == ()
-
-
-def test_a_strip_of_swarf_beside_a_corner_is_not_the_corner_that_the_outline_cuts_off() -> None:
-    assert measured(render(shop_floor_scene("swarf", 3_000_436, alone=True).scene)).reasons == ()

@@ -44,9 +44,10 @@ _ARC_RADII, _ARC_OFF, _ARC_OFF_PX, _MOUTH, _MOUTH_PX, _FEWEST_ARC = 0.25, 0.04, 
 _ROUND_PITCHES = 0.2
 # Edges of webs run along the cut itself, so near and so straight.
 _WEB_PX, _ALONG = 3.0, 0.98
-# Edges as long as so many pitches are moved onto webs that lie so near, looked for twice; and run along so much of the
-# edge, and over so much of it. Corners move by less than a pitch.
+# Edges as long as so many pitches are moved onto webs that lie so near, and run along so much of the edge, and over so
+# much of it. Corners move by less than a pitch, and not where lines meet at a smaller sine.
 _LONG_EDGE, _NEAR_WEBS, _OF_EDGE, _SPREAD_OF_EDGE, _MOVED, _PARALLEL = 2.0, 0.4, 0.15, 0.4, 1.0, 0.2
+# Rims of opened holes lie farther in: what does by so many pixels is left out, step by step.
 _STEPS_OUT, _WEB_OFF_PX = 8, 0.7
 # An opened hole is less than a pitch wide.
 _OPEN_PITCHES = 1.0
@@ -188,7 +189,7 @@ def _outermost(material: MaterialEdge, corners: Float64s, normals: Float64s, rad
     return moved
 
 
-def along_webs(material: MaterialEdge, outline: Contour, pitch_px: float) -> Contour:
+def onto_webs(material: MaterialEdge, outline: Contour, pitch_px: float) -> Contour:
     """An outline, pixels, of a sheet that was cut on several sides, its straight edges moved onto the webs between
     holes, which show where the sheet ends, and its corners with them.
     """

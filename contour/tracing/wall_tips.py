@@ -48,7 +48,7 @@ from contour.tracing.evidence_check import (
     check_unseen,
     ends_outside_corners,
 )
-from contour.tracing.plates import along_webs, check_sheet, like_plate, plate_edge
+from contour.tracing.plates import check_sheet, like_plate, onto_webs, plate_edge
 from contour.tracing.touched_edges import touched_cuts
 from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
 from contour.tracing.wide_lines import wide_line
@@ -135,7 +135,7 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
             check_promise(promise, kind, traced=closed is not None)
             found = closed or found
         if plate is not None:
-            found = replace(found, contour=along_webs(solid.edge, found.contour, seen.pitch_px))
+            found = replace(found, contour=onto_webs(solid.edge, found.contour, seen.pitch_px))
             check_sheet(solid.edge, found.contour, seen.pitch_px)
         if promise == "auto" and plate is None and kind is None:
             solid.check_fine(seen, found.contour)

@@ -119,8 +119,12 @@ class NodeClient:
         return [one["event"] for one in list(self.told) if message in one.get("event", {}).get("Message", "")]
 
     def states(self, node: str) -> list[str]:
-        """What a node showed, in order."""
-        return [one["value"] for one in list(self.told) if one.get("node") == node]
+        """What a node showed, in order of the server's times.
+
+        What comes while an item is being made node-opcua holds back, and tells after what came later.
+        """
+        shown = [one for one in list(self.told) if one.get("node") == node]
+        return [one["value"] for one in sorted(shown, key=lambda one: float(one["since"]))]
 
     def close(self) -> None:
         """End it."""

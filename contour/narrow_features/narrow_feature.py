@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from contour.geometry.rings import Contour, area
+from contour.geometry.rings import Contour, Ring, area
 from contour.narrow_features.arms import arms, slits
 from contour.narrow_features.bumps import deepest_bump
-from contour.narrow_features.feature import NarrowFeature
+from contour.narrow_features.feature import WIDTH, NarrowFeature
 from contour.narrow_features.steps import horns, jogs, steps
+from contour.seams.inner_corners import hanging
 
 # Blocks of few cells have arms and steps as narrow; but chips and strips are less than this share of a block.
 _LARGE = 1.0 / 7.0
+# What hangs on a neck reaches so many pitches beyond it.
+_LONG = 2.5
 
 
 def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
@@ -20,10 +23,20 @@ def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
     """
     found = [one for ring in contour.rings for one in [deepest_bump(ring, pitch_px)] if one is not None]
     large = _LARGE * area(contour) / pitch_px**2
-    found += arms(contour, pitch_px, large) + slits(contour, pitch_px)
+    found += arms(contour, pitch_px, large) + slits(contour, pitch_px) + _necks(contour.exterior, pitch_px)
     found += [
         one
         for ring in contour.rings
         for one in (*steps(ring, pitch_px, large), *jogs(ring, pitch_px), *horns(ring, pitch_px))
     ]
     return max(found, key=lambda one: one.depth_pitches) if found else None
+
+
+def _necks(exterior: Ring, pitch_px: float) -> list[NarrowFeature]:
+    """What hangs on a block by as little as an offcut does that touches it."""
+    found = []
+    for one in hanging(exterior, pitch_px):
+        if one.width_px < WIDTH * pitch_px and one.depth_px > _LONG * pitch_px:
+            x, y = one.part[[0, -1]].mean(axis=0).tolist()
+            found.append(NarrowFeature(one.depth_px / pitch_px, one.width_px / pitch_px, (x, y), outwards=True))
+    return found

@@ -21,7 +21,7 @@ _DARK, _LIGHT = 0.12, 0.5
 _FLOORS, _WALLS, _BLACKER = 0.85, 0.68, 0.1
 # Cells within so many pitches of the line, and what the step between two neighbours leads to: a cell so many steps on.
 _ROWS, _STEPS = 2.0, (2, 3, 4)
-_FEWEST = 12
+_FEWEST, _FEWEST_A_SIDE = 12, 6
 # How often it does on the same side of the line at the least for another order across to be told, or the same: one of
 # five places lies as near to some cell by chance, and of irregular cells two or three of five.
 _ORDERLY, _IN_SOME_ORDER = 0.5, 0.35
@@ -56,10 +56,13 @@ def comb_along(light: Bytes, free: Openings, found: Parted) -> bool:
 
 @dataclass(frozen=True)
 class Order:
-    """How often the step from one cell to its neighbour leads to others on the same side of a line, and across it."""
+    """How often the step from one cell to its neighbour leads to others on the same side of a line, and across it;
+    whether that was seen on both sides.
+    """
 
     own: float
     across: float
+    on_both: bool = False
 
     @property
     def known(self) -> bool:
@@ -69,7 +72,12 @@ class Order:
     @property
     def other(self) -> bool:
         """Whether cells lie in good order on both sides, and not in the same."""
-        return self.own > _ORDERLY and self.across < _OTHER * self.own
+        return self.on_both and self.own > _ORDERLY and self.across < _OTHER * self.own
+
+    @property
+    def some_other(self) -> bool:
+        """As `other`, where cells lie in some order only, as irregular ones do: where openings tell as well."""
+        return self.on_both and self.own > _IN_SOME_ORDER and self.across < _OTHER * self.own
 
     @property
     def surely_other(self) -> bool:
@@ -92,6 +100,7 @@ def cell_order(free: Openings, found: Parted) -> Order:
     start, other = np.nonzero((far > NEIGHBOURS[0]) & (far < NEIGHBOURS[1]) & (side[near][:, None] == side[about]))
     step, start = apart[start, other], near[start]
     hits: tuple[list[bool], list[bool]] = ([], [])
+    seen = np.zeros(2, np.intp)
     for steps in _STEPS:
         aim = free.centre[start] + steps * step
         number, inside = free.at(aim)
@@ -99,8 +108,9 @@ def cell_order(free: Openings, found: Parted) -> Order:
         said = (free.cells[number] | (number == 0)) & inside
         hit = free.met(aim[said], number[said])
         across = found.at(aim[said])[0] != side[start][said]
+        seen += np.bincount(side[start][said][~across], minlength=2)
         hits[0].extend(hit[~across].tolist())
         hits[1].extend(hit[across].tolist())
     if min(map(len, hits)) < _FEWEST:
         return Order(0.0, 0.0)
-    return Order(float(np.mean(hits[0])), float(np.mean(hits[1])))
+    return Order(float(np.mean(hits[0])), float(np.mean(hits[1])), bool(seen.min() >= _FEWEST_A_SIDE))

@@ -13,8 +13,9 @@ from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, median, qua
 from contour.seams.both_sides import cell_order
 from contour.seams.openings import NEAR_OUTLINE, Openings
 from contour.seams.parting import Parted, parted_by_kind
+from contour.seams.two_kinds import FEWEST, Kinds, two_kinds
 
-_DIRECTIONS, _FEWEST_CELLS = 72, 15
+_DIRECTIONS = 72
 # How large the step between both kinds is of the contrast of walls, how large of what floors of one kind differ by, how
 # much of it parts most of one kind from most of the other, and what share of cells lies among the other kind.
 # Of 440 single blocks 26 have such floors, most of them under glare, and cells in one order on both sides of the line.
@@ -24,18 +25,6 @@ _STEP, _SPREADS, _GAP, _ASTRAY = 0.1, 4.0, 0.4, 0.05
 _SURE_SPREADS, _SURE_GAP, _SURE_ASTRAY, _NEAR, _NEAR_STEP = 6.0, 0.72, 0.02, 1.3, 0.7
 _LEAST_SPREAD = 0.5
 _WALL = 0.7
-
-
-@dataclass(frozen=True, eq=False)
-class _Kinds:
-    """Floors in two kinds of light: which are lighter, (N,), the step between both, what floors of one kind differ by,
-    and how much of the step parts them.
-    """
-
-    lighter: Bools
-    step: float
-    spread: float
-    gap: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,27 +40,50 @@ def parted_by_floors(light: Bytes, free: Openings) -> Parted | None:
     """The part of a block whose cells' floors are lighter than the others'; None where they are of one kind, or lie
     among each other. light: bright where walls are, (h, w), on the openings' grid.
     """
-    place, floor = free.centre[free.cells] / free.pitch, _floors(light, free)[free.cells]
-    if len(place) < 2 * _FEWEST_CELLS:
+    told = _of_two_kinds(light, free)
+    if told is None:
         return None
-    kinds = _kinds(floor)
-    wall = quantile(light[(free.numbers == 0) & (free.depth > NEAR_OUTLINE)], _WALL)
-    if kinds.step < max(_STEP * (wall - median(floor)), _SPREADS * kinds.spread) or kinds.gap < _GAP:
-        return None
-    found = parted_by_kind(free, kinds.lighter)
-    if found is None:
-        return None
-    if np.mean(found.at(free.centre[free.cells])[0] != kinds.lighter) > _ASTRAY:
+    middles, floor, kinds = told
+    found = parted_by_kind(free, middles, kinds.more)
+    if found is None or np.mean(found.at(middles)[0] != kinds.more) > _ASTRAY:
         return None
     order = cell_order(free, found)
-    return found if order.surely_other or (not order.same and _surely(kinds, place, floor)) else None
+    return found if order.surely_other or (not order.same and _surely(kinds, middles / free.pitch, floor)) else None
 
 
-def _surely(kinds: _Kinds, place: Float64s, floor: Float64s) -> bool:
-    """Whether floors alone tell that two blocks meet, along a straight line."""
-    if kinds.gap < _SURE_GAP or kinds.step < _SURE_SPREADS * kinds.spread:
+def floors_differ(light: Bytes, free: Openings, found: Parted) -> bool:
+    """Whether floors are of two kinds, and a line parts these."""
+    told = _of_two_kinds(light, free)
+    if told is None:
         return False
-    line = _best_line(place, kinds.lighter)
+    middles, _, kinds = told
+    astray = float(np.mean(found.at(middles)[0] != kinds.more))
+    return min(astray, 1.0 - astray) < _ASTRAY
+
+
+def _of_two_kinds(light: Bytes, free: Openings) -> tuple[Float64s, Float64s, Kinds] | None:
+    """Middles of cells, (N, 2), the light of their floors, (N,), and its kinds; None where these are not two. Cells of
+    another block may be the larger ones.
+    """
+    if not free.cells.any():
+        return None
+    floors = _floors(light, free)
+    wall = quantile(light[(free.numbers == 0) & (free.depth > NEAR_OUTLINE)], _WALL)
+    for cells in (free.cells, free.of_any_block):
+        floor = floors[cells]
+        kinds = two_kinds(floor)
+        if kinds is None or kinds.gap < _GAP:
+            continue
+        if kinds.step > max(_STEP * (wall - median(floor)), _SPREADS * (kinds.spread + _LEAST_SPREAD)):
+            return free.centre[cells], floor, kinds
+    return None
+
+
+def _surely(kinds: Kinds, place: Float64s, floor: Float64s) -> bool:
+    """Whether floors alone tell that two blocks meet, along a straight line."""
+    if kinds.gap < _SURE_GAP or kinds.step < _SURE_SPREADS * (kinds.spread + _LEAST_SPREAD):
+        return False
+    line = _best_line(place, kinds.more)
     away = place @ line.normal - line.distance
     near = np.abs(away) < _NEAR
     one, other = floor[near & (away < 0.0)], floor[near & (away > 0.0)]
@@ -90,21 +102,6 @@ def _floors(light: Bytes, free: Openings) -> Float64s:
     return np.asarray(total / np.maximum(count, 1), np.float64)
 
 
-def _kinds(floor: Float64s) -> _Kinds:
-    """Floors, (N,), in the two kinds between whose means they differ most (Otsu)."""
-    order = np.argsort(floor)
-    total, count = np.cumsum(floor[order]), np.arange(1, len(floor))
-    mean, rest = total[:-1] / count, (total[-1] - total[:-1]) / count[::-1]
-    between = count * count[::-1] * (rest - mean) ** 2
-    first = _FEWEST_CELLS + int(between[_FEWEST_CELLS - 1 : len(floor) - _FEWEST_CELLS].argmax())
-    lighter = np.zeros(len(floor), np.bool_)
-    lighter[order[first:]] = True
-    dark, light = median(floor[~lighter]), median(floor[lighter])
-    spread = 1.4826 * median(np.abs(floor - np.where(lighter, light, dark))) + _LEAST_SPREAD
-    gap = quantile(floor[lighter], 0.1) - quantile(floor[~lighter], 0.9)
-    return _Kinds(lighter, light - dark, spread, gap / max(light - dark, 1e-9))
-
-
 def _best_line(place: Float64s, lighter: Bools) -> _Line:
     """The line that leaves fewest cells, at places (N, 2), among those of the other kind."""
     turns = np.arange(_DIRECTIONS) * (math.pi / _DIRECTIONS)
@@ -115,7 +112,7 @@ def _best_line(place: Float64s, lighter: Bools) -> _Line:
     count = np.arange(1, len(place))[:, None]
     # Lighter ones before the line, and darker ones behind it, or the other way around.
     wrong = before + (len(place) - count) - (before[-1:] + lighter[order[-1:]] - before)
-    wrong = np.minimum(wrong, len(place) - wrong)[_FEWEST_CELLS - 1 : len(place) - _FEWEST_CELLS]
+    wrong = np.minimum(wrong, len(place) - wrong)[FEWEST - 1 : len(place) - FEWEST]
     row, turn = (int(one) for one in np.unravel_index(wrong.argmin(), wrong.shape))
-    split: Indices = order[row + _FEWEST_CELLS - 1 : row + _FEWEST_CELLS + 1, turn]
+    split: Indices = order[row + FEWEST - 1 : row + FEWEST + 1, turn]
     return _Line(normals[turn], float(away[split, turn].mean()), float(wrong[row, turn]) / len(place))

@@ -55,6 +55,11 @@ class Openings:
         """Which openings are single cells, (N,)."""
         return self._large(*_USUAL)
 
+    @cached_property
+    def of_any_block(self) -> Bools:
+        """Which openings are single cells, of this block or of another one that lies against it, (N,)."""
+        return self._large(*_OF_EITHER)
+
     def _large(self, least: float, most: float) -> Bools:
         """Which openings are so large of what is usual, (N,)."""
         large = self.area > _LEAST_CELL * self.pitch**2
@@ -83,7 +88,7 @@ class Openings:
         """Middles of cells whose neighbours lie opposite others, as they do in one lattice however it is stretched and
         turned, and not where another begins, (N, 2). Cells of either may be the larger ones.
         """
-        cells = self._large(*_OF_EITHER)
+        cells = self.of_any_block
         middle = self.centre[cells][:, None]
         if not len(middle):
             return np.empty((0, 2))

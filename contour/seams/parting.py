@@ -185,26 +185,27 @@ def _line(free: Openings, place: Float64s, normal: Float64s) -> tuple[float, Flo
     return max(stretches, key=lambda one: one[0], default=(0.0, line[0], line[0]))
 
 
-def beside(free: Openings, share: float, start: Float64s, stop: Float64s) -> Parted | None:
+def beside(free: Openings, share: float, start: Float64s, stop: Float64s, least: float | None = None) -> Parted | None:
     """What a line from start to stop, pitches, parts from the rest of the block; None where that is nothing, as between
-    a hole and the edge.
+    a hole and the edge, or less than `least`, squares of the pitch.
     """
     every = max(1, int(free.pitch / _SAMPLES))
     depth, pitch = free.depth[::every, ::every], free.pitch / every
     along = (stop - start) / np.hypot(*(stop - start))
     first, last = (np.rint(end * pitch).astype(int).tolist() for end in (start - _END * along, stop + _END * along))
     off_line = cv2.line(np.ones(depth.shape, np.uint8), first, last, 0, 1, cv2.LINE_4) > 0
-    part = next(_pieces((depth > OPENED) & off_line, _LEAST_PART * np.count_nonzero(depth)), None)
+    samples = _LEAST_PART * np.count_nonzero(depth) if least is None else least * pitch**2
+    part = next(_pieces((depth > OPENED) & off_line, samples), None)
     if part is None:
         return None
     return _parted(free, every, share, part, off_line)
 
 
-def parted_by_kind(free: Openings, kind: Bools) -> Parted | None:
-    """The part of the block in which most cells are of a kind, (N,), one flag a cell; None where that is nothing."""
+def parted_by_kind(free: Openings, cells: Float64s, kind: Bools) -> Parted | None:
+    """The part of the block in which most cells, (N, 2), are of a kind, (N,); None where that is nothing."""
     every = max(1, int(free.pitch / _SAMPLES))
     depth, pitch = free.depth[::every, ::every], free.pitch / every
-    row, column = _samples(free.centre[free.cells], every, depth.shape)
+    row, column = _samples(cells, every, depth.shape)
     apart = np.ones(depth.shape, np.uint8)
     apart[row, column] = 0
     _, nearest = cv2.distanceTransformWithLabels(apart, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)

@@ -15,14 +15,18 @@ import cv2
 import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes
+from contour.geometry.rings import Ring
 from contour.image.opencv import grey
-from contour.image.pixel_grid import averaged, pixels_of
+from contour.image.pixel_grid import averaged, pixels_of, samples_of
 from contour.seams.both_sides import cell_order, comb_along
-from contour.seams.floors import parted_by_floors
+from contour.seams.cell_sizes import parted_by_size
+from contour.seams.floors import floors_differ, parted_by_floors
+from contour.seams.inner_corners import hanging
 from contour.seams.openings import Openings, openings
 from contour.seams.parting import (
     LONG,
     Parted,
+    beside,
     parted,
     parted_by_order,
     parted_by_row,
@@ -39,19 +43,26 @@ _STEP = 2
 # How much of a line runs along openings that part two blocks whose cells lie in one order: of those that lie alike by
 # chance, and of halves that were left where they were cut, all of it; of single blocks with such openings 0.88.
 _ALL_ALONG = 0.95
+# A row of openings that runs so much along a line, with irregular cells on both sides: no single block of 420 has one.
+_SURE_ROW = 0.85
 # And where cells are in no order, but one opening is as long as in no single block, pitches, noise across it says
 # nothing.
 _OF_NO_BLOCK = 10.0
+# Of a block: of 360 with compound or a splice, three have floors in two kinds of light, and fill 0.11 of it at most;
+# another block against it that is no more is told by its cells or by what lies between.
+_NO_PATCH = 0.25
+# What hangs on a block between two inner corners has so many square pitches well within its outline at the least.
+_LEAST_HANGING = 6.0
 
 
-def parted_by_seam(walls: SeenWalls, seen: BlockEvidence) -> Piece | None:
-    """The smaller of two parts of a block that a seam parts, pixels; None without a seam."""
+def parted_by_seam(walls: SeenWalls, seen: BlockEvidence, exterior: Ring) -> Piece | None:
+    """The smaller of two parts of a block that a seam parts, by its exterior; None without a seam; all pixels."""
     if seen.mask is None:
         return None
     coarse = _STEP if seen.wall_px >= 2 * _STEP * walls.scale else 1
     for step in sorted({coarse, 1}, reverse=True):
         free = openings(walls, seen, seen.mask, step)
-        found = _other_block(walls, seen, free)
+        found = _other_block(walls, seen, free) or _other_part(walls, seen, free, exterior)
         if found is not None:
             return _smaller(free, found.part, walls.scale)
         if free.long.max(initial=0.0) < LONG:
@@ -68,29 +79,59 @@ def _other_block(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Parte
         if order.other or not order.known:
             return strip
     found, light = parted(free), _light(walls, seen, free)
-    if found is not None and comb_along(light, free, found) and _two(walls, seen, free, found):
+    if found is not None and comb_along(light, free, found) and _two(walls, seen, free, found, light):
         return found
     others = (one for one in _in_another_order(free) if comb_along(light, free, one))
-    return next(others, None) or parted_by_floors(_lit(walls, free, light), free)
+    found = next(others, None)
+    if found is None:
+        larger = parted_by_size(free)
+        found = larger if larger is not None and comb_along(light, free, larger) else None
+    return found if found is not None else _of_other_floors(_lit(walls, free, light), free)
+
+
+def _of_other_floors(light: Bytes, free: Openings) -> Parted | None:
+    """The part whose floors are in another light, where it is comb, or more of the block than compound fills."""
+    found = parted_by_floors(light, free)
+    if found is None or comb_along(light, free, found):
+        return found
+    share = float(np.mean(found.part[free.depth > 0.0]))
+    return found if min(share, 1.0 - share) > _NO_PATCH else None
+
+
+def _other_part(walls: SeenWalls, seen: BlockEvidence, free: Openings, exterior: Ring) -> Parted | None:
+    """What hangs on the block between two inner corners, where its cells lie in another order."""
+    light = _light(walls, seen, free)
+    for one in hanging(exterior, seen.pitch_px):
+        ends = (samples_of(one.part[[0, -1]], walls.scale) - free.first) / (free.step * free.pitch)
+        found = beside(free, 0.0, ends[0], ends[1], _LEAST_HANGING)
+        if found is not None and cell_order(free, found).other and comb_along(light, free, found):
+            return found
+    return None
 
 
 def _in_another_order(free: Openings) -> Iterator[Parted]:
     """Parts in which cells lie in another order than beyond: along a row of openings, or by the order alone."""
     row = parted_by_row(free)
-    if row is not None and cell_order(free, row).other:
-        yield row
+    if row is not None:
+        order = cell_order(free, row)
+        if order.other or (row.along > _SURE_ROW and order.some_other):
+            yield row
     yield from (one for one in parted_by_order(free) if cell_order(free, one).surely_other)
 
 
-def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted) -> bool:
-    """Whether cells lie in another order on both sides of a line along long openings, or else no faint walls lead
-    across. One block that was cut in two lies in one order: there openings must run all along.
+def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted, light: Bytes) -> bool:
+    """Whether cells lie in another order on both sides of a line along long openings, or else their floors differ, or
+    no faint walls lead across. One block that was cut in two lies in one order: there openings must run all along.
     """
     order = cell_order(free, found)
-    if order.other or (order.same and found.along < _ALL_ALONG):
-        return order.other
-    alone = not order.same and found.along >= _ALL_ALONG and float(free.long.max()) > _OF_NO_BLOCK
-    return alone or runs_along(_with_faint(walls, seen, free.step), found)
+    if order.some_other or (order.same and found.along < _ALL_ALONG):
+        return order.some_other
+    if not order.same:
+        if found.along >= _ALL_ALONG and float(free.long.max()) > _OF_NO_BLOCK:
+            return True
+        if floors_differ(_lit(walls, free, light), free, found):
+            return True
+    return runs_along(_with_faint(walls, seen, free.step), found)
 
 
 def _with_faint(walls: SeenWalls, seen: BlockEvidence, step: int) -> Openings:

@@ -139,7 +139,7 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
             check_sheet(solid.edge, found.contour, seen.pitch_px)
         if promise == "auto" and plate is None and kind is None:
             solid.check_fine(seen, found.contour)
-        return replace(found, parted=parted_by_seam(walls, seen), wide=_wide(found, walls))
+        return replace(found, parted=parted_by_seam(walls, seen, found.contour.exterior), wide=_wide(found, walls))
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
         if kind is None and promise != "cut" and ends_tell:

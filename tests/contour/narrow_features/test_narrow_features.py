@@ -325,3 +325,23 @@ def test_what_lies_between_a_hole_and_the_edge_is_no_strip_but_may_be_a_thread(t
     for web, none in ((4.0, True), (2.0, True), (1.0, False)):
         hole = shapely.box(200, 100 + web * PITCH, 500, 100 + size - web * PITCH)
         assert (found(BLOCK - hole, turn_deg) is None) == none
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 33.0])
+@pytest.mark.parametrize(("side", "lies"), [(6.0, 0.7), (10.0, 0.7), (10.0, 2.0)])
+def test_what_hangs_on_a_block_by_a_corner_of_its_own_is_found(side: float, lies: float, turn_deg: float) -> None:
+    """An offcut that touches the block, and reaches over its edge by so many pitches."""
+    half = side * PITCH / math.sqrt(2.0)
+    piece = shapely.affinity.rotate(
+        shapely.box(400 - 0.5 * side * PITCH, 0, 400 + 0.5 * side * PITCH, side * PITCH), 45
+    )
+    piece = shapely.affinity.translate(piece, 0.0, 500 + half - lies * PITCH - piece.centroid.y)
+    one = found(BLOCK | piece, turn_deg)
+    assert one is not None
+    assert one.outwards
+    assert one.width_pitches == pytest.approx(2.0 * lies, abs=0.5)
+
+
+def test_a_bone_is_held_by_its_middle() -> None:
+    ends = shapely.box(100, 100, 300, 500) | shapely.box(500, 100, 700, 500)
+    assert found(ends | shapely.box(250, 230, 550, 370)) is None

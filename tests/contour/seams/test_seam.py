@@ -36,7 +36,8 @@ def seam_in(scene: Scene) -> Piece | None:
     picture = render(scene).picture
     light = wall_light(picture)
     walls = see_walls(picture, light, "auto")
-    return parted_by_seam(walls, looked_at(picture, walls, lambda _: None)[0])
+    seen = looked_at(picture, walls, lambda _: None)[0]
+    return parted_by_seam(walls, seen, seen.rings[0].coarse)
 
 
 def two(first: Contour, second: Contour, cells: CellGeometry = OTHER) -> Scene:
@@ -78,9 +79,48 @@ def test_a_block_without_whole_cells_has_no_floors() -> None:
     assert parted_by_floors(none.astype(np.uint8), free) is None
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("compound", 1_470_013), ("glare", 1_564_045)])
-def test_compound_in_some_cells_beside_a_line_and_glare_make_no_other_block(kind: str, seed: int) -> None:
-    assert seam_in(shop_floor_scene(kind, seed).scene) is None
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [
+        ("pushed_together", 3_390_109),  # cells of another size, along a straight line
+        ("pushed_together", 3_320_057),  # irregular ones
+        ("pushed_together", 3_320_011),  # and floors in another light
+        ("pushed_together", 3_350_037),  # floors, in the notch of an L, with openings along it
+        ("pushed_together", 3_390_020),  # irregular cells in another order, with long openings
+        ("offcut", 3_350_068),  # with a row of short ones
+    ],
+)
+def test_other_core_is_told_by_what_little_there_is(kind: str, seed: int) -> None:
+    assert seam_in(shop_floor_scene(kind, seed, alone=True).scene) is not None
+
+
+@pytest.mark.parametrize(
+    ("base", "high", "turn_deg", "offset_mm"), [(8.0, 7.0, 3.0, (3.0, 4.0)), (9.0, 8.0, 15.0, (1.0, 9.0))]
+)
+def test_a_triangle_of_nearly_the_same_order_begins_between_two_corners_that_turn_in(
+    base: float, high: float, turn_deg: float, offset_mm: tuple[float, float]
+) -> None:
+    """Too few walls are missing along it for a row of openings, and too few cells lie in it for their order to tell."""
+    half, up = 0.5 * base * CELLS.pitch_mm, high * CELLS.pitch_mm
+    piece = polygon([at(-half, -50.0), at(0.0, -50.0 + up), at(half, -50.0)])
+    cells = replace(CELLS, ribbon_deg=CELLS.ribbon_deg + turn_deg, offset_mm=offset_mm)
+    part = trace(render(two(patch(0.0, -85.0, LONG, 70.0), piece, cells)).picture, TraceSettings()).parted
+    assert part is not None
+    assert part.area_px2 == pytest.approx(abs(area(piece)) / 0.25, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "alone"),
+    [
+        ("compound", 1_470_013, False),
+        ("glare", 1_564_045, False),
+        ("compound", 3_360_002, True),
+        ("compound", 3_360_056, True),
+        ("splice", 3_360_005, True),
+    ],
+)
+def test_compound_in_some_cells_beside_a_line_and_glare_make_no_other_block(kind: str, seed: int, alone: bool) -> None:
+    assert seam_in(shop_floor_scene(kind, seed, alone=alone).scene) is None
 
 
 def test_two_halves_that_lie_as_they_were_cut_are_two() -> None:
@@ -103,7 +143,7 @@ def test_noise_across_one_opening_from_edge_to_edge_is_no_faint_wall() -> None:
     walls = see_walls(picture, wall_light(picture), "auto")
     seen = looked_at(picture, walls, lambda _: None)[0]
     noisy = replace(walls, mask=replace(walls.mask, faint=lambda: np.full_like(walls.mask.mask, 255)))
-    assert parted_by_seam(noisy, seen) is not None
+    assert parted_by_seam(noisy, seen, seen.rings[0].coarse) is not None
 
 
 def _line(width_mm: float) -> Contour:

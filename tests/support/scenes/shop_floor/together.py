@@ -1,4 +1,4 @@
-"""Two blocks of core that lie against each other, each with cells of its own: they are two, however near."""
+"""What else of core lies against a block, with cells of its own: another block, or an offcut."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from contour.geometry.arrays import Float64s
-from contour.geometry.rings import Contour, Ring
+from contour.geometry.rings import Contour, Ring, densified
+from contour.geometry.signed_distance import depth_inside
 from contour.synthetic import CellGeometry, Scene, Strip, l_shape, moved, polygon
 from tests.support.scenes.shop_floor.blocks import placed
-from tests.support.scenes.shop_floor.places import extent, with_things
+from tests.support.scenes.shop_floor.places import a_place, extent, with_things
 
 FORMS = ("edge", "edge", "short", "notch", "curve", "wedge")
 MOST_GAP = 0.6
@@ -28,6 +29,26 @@ def pushed_together(rng: np.random.Generator, scene: Scene) -> Scene:
     step = float(rng.uniform(0.0, MOST_GAP)) * pitch * moved(Contour(apart[None]), (0.0, 0.0), turn).exterior[0]
     one, other = ring[: len(first)] - 0.5 * step, ring[len(first) :] + 0.5 * step
     return with_things(replace(scene, outline=Contour(one)), Strip(Contour(other), _own_cells(rng, scene.cells)))
+
+
+def offcut(rng: np.random.Generator, scene: Scene) -> Scene:
+    """A piece of the same core, 20 to 100 cells large, that lies against the edge along a side or with a corner."""
+    pitch, own = scene.cells.pitch_mm, densified(scene.outline.exterior, 0.5 * scene.cells.pitch_mm)
+    while True:
+        place, (wide, deep) = a_place(rng, scene), rng.uniform(4.0, 11.0, 2) * pitch
+        ring = _box(-0.5 * wide, 0.0, 0.5 * wide, deep)
+        if rng.random() < 0.4:
+            ring = _ring(np.array([ring[0], ring[1], [float(rng.uniform(-0.5, 0.5)) * wide, 1.4 * deep]]))
+        askew = float(rng.normal(0.0, 2.0)) if rng.random() < 0.6 else float(rng.uniform(0.0, 360.0))
+        piece = moved(Contour(ring), (0.0, 0.0), askew + place.out_deg - 90.0).exterior
+        out = place.at + (float(rng.uniform(0.0, MOST_GAP)) * pitch - float((piece @ place.out).min())) * place.out
+        piece = piece + out
+        over = max(
+            float(depth_inside(scene.outline.exterior, densified(piece, 0.5 * pitch)).max()),
+            float(depth_inside(piece, own).max()),
+        )
+        if over < 0.1 * pitch:
+            return with_things(scene, Strip(Contour(piece), _own_cells(rng, scene.cells)))
 
 
 def _own_cells(rng: np.random.Generator, cells: CellGeometry) -> CellGeometry:

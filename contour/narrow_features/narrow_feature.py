@@ -37,6 +37,6 @@ def _necks(exterior: Ring, pitch_px: float) -> list[NarrowFeature]:
     found = []
     for one in hanging(exterior, pitch_px):
         if one.width_px < WIDTH * pitch_px and one.depth_px > _LONG * pitch_px:
-            x, y = one.part[[0, -1]].mean(axis=0).tolist()
+            x, y = one.part.mean(axis=0).tolist()
             found.append(NarrowFeature(one.depth_px / pitch_px, one.width_px / pitch_px, (x, y), outwards=True))
     return found

@@ -21,7 +21,7 @@ _DARK, _LIGHT = 0.12, 0.5
 _FLOORS, _WALLS, _BLACKER = 0.85, 0.68, 0.1
 # Cells within so many pitches of the line, and what the step between two neighbours leads to: a cell so many steps on.
 _ROWS, _STEPS = 2.0, (2, 3, 4)
-_FEWEST, _FEWEST_A_SIDE = 12, 6
+_FEWEST, _FEWEST_A_SIDE = 12, 10
 # How often it does on the same side of the line at the least for another order across to be told, or the same: one of
 # five places lies as near to some cell by chance, and of irregular cells two or three of five.
 _ORDERLY, _IN_SOME_ORDER = 0.5, 0.35
@@ -108,7 +108,7 @@ def cell_order(free: Openings, found: Parted) -> Order:
         said = (free.cells[number] | (number == 0)) & inside
         hit = free.met(aim[said], number[said])
         across = found.at(aim[said])[0] != side[start][said]
-        seen += np.bincount(side[start][said][~across], minlength=2)
+        seen += np.bincount(side[start][said], minlength=2)
         hits[0].extend(hit[~across].tolist())
         hits[1].extend(hit[across].tolist())
     if min(map(len, hits)) < _FEWEST:

@@ -31,10 +31,7 @@ def parted_by_size(free: Openings) -> Parted | None:
     kinds = two_kinds(_sizes(middles, 0.5 * np.log(free.area[cells]), asked))
     if kinds is None or kinds.step < _STEP or kinds.gap < _GAP:
         return None
-    found = parted_by_kind(free, middles[asked], kinds.more)
-    if found is None or np.mean(found.at(middles[asked])[0] != kinds.more) > _ASTRAY:
-        return None
-    return found
+    return parted_by_kind(free, middles[asked], kinds.more, _ASTRAY)
 
 
 def _sizes(middles: Float64s, size: Float64s, asked: Indices) -> Float64s:

@@ -44,8 +44,8 @@ def parted_by_floors(light: Bytes, free: Openings) -> Parted | None:
     if told is None:
         return None
     middles, floor, kinds = told
-    found = parted_by_kind(free, middles, kinds.more)
-    if found is None or np.mean(found.at(middles)[0] != kinds.more) > _ASTRAY:
+    found = parted_by_kind(free, middles, kinds.more, _ASTRAY)
+    if found is None:
         return None
     order = cell_order(free, found)
     return found if order.surely_other or (not order.same and _surely(kinds, middles / free.pitch, floor)) else None

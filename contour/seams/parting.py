@@ -201,8 +201,10 @@ def beside(free: Openings, share: float, start: Float64s, stop: Float64s, least:
     return _parted(free, every, share, part, off_line)
 
 
-def parted_by_kind(free: Openings, cells: Float64s, kind: Bools) -> Parted | None:
-    """The part of the block in which most cells, (N, 2), are of a kind, (N,); None where that is nothing."""
+def parted_by_kind(free: Openings, cells: Float64s, kind: Bools, astray: float) -> Parted | None:
+    """The part of the block in which most cells, (N, 2), are of a kind, (N,); None where that is nothing, or more than
+    a share of cells lies astray.
+    """
     every = max(1, int(free.pitch / _SAMPLES))
     depth, pitch = free.depth[::every, ::every], free.pitch / every
     row, column = _samples(cells, every, depth.shape)
@@ -213,7 +215,8 @@ def parted_by_kind(free: Openings, cells: Float64s, kind: Bools) -> Parted | Non
     of_kind[nearest[row, column]] = kind
     part = cv2.medianBlur(of_kind[nearest], 2 * round(_MOST_OF_PITCHES * pitch) + 1) > 0
     line = (depth > NEAR_OUTLINE) & _border(part)
-    return _parted(free, every, 0.0, part, ~line) if line.any() else None
+    found = _parted(free, every, 0.0, part, ~line) if line.any() else None
+    return None if found is None or np.mean(found.at(cells)[0] != kind) > astray else found
 
 
 def _parts(free: Openings) -> Iterator[Parted]:

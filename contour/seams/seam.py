@@ -62,7 +62,8 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence, exterior: Ring) -> Pie
     coarse = _STEP if seen.wall_px >= 2 * _STEP * walls.scale else 1
     for step in sorted({coarse, 1}, reverse=True):
         free = openings(walls, seen, seen.mask, step)
-        found = _other_block(walls, seen, free) or _other_part(walls, seen, free, exterior)
+        light = _light(walls, seen, free)
+        found = _other_block(walls, seen, free, light) or _other_part(walls, seen, free, light, exterior)
         if found is not None:
             return _smaller(free, found.part, walls.scale)
         if free.long.max(initial=0.0) < LONG:
@@ -70,7 +71,7 @@ def parted_by_seam(walls: SeenWalls, seen: BlockEvidence, exterior: Ring) -> Pie
     return None
 
 
-def _other_block(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Parted | None:
+def _other_block(walls: SeenWalls, seen: BlockEvidence, free: Openings, light: Bytes) -> Parted | None:
     """The part that is another block, by its openings."""
     strip = parted_strip(free)
     if strip is not None and parted_strip(_with_faint(walls, seen, free.step)) is not None:
@@ -78,15 +79,11 @@ def _other_block(walls: SeenWalls, seen: BlockEvidence, free: Openings) -> Parte
         order = cell_order(free, strip)
         if order.other or not order.known:
             return strip
-    found, light = parted(free), _light(walls, seen, free)
+    found = parted(free)
     if found is not None and comb_along(light, free, found) and _two(walls, seen, free, found, light):
         return found
-    others = (one for one in _in_another_order(free) if comb_along(light, free, one))
-    found = next(others, None)
-    if found is None:
-        larger = parted_by_size(free)
-        found = larger if larger is not None and comb_along(light, free, larger) else None
-    return found if found is not None else _of_other_floors(_lit(walls, free, light), free)
+    others = (one for one in _of_other_cells(free) if comb_along(light, free, one))
+    return next(others, None) or _of_other_floors(_lit(walls, free, light), free)
 
 
 def _of_other_floors(light: Bytes, free: Openings) -> Parted | None:
@@ -98,9 +95,8 @@ def _of_other_floors(light: Bytes, free: Openings) -> Parted | None:
     return found if min(share, 1.0 - share) > _NO_PATCH else None
 
 
-def _other_part(walls: SeenWalls, seen: BlockEvidence, free: Openings, exterior: Ring) -> Parted | None:
+def _other_part(walls: SeenWalls, seen: BlockEvidence, free: Openings, light: Bytes, exterior: Ring) -> Parted | None:
     """What hangs on the block between two inner corners, where its cells lie in another order."""
-    light = _light(walls, seen, free)
     for one in hanging(exterior, seen.pitch_px):
         ends = (samples_of(one.part[[0, -1]], walls.scale) - free.first) / (free.step * free.pitch)
         found = beside(free, 0.0, ends[0], ends[1], _LEAST_HANGING)
@@ -109,14 +105,19 @@ def _other_part(walls: SeenWalls, seen: BlockEvidence, free: Openings, exterior:
     return None
 
 
-def _in_another_order(free: Openings) -> Iterator[Parted]:
-    """Parts in which cells lie in another order than beyond: along a row of openings, or by the order alone."""
+def _of_other_cells(free: Openings) -> Iterator[Parted]:
+    """Parts in which cells lie in another order than beyond, along a row of openings or by the order alone, or are of
+    another size.
+    """
     row = parted_by_row(free)
     if row is not None:
         order = cell_order(free, row)
         if order.other or (row.along > _SURE_ROW and order.some_other):
             yield row
     yield from (one for one in parted_by_order(free) if cell_order(free, one).surely_other)
+    larger = parted_by_size(free)
+    if larger is not None:
+        yield larger
 
 
 def _two(walls: SeenWalls, seen: BlockEvidence, free: Openings, found: Parted, light: Bytes) -> bool:

@@ -24,6 +24,8 @@ _AS_WELL, _FAR, _OF_A_LINE = 8.0, 0.4, 2
 # Motion moves ends of neighbouring walls alike: of 215 right outlines the least is 17 nats for a line for an arc
 # whose ends it misses by so much; of two that were off by 0.8 and 1.2 cells it was 15 and 9.
 _HARDLY_BENT = 16.0
+# Shares of the way along an arc at which a line is asked how far off it leads.
+_ALONG = np.linspace(0.0, 1.0, 9)
 # Where an arc meets a line in a corner, its outermost ends may be that line's if they lie so near to it, pitches.
 _AT_JOINT = 0.2
 # Where two arcs meet so far from what was seen of either, pitches, and so deep in the material, one arc through so many
@@ -40,6 +42,9 @@ _ACROSS_LONG, _IN_LINE = 1.0, 0.03
 # So may one of which so many square pitches are unseen between the last ends on both: a bevel of three cells was drawn
 # halfway. Of 255 right outlines none has such a corner, of 139 cut lattices one.
 _UNSEEN = 2.6
+# And where another corner is cut or round, of so many: one that is cut by a cell, or as round, was drawn whole. A cut
+# is no longer than that, between edges that turn by no more.
+_UNSEEN_LIKEWISE, _CUT_LONG, _CUT_TURN = 0.75, 7.0, np.radians(125.0)
 # So is a line across a corner no longer than that, by so few witnesses, if less than a cell would be lost in it: of 135
 # blocks none has one, and one whose last walls are inked has.
 _BEVEL_LONG, _LOST = 2.0, 1.0
@@ -63,15 +68,17 @@ def untold(
     alike[np.ix_(bend, bend)] = np.abs(curvature[bend] / curvature[bend, None] - 1.0) < _ALIKE
     arcs = np.setdiff1d(bend, [k for chain in chains for k in chain.segments])
     lone = arcs[np.count_nonzero(alike[np.ix_(arcs, arcs)], axis=1) == 1]
-    curves = [(segments.members(k, len(witnesses)), PRICE_ARC) for k in lone.tolist()]
+    curves: list[tuple[Indices, float, Models | None]] = [
+        (segments.members(k, len(witnesses)), PRICE_ARC, segments.models.take(np.array([k]))) for k in lone.tolist()
+    ]
     for chain in chains:
         others = np.setdiff1d(bend, chain.segments)
         if not chain.curve.closed and not alike[np.ix_(np.array(chain.segments), others)].any():
-            curves.append((chain.witnesses, chain.price))
+            curves.append((chain.witnesses, chain.price, None))
     places = [
         witnesses.points[index].mean()
-        for index, price in curves
-        if _may_be_a_corner(witnesses, index, residual[index], price)
+        for index, price, arc in curves
+        if _may_be_a_corner(witnesses, index, residual[index], price, arc)
     ]
     places += _hardly_seen(witnesses, segments, lone, found, inlier)
     places += _bent_lines(witnesses, segments, lone, found, residual)
@@ -81,15 +88,18 @@ def untold(
     return np.array(places + _lone_bevels(witnesses, segments, found, inlier), np.complex128)
 
 
-def _may_be_a_corner(witnesses: Witnesses, index: Indices, residual: Float64s, price: float) -> bool:
+def _may_be_a_corner(
+    witnesses: Witnesses, index: Indices, residual: Float64s, price: float, arc: Models | None
+) -> bool:
     """Whether two lines explain the witnesses at `index`, in order, as well as the curve of so many nats that they
-    have these distances from, and meet far from it.
+    have these distances from, and meet far from it: from these witnesses, and from the `arc` if it is one.
     """
     count = len(index)
     first = np.arange(_OF_A_LINE, count - _OF_A_LINE + 1)
     if not len(first):
         return False
-    points = witnesses.points[index] - witnesses.points[index].mean()
+    middle = witnesses.points[index].mean()
+    points = witnesses.points[index] - middle
     lying = _lying(witnesses, index, residual)
     weight = _weights(witnesses, index, lying)
     before = _lines(points, weight).take(first - 1)
@@ -110,7 +120,11 @@ def _may_be_a_corner(witnesses: Witnesses, index: Indices, residual: Float64s, p
         return False
     on_it = points[lying]
     along = ((after.origin[best] - before.origin[best]) * other.conjugate()).imag / (way * other.conjugate()).imag
-    return bool(np.abs(before.origin[best] + along * way - on_it).min(initial=np.inf) > _FAR * witnesses.pitch_px)
+    corner = before.origin[best] + along * way
+    far = np.abs(corner - on_it).min(initial=np.inf)
+    if arc is not None:
+        far = min(far, float(np.abs(distance(arc, middle + corner)[0])))
+    return bool(far > _FAR * witnesses.pitch_px)
 
 
 def _bent_lines(
@@ -120,30 +134,33 @@ def _bent_lines(
     places = []
     for k in arcs.tolist() if len(segments) > 1 else ():
         index, (ends, tangent) = segments.members(k, len(witnesses)), _at_ends(segments, found, k)
+        arc = feet(segments.models.take(np.full(len(_ALONG), k)), ends[0] + _ALONG * (ends[1] - ends[0]))[0]
         beside = np.array([k - 1, (k + 1) % len(segments)])
-        off = np.abs(distance(segments.models.take(beside[:, None]), witnesses.points[index]))
+        edges = segments.models.take(beside[:, None])
+        off = np.abs(distance(edges, witnesses.points[index]))
         turn = np.abs(np.angle(segments.models.tangent[beside] * tangent.conjugate()))
         corner = (turn > LEAST_TURN) & ~segments.bend[beside]
         theirs = (off < _AT_JOINT * witnesses.pitch_px) & corner[:, None]
         first, last = (int(np.argmin(np.append(one, False))) for one in (theirs[0], theirs[1, ::-1]))
         for start, stop in {(a, len(index) - b) for a in (0, first) for b in (0, last)}:
             own = index[start:stop]
-            if len(own) > _OF_A_LINE and _may_be_a_line(witnesses, own, residual[own], ends):
+            if len(own) > _OF_A_LINE and _may_be_a_line(witnesses, own, residual[own], arc, edges):
                 places.append(ends.mean())
                 break
     return places
 
 
-def _may_be_a_line(witnesses: Witnesses, index: Indices, residual: Float64s, ends: Complexes) -> bool:
+def _may_be_a_line(witnesses: Witnesses, index: Indices, residual: Float64s, arc: Complexes, edges: Models) -> bool:
     """Whether a line explains the witnesses at `index` nearly as well as an arc that they have these distances from,
-    and misses that arc's ends.
+    and leads far from it between the edges beside it: that arc's places are given, and these edges, shape (2, 1).
     """
     points = witnesses.points[index]
     most = cost(witnesses, residual, index).sum() + PRICE_ARC + _HARDLY_BENT
     for weight in (_weights(witnesses, index, _lying(witnesses, index, residual)), np.ones(len(index))):
         line = _lines(points, weight).take([-1])
         nats = cost(witnesses, distance(line.take((slice(None), None)), points), index).sum() + PRICE_LINE
-        apart = np.abs(((ends - line.origin) * line.tangent.conjugate()).imag).max()
+        aside = np.abs(distance(line.take((slice(None), None)), arc))
+        apart = np.minimum(aside, np.abs(distance(edges, arc))).min(axis=0).max()
         if nats < most and apart > _APART * witnesses.pitch_px:
             return True
     return False
@@ -154,6 +171,7 @@ def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inl
     places = []
     first, last = outermost(witnesses, segments, inlier)
     lines = ~segments.bend & ~rolled(segments.bend, -1)
+    most_unseen = _UNSEEN_LIKEWISE if _cuts_a_corner(witnesses, segments, found).any() else _UNSEEN
     for k in np.flatnonzero(lines).tolist() if len(segments) > 2 else ():
         after = (k + 1) % len(segments)
         index = between(segments, inlier, k, after)
@@ -165,9 +183,17 @@ def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inl
         unseen = 0.5 * abs((sides[0] * sides[1].conjugate()).imag) / witnesses.pitch_px**2
         row = np.concatenate([last[[k]], witnesses.points[index], first[[after]]])
         across = _in_one_line(row, witnesses.pitch_px, np.pad(inside > _DEEP_IN_CORNER, 1))
-        if unseen > _UNSEEN or across or np.count_nonzero(inside > _DEEP_IN_CORNER) >= _IN_CORNER:
+        if unseen > most_unseen or across or np.count_nonzero(inside > _DEEP_IN_CORNER) >= _IN_CORNER:
             places.append(corner)
     return places
+
+
+def _cuts_a_corner(witnesses: Witnesses, segments: Segments, found: Joints) -> Bools:
+    """Which segments are short enough to cut off a corner, or round it, between what is beside them, shape (S,)."""
+    short = np.abs(found.end - rolled(found.begin, 1)) < _CUT_LONG * witnesses.pitch_px
+    tangent = segments.models.tangent
+    turn = np.abs(np.angle(rolled(tangent, -1) * rolled(tangent, 1).conj()))
+    return np.asarray(short & (turn > LEAST_TURN) & (turn < _CUT_TURN))
 
 
 def _in_one_line(points: Complexes, pitch_px: float, deep: Bools) -> bool:

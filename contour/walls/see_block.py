@@ -32,6 +32,9 @@ _PITCH_PX, _LEAST_WALL_PX = 16.0, 1.25
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
 _SUBSAMPLED_PITCH = 20.0
 _DARK_POINTS_PER_PITCH = 4
+# Squares wider than any wall and narrower than most cells; and how much lighter than midway to the table something is
+# in glare, of what walls are darker.
+_BESIDE_PITCHES, _GLARE = 0.8, 1.5
 # A horn that hangs on nothing reaches no farther from the block.
 _STRANDS_PITCHES = 5.0
 
@@ -111,7 +114,7 @@ def see_block(
     midway = None if cells.bright else midway_to_table(small, cells.level, seen.contrast)
     if midway is not None:
         # Such a block is told from the table by its darkness: fainter walls would be more of its cells' own shades.
-        seen = _darker_than_table(seen, small, midway)
+        seen = _darker_than_table(seen, small, midway, cells.level, pitch_px)
     every, few, faint = seen.mask, averaged(seen.mask, coarse_step(pitch_px)), None
     if midway is None:
         faint = seen.faint
@@ -159,13 +162,18 @@ def _enlarged(part: Bytes, shape: tuple[int, ...]) -> Bools:
     return np.asarray(cv2.resize(part, shape[::-1], interpolation=cv2.INTER_NEAREST) > 0)
 
 
-def _darker_than_table(seen: WallMask, light: Bytes, midway: float) -> WallMask:
-    """The mask without what is lighter than midway from dark walls to the table.
+def _darker_than_table(seen: WallMask, light: Bytes, midway: float, walls: float, pitch_px: float) -> WallMask:
+    """The mask without what is lighter than `midway` from dark walls to the table, or in glare to what lies beside.
 
     Cells of a black block are nearly as dark as its walls. Against so small a contrast the table's own shades, beside a
     scratch or in the block's shadow, look like walls; but they are not dark.
     """
-    _, dark = cv2.threshold(light, midway, 255, cv2.THRESH_BINARY_INV)
+    step = coarse_step(pitch_px)
+    square = np.ones((max(3, round(_BESIDE_PITCHES * pitch_px / step)),) * 2, np.uint8)
+    beside = cv2.morphologyEx(averaged(light, step, cv2.BORDER_REPLICATE), cv2.MORPH_CLOSE, square)
+    half = midway - walls
+    level = np.where(beside > midway + _GLARE * half, beside - half, midway).astype(np.uint8)
+    dark = cv2.compare(light, cv2.resize(level, light.shape[::-1], interpolation=cv2.INTER_LINEAR), cv2.CMP_LE)
     return replace(seen, mask=np.asarray(cv2.bitwise_and(seen.mask, dark), np.uint8))
 
 

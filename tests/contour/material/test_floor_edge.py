@@ -54,6 +54,12 @@ def test_the_edges_own_corners_and_roundings_are_told(inverted: bool) -> None:
     assert told(rounded(2.0), rounded(2.0), inverted=inverted).tells(middle[None], PITCH).all()
 
 
+def test_so_are_they_beside_a_table_that_is_hardly_lighter_than_floors() -> None:
+    assert not len(told(BLOCK, BLOCK, table=FLOOR + 14, inverted=False).passed(NOWHERE, PITCH))
+    passed = told(rounded(2.0), BLOCK, table=FLOOR + 14, inverted=False).passed(NOWHERE, PITCH)
+    assert np.hypot(*(passed[:, None] - BLOCK).transpose(2, 0, 1)).min(axis=0).max() < PITCH, "each corner"
+
+
 @pytest.mark.parametrize("inverted", [False, True])
 def test_a_corner_drawn_for_a_rounding_and_a_rounding_for_a_corner_are_not(inverted: bool) -> None:
     drawn_round = told(BLOCK, rounded(2.5), inverted=inverted)

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from contour.synthetic import render
+from contour.synthetic import CellGeometry, Scene, Table, camera_above, moved, polygon, render
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from tests.support.scenes.random_scenes import random_scene
 from tests.support.scenes.shop_floor_scenes import ShopFloorScene, shop_floor_scene
 from tests.support.scenes.trials import calibration_for
+
+CUT = 8.2
+"""Millimetres, of cells of 8."""
 
 
 def assert_told(scene: ShopFloorScene, place: tuple[float, float], *, within: float) -> None:
@@ -69,3 +72,30 @@ def test_a_line_that_two_ends_alone_put_across_a_corner_is_told() -> None:
     corner = max(rendered.truth_px.exterior.tolist())
     assert traced.untold_px is not None
     assert np.hypot(*np.subtract(traced.untold_px, corner)) < 1.5 * rendered.pitch_px
+
+
+@pytest.mark.parametrize("seed", [1, 23])
+def test_a_corner_of_which_little_is_seen_is_told_where_another_is_round(seed: int) -> None:
+    """It is cut by a cell, and was drawn whole, 0.7 of a cell off."""
+    turn = np.linspace(0.5 * np.pi, 0.0, 24)
+    round_ = np.column_stack([71.0 + 24.0 * np.sin(turn), 41.0 + 24.0 * np.cos(turn)]).tolist()
+    outline = polygon([(-95.0, -65.0), (95.0 - CUT, -65.0), (95.0, CUT - 65.0), *map(tuple, round_), (-95.0, 65.0)])
+    scene = Scene(
+        moved(outline, (150.0, 112.0), 9.0),
+        camera_above(800, 600, 0.375, distance_mm=1500.0),
+        CellGeometry(pitch_mm=8.0, wall_mm=0.6, ribbon_deg=seed * 7.0 % 60.0),
+        table=Table(texture=0.004),
+        seed=seed,
+    )
+    rendered = render(scene)
+    traced = trace(rendered.picture, TraceSettings())
+    assert traced.untold_px is not None
+    cut = rendered.truth_px.exterior
+    assert np.hypot(*(cut - traced.untold_px).T).min() < rendered.pitch_px
+
+
+def test_an_arc_that_a_cut_or_two_lines_lead_near_to_is_told_from_neither() -> None:
+    """A rounding of five cells: a line across it, or two, are nowhere half a cell from it."""
+    rendered = render(shop_floor_scene("undisturbed", 3_700_019, alone=True).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    assert trace(rendered.picture, TraceSettings(), rectifier=rectifier).untold_px is None

@@ -219,6 +219,17 @@ def test_where_walls_fade_there_are_cells_and_no_hole(size_mm: float) -> None:
     assert (len(seen.rings), len(seen.openings)) == (1, 0)
 
 
+def test_dark_walls_that_a_lamp_makes_as_light_as_the_table_elsewhere_are_walls() -> None:
+    rendered = picture(dark=True)
+    corner = max(rendered.truth_px.exterior.tolist(), key=sum)
+    y, x = np.mgrid[: rendered.picture.shape[0], : rendered.picture.shape[1]]
+    away = np.hypot(x - corner[0], y - corner[1]) / (3.0 * rendered.pitch_px)
+    lit = np.clip(rendered.picture + 150.0 * np.exp(-0.5 * away**2), 0, 255).astype(np.uint8)
+    seen = seen_in(lit, "auto")
+    assert seen.polarity == "dark"
+    assert np.hypot(*(seen.rings[0].coarse - corner).T).min() < rendered.pitch_px
+
+
 def test_where_glare_drowns_walls_of_the_mask_there_are_cells_and_no_hole() -> None:
     rendered = render(shop_floor_scene("glare", 2600001, alone=True).scene)
     assert [ring.is_hole for ring in seen_in(rendered.picture, "auto").rings] == [False]

@@ -10,6 +10,7 @@ import numpy as np
 from contour.synthetic import Scene, pitch_px
 from tests.support.scenes.shop_floor import cells, covers, light
 from tests.support.scenes.shop_floor.blocks import shop_floor_block
+from tests.support.scenes.shop_floor.corners import corners
 from tests.support.scenes.shop_floor.together import offcut, pushed_together
 
 KINDS: dict[str, light.Drawn] = {
@@ -51,7 +52,12 @@ GUARDS: dict[str, light.Drawn] = {
 }
 """Tables that nothing is tuned on: they tell whether what was learnt on others holds. Never a second kind."""
 
-LATER: dict[str, light.Drawn] = {"sheet": covers.sheet, "pushed_together": pushed_together, "offcut": offcut}
+LATER: dict[str, light.Drawn] = {
+    "sheet": covers.sheet,
+    "pushed_together": pushed_together,
+    "offcut": offcut,
+    "corners": corners,
+}
 """Kinds that were thought of later: never a second kind, so that all other scenes stay what they were."""
 
 _LIGHT = {"gamma", "blown_out", "dim", "coloured", "light_table", "wood", "brushed", "slots", "old_cuts", *GUARDS}

@@ -84,7 +84,7 @@ def undisturbed():
     return render(small("undisturbed", 5))
 
 
-OTHER_BLOCKS = {"undisturbed", "pushed_together"}
+OTHER_BLOCKS = {"undisturbed", "pushed_together", "corners"}
 
 
 @pytest.mark.parametrize("kind", [kind for kind in (*KINDS, *LATER) if kind not in OTHER_BLOCKS])
@@ -96,6 +96,18 @@ def test_every_kind_changes_the_picture_and_hides_the_edge_or_not(undisturbed, k
     assert [len(seen) for seen in done.visible] == [len(ring) for ring in done.truth_px.rings]
     assert (not all(seen.all() for seen in done.visible)) == (kind in HIDING)
     assert sum(seen.sum() for seen in done.visible) > 0.4 * sum(map(len, done.visible))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_corners_are_sharp_cut_or_round_and_no_edge_between_them_is_gone(seed):
+    scene = shop_floor_scene("corners", seed, alone=True).scene
+    ring = scene.outline.exterior
+    edge = np.roll(ring, -1, axis=0) - ring
+    way = edge[:, 0] + 1j * edge[:, 1]
+    quarters = np.angle(way / way[np.abs(way).argmax()]) / (0.5 * np.pi)
+    along = np.abs(quarters - np.rint(quarters)) < 0.01
+    assert {int(quarter) % 4 for quarter in np.rint(quarters[along])} == {0, 1, 2, 3}
+    assert np.abs(way[along]).min() > scene.cells.pitch_mm
 
 
 @pytest.mark.parametrize("seed", range(8))

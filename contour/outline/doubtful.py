@@ -21,8 +21,8 @@ _TELL, _DEEP_IN, _ALIKE, _APART = 4, 0.1, 0.15, 0.5
 # Two lines explain the witnesses of an arc or a curve as well where they cost no more than so many nats above it; it
 # matters where they meet so far from any of these witnesses, pitches. A line's least number of witnesses.
 _AS_WELL, _FAR, _OF_A_LINE = 8.0, 0.4, 2
-# Motion moves ends of neighbouring walls alike: of 215 right outlines the least is 17 nats for a line for an arc
-# whose ends it misses by so much; of two that were off by 0.8 and 1.2 cells it was 15 and 9.
+# Motion moves ends of neighbouring walls alike: of 215 right outlines the least is 17 nats for a line for an arc (told
+# while it was asked how far it misses that arc's ends); of two that were off by 0.8 and 1.2 cells it was 15 and 9.
 _HARDLY_BENT = 16.0
 # Shares of the way along an arc at which a line is asked how far off it leads.
 _ALONG = np.linspace(0.0, 1.0, 9)
@@ -171,7 +171,7 @@ def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inl
     places = []
     first, last = outermost(witnesses, segments, inlier)
     lines = ~segments.bend & ~rolled(segments.bend, -1)
-    most_unseen = _UNSEEN_LIKEWISE if _cuts_a_corner(witnesses, segments, found).any() else _UNSEEN
+    most_unseen = _UNSEEN_LIKEWISE if _cuts_a_corner(witnesses, segments, found) else _UNSEEN
     for k in np.flatnonzero(lines).tolist() if len(segments) > 2 else ():
         after = (k + 1) % len(segments)
         index = between(segments, inlier, k, after)
@@ -188,12 +188,12 @@ def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inl
     return places
 
 
-def _cuts_a_corner(witnesses: Witnesses, segments: Segments, found: Joints) -> Bools:
-    """Which segments are short enough to cut off a corner, or round it, between what is beside them, shape (S,)."""
+def _cuts_a_corner(witnesses: Witnesses, segments: Segments, found: Joints) -> bool:
+    """Whether any segment is short enough to cut off a corner, or round it, between what is beside it."""
     short = np.abs(found.end - rolled(found.begin, 1)) < _CUT_LONG * witnesses.pitch_px
     tangent = segments.models.tangent
     turn = np.abs(np.angle(rolled(tangent, -1) * rolled(tangent, 1).conj()))
-    return np.asarray(short & (turn > LEAST_TURN) & (turn < _CUT_TURN))
+    return bool((short & (turn > LEAST_TURN) & (turn < _CUT_TURN)).any())
 
 
 def _in_one_line(points: Complexes, pitch_px: float, deep: Bools) -> bool:

@@ -20,7 +20,7 @@ from contour.walls.faint_links import with_faint_links
 from contour.walls.lightness import light_from_table
 from contour.walls.pieces import pieces_beside, without_loose_pieces
 from contour.walls.wall_evidence import BlockEvidence
-from contour.walls.wall_mask import FINE_PITCH, WallMask, wall_mask, without_specks
+from contour.walls.wall_mask import FINE_PITCH, WallMask, light_beside_walls, wall_mask, without_specks
 from contour.walls.wall_witnesses import block_evidence
 
 # Noise alone reaches a score of 0.18.
@@ -32,9 +32,8 @@ _PITCH_PX, _LEAST_WALL_PX = 16.0, 1.25
 # Walls of such cells are two pixels wide and more: every second pixel tells their colour.
 _SUBSAMPLED_PITCH = 20.0
 _DARK_POINTS_PER_PITCH = 4
-# Squares wider than any wall and narrower than most cells; and how much lighter than midway to the table something is
-# in glare, of what walls are darker.
-_BESIDE_PITCHES, _GLARE = 0.8, 1.5
+# How much lighter than midway to the table something is in glare, of what walls are darker.
+_GLARE = 1.5
 # A horn that hangs on nothing reaches no farther from the block.
 _STRANDS_PITCHES = 5.0
 
@@ -169,8 +168,7 @@ def _darker_than_table(seen: WallMask, light: Bytes, midway: float, walls: float
     scratch or in the block's shadow, look like walls; but they are not dark.
     """
     step = coarse_step(pitch_px)
-    square = np.ones((max(3, round(_BESIDE_PITCHES * pitch_px / step)),) * 2, np.uint8)
-    beside = cv2.morphologyEx(averaged(light, step, cv2.BORDER_REPLICATE), cv2.MORPH_CLOSE, square)
+    beside = light_beside_walls(averaged(light, step, cv2.BORDER_REPLICATE), pitch_px / step, closed=True)
     half = midway - walls
     level = np.where(beside > midway + _GLARE * half, beside - half, midway).astype(np.uint8)
     dark = cv2.compare(light, cv2.resize(level, light.shape[::-1], interpolation=cv2.INTER_LINEAR), cv2.CMP_LE)

@@ -107,7 +107,7 @@ def wall_mask(
     smooth = smooth or Smooth.of(light, pitch_px, contrast)
     levels, unit = smooth.levels, smooth.unit
     sign = 1 if bright else -1
-    beside = _beside(_shrunk(levels, step), pitch_px / step, closed=not bright)
+    beside = light_beside_walls(_shrunk(levels, step), pitch_px / step, closed=not bright).astype(np.float32)
     beside *= sign
     # Every step-th pixel, not their average: an average would take the walls' contrast away.
     height = levels[step // 2 :: step, step // 2 :: step].astype(np.float32)
@@ -180,14 +180,14 @@ def _shrunk(smooth: L, step: int) -> L:
     return cast(L, cv2.resize(smooth, size, interpolation=cv2.INTER_AREA)) if step > 1 else smooth
 
 
-def _beside(small: Levels, samples: float, *, closed: bool) -> Float32s:
+def light_beside_walls(small: L, samples: float, *, closed: bool) -> L:
     """The level on which walls stand: what stays of `small` when all is taken away that is narrower than a cell, and
     brighter (with `closed`, darker).
 
     A morphological opening (Matheron): the highest of the lowest levels of all squares that hold a sample. A table's
     edge of light or shadow stays, for it stands out on one side only.
     """
-    return _opened(small, _odd(_BESIDE_PITCHES * samples - 1), closed=closed).astype(np.float32)
+    return _opened(small, _odd(_BESIDE_PITCHES * samples - 1), closed=closed)
 
 
 def _opened(light: L, size: int, *, closed: bool = False) -> L:

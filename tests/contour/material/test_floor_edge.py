@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from contour.material.floor_edge import FloorEdge, floor_edge
 from tests.support.pictures.outline_scenes import PITCH, rectangle
+from tests.support.scenes.shop_floor.corners import rounding
 
 BLOCK = rectangle(700.0, 500.0)
 CORNER = BLOCK[1]
@@ -21,8 +22,7 @@ def rounded(radius: float) -> NDArray[np.float64]:
     parts = []
     for before, corner, after in zip(np.roll(BLOCK, 1, axis=0), BLOCK, np.roll(BLOCK, -1, axis=0), strict=True):
         one, other = ((end - corner) / np.hypot(*(end - corner)) * radius * PITCH for end in (before, after))
-        turn = np.linspace(0.0, 0.5 * np.pi, 30)[:, None]
-        parts.append(corner + (one + other) - np.sin(turn) * one - np.cos(turn) * other)
+        parts.append(rounding(corner, one, other))
     return np.concatenate(parts)
 
 

@@ -9,6 +9,7 @@ from contour.synthetic import CellGeometry, Scene, Table, camera_above, moved, p
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from tests.support.scenes.random_scenes import random_scene
+from tests.support.scenes.shop_floor.corners import rounding
 from tests.support.scenes.shop_floor_scenes import ShopFloorScene, shop_floor_scene
 from tests.support.scenes.trials import calibration_for
 
@@ -77,8 +78,7 @@ def test_a_line_that_two_ends_alone_put_across_a_corner_is_told() -> None:
 @pytest.mark.parametrize("seed", [1, 23])
 def test_a_corner_of_which_little_is_seen_is_told_where_another_is_round(seed: int) -> None:
     """It is cut by a cell, and was drawn whole, 0.7 of a cell off."""
-    turn = np.linspace(0.5 * np.pi, 0.0, 24)
-    round_ = np.column_stack([71.0 + 24.0 * np.sin(turn), 41.0 + 24.0 * np.cos(turn)]).tolist()
+    round_ = rounding(np.array([95.0, 65.0]), np.array([0.0, -24.0]), np.array([-24.0, 0.0])).tolist()
     outline = polygon([(-95.0, -65.0), (95.0 - CUT, -65.0), (95.0, CUT - 65.0), *map(tuple, round_), (-95.0, 65.0)])
     scene = Scene(
         moved(outline, (150.0, 112.0), 9.0),

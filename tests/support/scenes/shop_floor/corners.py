@@ -40,5 +40,10 @@ def _corner(
         return [tip]
     if form == "cut":
         return [tip + back, tip + on]
-    turn = np.linspace(0.0, 0.5 * np.pi, 30)
-    return [tip + back + on - math.sin(one) * back - math.cos(one) * on for one in turn]
+    return list(rounding(tip, back, on))
+
+
+def rounding(tip: Float64s, back: Float64s, on: Float64s) -> Float64s:
+    """The arc that touches both edges of a right angle so far from its tip, (N, 2)."""
+    turn = np.linspace(0.0, 0.5 * np.pi, 30)[:, None]
+    return tip + (back + on) - np.sin(turn) * back - np.cos(turn) * on

@@ -18,6 +18,7 @@ def test_what_the_probe_would_change_goes_into_the_configuration_and_its_comment
     try:
         until(lambda: "page: http" in cell.service.text, what="the page")
         assert client.order("/api/v1/halt").status == 200
+        until(lambda: client.get("/api/v1/state").json["state"] == "Halted", what="the halt")
         assert client.order("/api/v1/commission/probe", content={"write": True}).status == 202
         told = until(lambda: (now := client.get("/api/v1/commission").json)["running"] is None and now, what="its end")
         assert told["changes"] == {"word_order": "big"}

@@ -37,7 +37,7 @@ def given(page: Page, key: str, value: str) -> None:
 def test_a_change_is_tried_adopted_used_by_the_next_job_and_taken_back(served: RecipesCell, browser: Browser) -> None:
     url = f"{served.client.url}recipes"
     with clean_page(browser, served.client.url, EXPECTED_NOISE, locale="en-GB") as page:
-        page.get_by_role("link", name="Recipes").click()
+        page.get_by_role("link", name="Recipes").press("Enter")  # what arrives above moves it from under a mouse
         expect(page).to_have_url(url)
         expect(page.locator("#try")).to_be_disabled()
         given(page, "max_area_mm2", str(BETWEEN))

@@ -122,7 +122,7 @@ def test_the_page_links_to_trends_which_are_drawn_in_both_languages(
     url = served[1].url
     with clean_page(browser, url, EXPECTED_NOISE, locale="en-GB", color_scheme=theme) as page:
         page.set_viewport_size({"width": width, "height": 1000})
-        page.get_by_role("link", name="Trends").click()
+        page.get_by_role("link", name="Trends").press("Enter")  # what arrives above moves it from under a mouse
         page.get_by_role("link", name="1 sheet").click()
         expect(page.get_by_role("heading", level=1)).to_have_text("Trends")
         expect(page.locator("svg")).to_have_count(7)

@@ -252,6 +252,8 @@ def _cut_tips(exterior: Ring, pitch_px: float) -> list[Ring]:
     pixels: chips beside a bevel lie anywhere.
     """
     even = fewer_vertices(exterior, _EVEN_PITCHES * pitch_px)
+    if len(even) < 4:
+        return []
     edges = np.roll(even, -1, axis=0) - even
     heading, long = edges[:, 0] + 1j * edges[:, 1], np.hypot(*edges.T) / pitch_px
     side = np.sign(signed_area(even))

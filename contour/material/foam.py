@@ -87,9 +87,13 @@ def _taken_off(region: Bytes, ring: Ring, begins: Float64s, inwards: Float64s) -
 
 
 def _square(ring: Ring, pitch_px: float) -> float:
-    """The share of a ring that runs along one of two directions at right angles, those that most of it runs along."""
+    """The share of a ring that runs along one of two directions at right angles, those that most of it runs along; 0 of
+    one too small to run along any.
+    """
     edges = RingLengths.of(fewer_vertices(ring, _NEAR_PITCHES * pitch_px)).edges
     length = np.hypot(*edges.T)
+    if not length.any():
+        return 0.0
     turned = np.arctan2(edges[:, 1], edges[:, 0])
     off = np.abs(np.remainder(turned[:, None] - turned + 0.25 * np.pi, 0.5 * np.pi) - 0.25 * np.pi)
     return float(((off < _ALONG_IT) @ length).max() / length.sum())

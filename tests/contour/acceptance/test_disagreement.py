@@ -37,6 +37,15 @@ def test_it_agrees_with_the_true_outline(name: str, kind: str) -> None:
     assert disagreement(scene.picture, scene.truth_px, scene.pitch_px).pitches < 1.2
 
 
+def test_a_sliver_of_the_block_disagrees() -> None:
+    """Of its vertices two are left: no corner of it is cut off."""
+    scene = block("rectangle", "easy")
+    middle = scene.truth_px.exterior.mean(axis=0)
+    long, wide = 5.0 * scene.pitch_px, 0.05 * scene.pitch_px
+    sliver = middle + np.array([(-long, -wide), (-long, wide), (long, wide), (long, -wide)])
+    assert disagreement(scene.picture, Contour(sliver), scene.pitch_px).pitches > LIMIT
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_half_the_block_lost_is_seen(kind: str) -> None:
     scene = block("rectangle", kind)

@@ -94,6 +94,24 @@ def test_a_corner_of_which_little_is_seen_is_told_where_another_is_round(seed: i
     assert np.hypot(*(cut - traced.untold_px).T).min() < rendered.pitch_px
 
 
+@pytest.mark.parametrize(
+    ("seed", "place"),
+    [(3_920_109, (1021.0, 933.0)), (3_920_122, (359.0, 48.0)), (3_920_068, (158.0, 446.0))],
+    ids=["where another is cut", "where another is round", "where all were drawn whole"],
+)
+def test_a_corner_that_no_wall_ends_near_is_told_sooner(seed: int, place: tuple[float, float]) -> None:
+    """They are cut by a cell, and were drawn whole, 0.6 to 0.7 of a cell off."""
+    assert_told(shop_floor_scene("corners", seed), place, within=1.0)
+
+
+def test_a_sharp_corner_that_no_wall_ends_near_is_none_to_tell_where_a_whole_cell_is_not_unseen() -> None:
+    """No wall ends within a cell of it; nor of one of nine tenths of a cell, in another picture."""
+    for kind, seed in (("mirror", 3_910_016), ("light_table", 3_910_001)):
+        rendered = render(shop_floor_scene(kind, seed).scene)
+        rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+        assert trace(rendered.picture, TraceSettings(), rectifier=rectifier).untold_px is None
+
+
 def test_an_arc_that_a_cut_or_two_lines_lead_near_to_is_told_from_neither() -> None:
     """A rounding of five cells: a line across it, or two, are nowhere half a cell from it."""
     rendered = render(shop_floor_scene("undisturbed", 3_700_019, alone=True).scene)

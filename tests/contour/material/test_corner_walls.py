@@ -1,0 +1,93 @@
+"""Walls that a corner would have, were it whole, are looked for in it; where none can be told, nothing is said."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from contour.geometry.arrays import Bytes, Float64s
+from contour.material.corner_walls import corner_walls
+from contour.synthetic import render
+from contour.tracing.trace import TraceSettings
+from contour.tracing.tracing import trace
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+from tests.support.scenes.trials import calibration_for
+
+PITCH = 20.0
+RING = np.array([[120.0, 120.0], [120.0, 480.0], [480.0, 480.0], [480.0, 120.0]])
+NOWHERE = np.empty((0, 2))
+
+
+def comb(phase: float) -> Bytes:
+    """Walls of hexagons within the ring."""
+    y, x = np.mgrid[:600, :600].astype(np.float64)
+    points = np.concatenate(
+        [
+            np.stack(np.meshgrid(np.arange(0, 620, PITCH) + at, np.arange(0, 620, 1.732 * PITCH) + down), axis=-1)
+            for at, down in ((phase, 0.0), (phase + 0.5 * PITCH, 0.866 * PITCH))
+        ],
+        axis=None,
+    ).reshape(-1, 2)
+    away = np.sort(np.stack([np.hypot(x - px, y - py) for px, py in points]), axis=0)
+    walls = (away[1] - away[0] < 3.0).astype(np.uint8) * np.uint8(255)
+    block = np.zeros_like(walls)
+    cv2.fillPoly(block, [RING.astype(np.int32)], 255)
+    return np.asarray(walls & block, np.uint8)
+
+
+def cut(mask: Bytes, deep: float) -> Bytes:
+    """Without what lies within so much of the corner at the top left."""
+    y, x = np.mgrid[:600, :600]
+    return np.where((x - 120) + (y - 120) < np.sqrt(2.0) * deep, np.uint8(0), mask)
+
+
+def told(mask: Bytes, doubted: Float64s = NOWHERE) -> tuple[list[list[float]], list[list[float]]]:
+    found = corner_walls(mask, 1.0, RING, doubted, PITCH)
+    return found.corners[found.bare].tolist(), found.corners[found.there].tolist()
+
+
+@pytest.mark.parametrize("phase", [0.0, 5.0, 10.0, 15.0])
+def test_a_corner_in_which_walls_stand_as_beside_it_is_there_and_a_cut_one_is_bare(phase: float) -> None:
+    mask = comb(phase)
+    assert told(mask, RING)[0] == []
+    assert RING[0].tolist() in told(mask, RING)[1]
+    bare, there = told(cut(mask, 0.7 * PITCH), RING)
+    assert bare == [RING[0].tolist()]
+    assert RING[0].tolist() not in there
+    assert told(cut(mask, 0.7 * PITCH))[0] == bare, "also where nobody doubts it"
+
+
+def test_a_corner_of_no_order_is_neither() -> None:
+    rng = np.random.default_rng(5)
+    noise = cv2.GaussianBlur(rng.normal(0.0, 1.0, (600, 600)), (0, 0), 3.0)
+    assert told(cut((noise > 0.1).astype(np.uint8) * np.uint8(255), 0.7 * PITCH), RING) == ([], [])
+
+
+def test_a_corner_at_the_pictures_border_and_a_picture_without_walls_are_none() -> None:
+    mask = comb(0.0)
+    assert told(np.zeros_like(mask), RING) == ([], [])
+    beyond = corner_walls(mask, 1.0, RING - 120.0, RING - 120.0, PITCH)
+    assert not beyond.bare.any()
+
+
+@pytest.mark.parametrize("seed", [3_950_038, 3_950_048, 3_950_049])
+def test_a_corner_that_was_cut_by_a_cell_and_drawn_whole_is_told(seed: int) -> None:
+    """0.6 to 0.7 of a cell off."""
+    rendered = render(shop_floor_scene("corners", seed).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+    assert traced.untold_px is not None
+    off = np.hypot(*(traced.contour.exterior - traced.untold_px).T).min()
+    assert off < 0.1 * rendered.pitch_px, "at a corner of the outline"
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"),
+    [("corners", 3_950_005), ("corners", 3_950_021), ("corners", 3_950_085), ("hot_pixels", 3_910_008)],
+)
+def test_a_sharp_corner_that_may_have_been_cut_is_told_by_its_walls(kind: str, seed: int) -> None:
+    """The last one's cells have no order, by which it was told to be cut."""
+    rendered = render(shop_floor_scene(kind, seed).scene)
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    assert trace(rendered.picture, TraceSettings(), rectifier=rectifier).untold_px is None

@@ -185,7 +185,10 @@ def _maybe_bevelled(witnesses: Witnesses, segments: Segments, found: Joints, inl
         corner = np.complex128(0.5 * (found.end[k] + found.begin[k]))
         sides = np.array([last[k], first[after]]) - corner
         unseen = 0.5 * abs((sides[0] * sides[1].conjugate()).imag) / witnesses.pitch_px**2
-        bare = np.abs(witnesses.points - corner).min() > _BARE * witnesses.pitch_px
+        away = np.abs(witnesses.points - corner).min() / witnesses.pitch_px
+        # A cut from one last end to the other leads no farther from a blunt corner.
+        lost = 2.0 * unseen * witnesses.pitch_px / max(abs(sides[0] - sides[1]), 1e-9)
+        bare = away > _BARE and lost > _ASIDE
         row = np.concatenate([last[[k]], witnesses.points[index], first[[after]]])
         across = _in_one_line(row, witnesses.pitch_px, np.pad(inside > _DEEP_IN_CORNER, 1))
         if unseen > (most_bare if bare else most) or across or np.count_nonzero(inside > _DEEP_IN_CORNER) >= _IN_CORNER:

@@ -50,7 +50,7 @@ class CornerWalls:
         return np.asarray((away < _AT * pitch_px).any(axis=1))
 
 
-def corner_walls(mask: Bytes, scale: float, ring: Ring, doubted: Float64s, pitch_px: float) -> CornerWalls:
+def corner_walls(mask: Bytes, scale: int, ring: Ring, doubted: Float64s, pitch_px: float) -> CornerWalls:
     """What walls tell of the corners of an exterior, (N, 2), in pixels.
 
     `mask`, (h, w), uint8, 255 on walls, of a picture `scale` times as large. `doubted`: places (K, 2) in which corners
@@ -58,7 +58,7 @@ def corner_walls(mask: Bytes, scale: float, ring: Ring, doubted: Float64s, pitch
     """
     before, after = ring - rolled(ring, 1), rolled(ring, -1) - ring
     long = np.minimum(np.hypot(*before.T), np.hypot(*after.T)) > _SIDE * pitch_px
-    turn = np.angle((after[:, 0] + 1j * after[:, 1]) / (before[:, 0] + 1j * before[:, 1]))
+    turn = np.angle((after[:, 0] + 1j * after[:, 1]) * (before[:, 0] - 1j * before[:, 1]))
     corners = np.flatnonzero(long & (np.sign(signed_area(ring)) * turn > _TURN))
     told = np.zeros((len(corners), 2), dtype=bool)
     for one, k in enumerate(corners.tolist()):
@@ -69,7 +69,7 @@ def corner_walls(mask: Bytes, scale: float, ring: Ring, doubted: Float64s, pitch
 
 
 def _told(
-    mask: Bytes, ring: Ring, corner: Float64s, ways: Float64s, pitch_px: float, scale: float, doubted: bool
+    mask: Bytes, ring: Ring, corner: Float64s, ways: Float64s, pitch_px: float, scale: int, doubted: bool
 ) -> tuple[bool, bool]:
     """Whether walls are missing in a corner whose sides lead these ways (2, 2), and whether they stand there."""
     half, near = _AROUND * _SAMPLES, round(_NEAR * _SAMPLES)

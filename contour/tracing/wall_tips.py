@@ -311,7 +311,8 @@ def _untold(one: VisibleRing, light: Bytes, seen: BlockEvidence, exterior: bool)
     told = floors.tells(ring.untold, seen.pitch_px)
     places = [floors.passed(one.on_line, seen.pitch_px)]
     if exterior and seen.mask is not None:
-        walls = corner_walls(seen.mask, light.shape[0] / seen.mask.shape[0], ring.ring, ring.untold, seen.pitch_px)
+        scale = round(light.shape[0] / seen.mask.shape[0])
+        walls = corner_walls(seen.mask, scale, ring.ring, ring.untold, seen.pitch_px)
         told |= walls.tells(ring.untold, seen.pitch_px)
         places.append(walls.corners[walls.bare])
     return np.concatenate([ring.untold[~told], *places])

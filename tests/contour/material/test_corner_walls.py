@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import cv2
 import numpy as np
 import pytest
@@ -14,36 +16,34 @@ from contour.tracing.tracing import trace
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 from tests.support.scenes.trials import calibration_for
 
-PITCH = 20.0
-RING = np.array([[120.0, 120.0], [120.0, 480.0], [480.0, 480.0], [480.0, 120.0]])
+PITCH, SIZE, FIRST, LAST = 20.0, 380, 40.0, 340.0
+RING = np.array([[FIRST, FIRST], [FIRST, LAST], [LAST, LAST], [LAST, FIRST]])
 NOWHERE = np.empty((0, 2))
 
 
 def comb(phase: float) -> Bytes:
-    """Walls of hexagons within the ring."""
-    y, x = np.mgrid[:600, :600].astype(np.float64)
-    points = np.concatenate(
-        [
-            np.stack(np.meshgrid(np.arange(0, 620, PITCH) + at, np.arange(0, 620, 1.732 * PITCH) + down), axis=-1)
-            for at, down in ((phase, 0.0), (phase + 0.5 * PITCH, 0.866 * PITCH))
-        ],
-        axis=None,
-    ).reshape(-1, 2)
-    away = np.sort(np.stack([np.hypot(x - px, y - py) for px, py in points]), axis=0)
-    walls = (away[1] - away[0] < 3.0).astype(np.uint8) * np.uint8(255)
-    block = np.zeros_like(walls)
+    """Walls of hexagons within the ring: as far from two of their middles, nearly."""
+    y, x = np.mgrid[:SIZE, :SIZE].astype(np.float64)
+    rows = np.sqrt(3.0) * PITCH
+    first, second = np.full((2, SIZE, SIZE), np.inf)
+    for shift in (0.0, 0.5):
+        for px, py in itertools.product(np.arange(0, SIZE + PITCH, PITCH), np.arange(0, SIZE + rows, rows)):
+            away = np.hypot(x - px - phase - shift * PITCH, y - py - shift * rows)
+            second = np.minimum(second, np.maximum(first, away))
+            first = np.minimum(first, away)
+    block = np.zeros((SIZE, SIZE), np.uint8)
     cv2.fillPoly(block, [RING.astype(np.int32)], 255)
-    return np.asarray(walls & block, np.uint8)
+    return np.where(second - first < 3.0, block, np.uint8(0))
 
 
 def cut(mask: Bytes, deep: float) -> Bytes:
     """Without what lies within so much of the corner at the top left."""
-    y, x = np.mgrid[:600, :600]
-    return np.where((x - 120) + (y - 120) < np.sqrt(2.0) * deep, np.uint8(0), mask)
+    y, x = np.mgrid[:SIZE, :SIZE]
+    return np.where(x + y - 2.0 * FIRST < np.sqrt(2.0) * deep, np.uint8(0), mask)
 
 
 def told(mask: Bytes, doubted: Float64s = NOWHERE) -> tuple[list[list[float]], list[list[float]]]:
-    found = corner_walls(mask, 1.0, RING, doubted, PITCH)
+    found = corner_walls(mask, 1, RING, doubted, PITCH)
     return found.corners[found.bare].tolist(), found.corners[found.there].tolist()
 
 
@@ -60,14 +60,20 @@ def test_a_corner_in_which_walls_stand_as_beside_it_is_there_and_a_cut_one_is_ba
 
 def test_a_corner_of_no_order_is_neither() -> None:
     rng = np.random.default_rng(5)
-    noise = cv2.GaussianBlur(rng.normal(0.0, 1.0, (600, 600)), (0, 0), 3.0)
+    noise = cv2.GaussianBlur(rng.normal(0.0, 1.0, (SIZE, SIZE)), (0, 0), 3.0)
     assert told(cut((noise > 0.1).astype(np.uint8) * np.uint8(255), 0.7 * PITCH), RING) == ([], [])
+
+
+def test_a_vertex_that_stands_twice_is_no_corner_and_takes_none_from_the_others() -> None:
+    mask = comb(0.0)
+    twice = corner_walls(mask, 1, np.concatenate([RING[:1], RING]), RING, PITCH)
+    assert RING[2].tolist() in twice.corners[twice.there].tolist()
 
 
 def test_a_corner_at_the_pictures_border_and_a_picture_without_walls_are_none() -> None:
     mask = comb(0.0)
     assert told(np.zeros_like(mask), RING) == ([], [])
-    beyond = corner_walls(mask, 1.0, RING - 120.0, RING - 120.0, PITCH)
+    beyond = corner_walls(mask, 1, RING - FIRST, RING - FIRST, PITCH)
     assert not beyond.bare.any()
 
 

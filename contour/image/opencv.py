@@ -111,6 +111,11 @@ def grown(picture: Anything, shape: tuple[int, ...]) -> Anything:
     return cast(Anything, cv2.resize(picture, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR))
 
 
+def slid(large: Float32s, small: Float32s) -> Float64s:
+    """Sums of products of a small array with the large one, at all places at which it lies within it."""
+    return np.asarray(cv2.matchTemplate(large, small, cv2.TM_CCORR), np.float64)
+
+
 def as_float32(picture: NDArray[np.uint16]) -> Float32s:
     """The picture with 32-bit floats."""
     return picture.astype(np.float32)

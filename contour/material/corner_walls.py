@@ -13,6 +13,9 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, rolled
 from contour.geometry.rings import Ring, signed_area
+from contour.geometry.signed_distance import nearest
+from contour.image.opencv import slid
+from contour.image.pixel_grid import samples_of
 
 # Corners turn by so much between sides so long, pitches.
 _TURN, _SIDE = np.radians(50.0), 2.5
@@ -35,6 +38,11 @@ _TIP, _EXPECTED, _BARE, _THERE = 0.55, 0.5, 0.12, 0.3
 _MAYBE_BARE = 0.2
 _AT = 1.0
 
+# What is looked at, in samples: its half and all of it, and in its middle what is compared.
+_HALF, _SIZE, _REACH = _AROUND * _SAMPLES, 2 * _AROUND * _SAMPLES + 1, round(_NEAR * _SAMPLES)
+_MIDDLE = slice(_HALF - _REACH, _HALF + _REACH + 1)
+_AROUND_IT = (np.hypot(*np.mgrid[-_REACH : _REACH + 1, -_REACH : _REACH + 1] / _SAMPLES) < _NEAR).astype(np.float32)
+
 
 @dataclass(frozen=True, eq=False)
 class CornerWalls:
@@ -46,8 +54,7 @@ class CornerWalls:
 
     def tells(self, points: Float64s, pitch_px: float) -> Bools:
         """In which of the points (K, 2) a corner lies whose walls are there, shape (K,)."""
-        away = np.hypot(*(self.corners[self.there] - points[:, None]).transpose(2, 0, 1))
-        return np.asarray((away < _AT * pitch_px).any(axis=1))
+        return nearest(points, self.corners[self.there]) < _AT * pitch_px
 
 
 def corner_walls(mask: Bytes, scale: int, ring: Ring, doubted: Float64s, pitch_px: float) -> CornerWalls:
@@ -56,84 +63,83 @@ def corner_walls(mask: Bytes, scale: int, ring: Ring, doubted: Float64s, pitch_p
     `mask`, (h, w), uint8, 255 on walls, of a picture `scale` times as large. `doubted`: places (K, 2) in which corners
     are doubted.
     """
-    before, after = ring - rolled(ring, 1), rolled(ring, -1) - ring
-    long = np.minimum(np.hypot(*before.T), np.hypot(*after.T)) > _SIDE * pitch_px
-    turn = np.angle((after[:, 0] + 1j * after[:, 1]) * (before[:, 0] - 1j * before[:, 1]))
-    corners = np.flatnonzero(long & (np.sign(signed_area(ring)) * turn > _TURN))
-    told = np.zeros((len(corners), 2), dtype=bool)
-    for one, k in enumerate(corners.tolist()):
-        ways = np.stack([-before[k], after[k]]) / np.hypot(*np.stack([before[k], after[k]]).T)[:, None]
-        near = np.hypot(*(doubted - ring[k]).T).min(initial=np.inf) < _AT * pitch_px
-        told[one] = _told(mask, ring, ring[k], ways, pitch_px, scale, near)
-    return CornerWalls(ring[corners], told[:, 0], told[:, 1])
+    sides = np.stack([rolled(ring, 1) - ring, rolled(ring, -1) - ring], axis=1)
+    long = np.hypot(sides[..., 0], sides[..., 1])
+    along = sides[..., 0] + 1j * sides[..., 1]
+    turn = np.angle(-along[:, 1] * along[:, 0].conj()) * np.sign(signed_area(ring))
+    at = np.flatnonzero((long.min(axis=1) > _SIDE * pitch_px) & (turn > _TURN))
+    near = nearest(ring[at], doubted) < _AT * pitch_px
+    samples, step = samples_of(ring, scale), pitch_px / scale / _SAMPLES
+    told = np.zeros((len(at), 2), dtype=bool)
+    for one, k in enumerate(at.tolist()):
+        first = samples[k] - _HALF * step
+        walls, depth = _walls(mask, first, step), _depth((samples - first) / step)
+        told[one] = _told(walls, depth, _tip(sides[k] / long[k, :, None]), doubted=bool(near[one]))
+    return CornerWalls(ring[at], told[:, 0], told[:, 1])
 
 
-def _told(
-    mask: Bytes, ring: Ring, corner: Float64s, ways: Float64s, pitch_px: float, scale: int, doubted: bool
-) -> tuple[bool, bool]:
-    """Whether walls are missing in a corner whose sides lead these ways (2, 2), and whether they stand there."""
-    half, near = _AROUND * _SAMPLES, round(_NEAR * _SAMPLES)
-    step = pitch_px / scale / _SAMPLES
-    first = (corner + 0.5) / scale - 0.5 - half * step
-    walls = _walls(mask, first, step, 2 * half + 1)
-    block = np.zeros(walls.shape, np.uint8)
-    cv2.fillPoly(block, [np.rint(((ring + 0.5) / scale - 0.5 - first) / step).astype(np.int32)], 1)
+def _walls(mask: Bytes, first: Float64s, step: float) -> Float32s:
+    """Walls from a place (x, y) of the mask on, `step` of its samples apart, (_SIZE, _SIZE), 1 where all is wall."""
+    low = np.clip(np.floor(first).astype(int) - 2, 0, np.subtract(mask.shape[::-1], 1))
+    high = np.maximum(np.ceil(first + _SIZE * step).astype(int) + 2, low + 1)
+    part = mask[low[1] : high[1], low[0] : high[0]].astype(np.float32) / 255
+    blurred = cv2.GaussianBlur(part, (0, 0), max(0.3, _BLUR * step))
+    there = np.array([[step, 0.0, first[0] - low[0]], [0.0, step, first[1] - low[1]]])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return np.asarray(cv2.warpAffine(blurred, there, (_SIZE, _SIZE), flags=flags), np.float32)
+
+
+def _depth(ring: Ring) -> Float32s:
+    """How deep in a ring of samples, (N, 2), each lies, pitches, (_SIZE, _SIZE): outside 0, as is what is beyond."""
+    block = np.zeros((_SIZE, _SIZE), np.uint8)
+    cv2.fillPoly(block, [np.rint(ring).astype(np.int32)], 1)
     block[[0, -1]] = block[:, [0, -1]] = 0
-    depth = cv2.distanceTransform(block, cv2.DIST_L2, 5) / _SAMPLES
-    inside = (depth > _DEEP).astype(np.float32)
-    middle = slice(half - near, half + near + 1)
-    y, x = np.mgrid[-near : near + 1, -near : near + 1] / _SAMPLES
-    beside = inside[middle, middle] * (np.hypot(x, y) < _NEAR).astype(np.float32)
-    tip = np.zeros(beside.shape, np.uint8)
+    return np.asarray(cv2.distanceTransform(block, cv2.DIST_L2, 5) / _SAMPLES, np.float32)
+
+
+def _tip(ways: Float64s) -> Bytes:
+    """1 in the tip of a corner in the middle whose sides lead these ways, unit vectors (2, 2), around it."""
+    tip = np.zeros(_AROUND_IT.shape, np.uint8)
     # Unit ways add up to twice the cosine of half the angle between them.
     legs = 2.0 * _TIP * ways / max(float(np.hypot(*ways.sum(axis=0))), 0.1)
-    corners = np.concatenate([[[0.0, 0.0]], legs]) * _SAMPLES + near
+    corners = np.concatenate([[[0.0, 0.0]], legs]) * _SAMPLES + len(tip) // 2
     cv2.fillPoly(tip, [np.rint(corners * 16).astype(np.int32)], 1, cv2.LINE_8, 4)
+    return tip
+
+
+def _told(walls: Float32s, depth: Float32s, tip: Bytes, *, doubted: bool) -> tuple[bool, bool]:
+    """Whether walls are missing in the tip of the corner in the middle, and whether they stand there."""
+    inside = (depth > _DEEP).astype(np.float32)
+    beside = inside[_MIDDLE, _MIDDLE] * _AROUND_IT
     usual = float(walls[inside > 0].mean()) if inside.any() else 0.0
     if beside.sum() < _SAMPLES**2 or not tip.any() or usual == 0.0:
         return False, False
-    there = float(walls[middle, middle][tip > 0].mean()) / usual
+    there = float(walls[_MIDDLE, _MIDDLE][tip > 0].mean()) / usual
     if not doubted and there > _MAYBE_BARE:
         return False, False
     at, beside = (part.astype(np.float32) / np.float32(part.sum()) for part in (tip, beside))
-    alike, would = _alike(walls, beside, middle), _matched(walls, at) / usual
-    away = np.hypot(*(np.mgrid[: len(alike), : len(alike)] - (half - near))) / _SAMPLES
-    whole = _matched((depth > _WITHIN).astype(np.float32), at) > _TIP_COVERED
-    whole &= _matched(inside, beside) > _COVERED
+    alike = _alike(walls, beside)
+    away = np.hypot(*(np.mgrid[: len(alike), : len(alike)] - _MIDDLE.start)) / _SAMPLES
+    whole = (slid((depth > _WITHIN).astype(np.float32), at) > _TIP_COVERED) & (slid(inside, beside) > _COVERED)
     alike[~whole | (away < _LEAST_AWAY) | (away > _MOST_AWAY)] = -1.0
     best = _best(alike)
-    if len(best) == 0 or alike[best[0]] < _ALIKE:
+    if not best or alike[best[0]] < _ALIKE:
         return False, False
+    would = slid(walls, at) / usual
     expected = float(np.median([would[place] for place in best]))
     return (there < _BARE * expected, there > _THERE * expected) if expected > _EXPECTED else (False, False)
 
 
-def _walls(mask: Bytes, first: Float64s, step: float, size: int) -> Float32s:
-    """Walls from a place (x, y) of the mask on, `step` of its samples apart, (size, size), 1 where all is wall."""
-    low = np.clip(np.floor(first).astype(int) - 2, 0, np.subtract(mask.shape[::-1], 1))
-    high = np.ceil(first + size * step).astype(int) + 2
-    part = mask[low[1] : max(high[1], low[1] + 1), low[0] : max(high[0], low[0] + 1)].astype(np.float32) / 255
-    blurred = cv2.GaussianBlur(part, (0, 0), max(0.3, _BLUR * step))
-    there = np.array([[step, 0.0, first[0] - low[0]], [0.0, step, first[1] - low[1]]])
-    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    return np.asarray(cv2.warpAffine(blurred, there, (size, size), flags=flags), np.float32)
-
-
-def _alike(walls: Float32s, weight: Float32s, middle: slice) -> Float32s:
+def _alike(walls: Float32s, weight: Float32s) -> Float64s:
     """How alike what lies in the middle, with these weights of 1 in all, is to what lies elsewhere: correlations."""
-    own = walls[middle, middle]
+    own = walls[_MIDDLE, _MIDDLE]
     off = own - np.float32((own * weight).sum())
-    mean = _matched(walls, weight)
-    spread = np.maximum(_matched(walls * walls, weight) - mean * mean, 1e-4) * float((off * off * weight).sum())
-    return np.asarray(_matched(walls, off * weight) / np.sqrt(np.maximum(spread, 1e-8)), np.float32)
+    mean = slid(walls, weight)
+    spread = np.maximum(slid(walls * walls, weight) - mean * mean, 1e-4) * float((off * off * weight).sum())
+    return np.asarray(slid(walls, off * weight) / np.sqrt(np.maximum(spread, 1e-8)))
 
 
-def _matched(picture: Float32s, weight: Float32s) -> Float32s:
-    """Sums of the picture with these weights, laid everywhere within it."""
-    return np.asarray(cv2.matchTemplate(picture, weight, cv2.TM_CCORR), np.float32)
-
-
-def _best(alike: Float32s) -> list[tuple[int, int]]:
+def _best(alike: Float64s) -> list[tuple[int, int]]:
     """The places that are most alike, best first, no two close together, none that is unlike."""
     left, best = alike.copy(), list[tuple[int, int]]()
     y, x = np.mgrid[: left.shape[0], : left.shape[1]]

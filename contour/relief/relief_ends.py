@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from contour.geometry.arrays import Float32s, Float64s, Int64s
+from contour.image.opencv import slid
 from contour.image.pixel_sampling import sample_at
 from contour.relief.relief import Relief
 
@@ -89,8 +89,8 @@ def _fitted(
     top, side = _strip(reach[:, None], beside[None, :], (inwards, aside), slope, width, blur_px)
     # Slid over each other: the patch moves against the end.
     ones = np.ones_like(seen[0])
-    squares = [_slid(part, ones) for part in (top * top, top * side, side * side)]
-    explained = sum(_explained(_slid(top, plane), _slid(side, plane), *squares) for plane in seen)
+    squares = [slid(part, ones) for part in (top * top, top * side, side * side)]
+    explained = sum(_explained(slid(top, plane), slid(side, plane), *squares) for plane in seen)
     total = float(sum((plane * plane).sum() for plane in seen))
     lost = np.maximum(total - explained, 1e-3 * total)
     # Sliding counts from the last end and centre to the first.
@@ -138,11 +138,6 @@ def _strip(
 
 def _ramp(x: Float64s, sigma: float) -> Float64s:
     return np.clip(0.5 + x / (_RAMP * sigma), 0.0, 1.0)
-
-
-def _slid(large: Float32s, small: Float32s) -> Float64s:
-    """Sums of products of a small array with the large one, at all places at which it lies within it."""
-    return np.asarray(cv2.matchTemplate(large, small, cv2.TM_CCORR), np.float64)
 
 
 def _steps(first: float, last: float, step: float) -> Int64s:

@@ -7,16 +7,19 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from contour.edge.visible_edge import VisibleRing
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, median, quantile, rolled
 from contour.geometry.rectifier import Rectifier, rectified
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.signed_distance import depth_inside, nearest
+from contour.material.corner_walls import corner_walls
+from contour.material.floor_edge import floor_edge
 from contour.outline.fit import FittedRing
 from contour.relief.reach import Reach
 from contour.relief.relief import Relief
-from contour.walls.wall_evidence import RingEvidence, WitnessKind
+from contour.walls.wall_evidence import BlockEvidence, RingEvidence, WitnessKind
 
 _FAR_OFF_PITCHES = 0.5
 # Edges that are all but parallel meet anywhere: a corner so far from all that was seen of the block is none of it.
@@ -123,6 +126,20 @@ def ends_outside_corners(
     flat = rectified(ring, rectifier)
     away = nearest(rectified(left, rectifier), flat[_at_corners(RingLengths.of(flat), pitch_px)])
     return left[away < _AT_CORNER_PITCHES * pitch_px]
+
+
+def untold_corners(one: VisibleRing, light: Bytes, seen: BlockEvidence, *, exterior: bool) -> Float64s:
+    """Where nothing that is seen tells whether a ring is round or a corner, walls or floors, (K, 2), pixels."""
+    ring = one.fitted
+    floors = floor_edge(light, ring.ring, seen.pitch_px, bright=seen.polarity == "bright")
+    told = floors.tells(ring.untold, seen.pitch_px)
+    places = [floors.passed(one.on_line, seen.pitch_px)]
+    if exterior and seen.mask is not None:
+        scale = round(light.shape[0] / seen.mask.shape[0])
+        walls = corner_walls(seen.mask, scale, ring.ring, ring.untold, seen.pitch_px)
+        told |= walls.tells(ring.untold, seen.pitch_px)
+        places.append(walls.corners[walls.bare])
+    return np.concatenate([ring.untold[~told], *places])
 
 
 def _at_corners(lengths: RingLengths, pitch_px: float) -> Bools:

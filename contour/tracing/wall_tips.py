@@ -14,15 +14,13 @@ from contour.edge.edge_parts import EdgePart
 from contour.edge.mirrored_block import is_mirrored, mirrored_block
 from contour.edge.open_cells import without_open_cells
 from contour.edge.table_look import TableLook, table_look
-from contour.edge.visible_edge import VisibleRing, doubtful, visible_rings
+from contour.edge.visible_edge import doubtful, visible_rings
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.image.opencv import grey
 from contour.material.closed_cells import MaterialEdge, material_edge
-from contour.material.corner_walls import corner_walls
-from contour.material.floor_edge import floor_edge
 from contour.material.foam import foam_edge
 from contour.outline.uncertainty import uncertainty
 from contour.relief.reach import reach
@@ -48,6 +46,7 @@ from contour.tracing.evidence_check import (
     check_reached,
     check_unseen,
     ends_outside_corners,
+    untold_corners,
 )
 from contour.tracing.plates import check_sheet, like_plate, onto_webs, plate_edge
 from contour.tracing.touched_edges import touched_cuts
@@ -278,7 +277,7 @@ def _cut(
             check_own_ends(one.evidence, one.fitted, seen.pitch_px, rectifier)
         check_reached(reaches or (), _GAP_PITCHES * seen.pitch_px)
     lit = light if relief is None else grey(picture)
-    untold = _first(_untold(one, lit, seen, one is visible[0]) for one in visible)
+    untold = _first(untold_corners(one, lit, seen, exterior=one is visible[0]) for one in visible)
     outside = _first(
         ends_outside_corners(one.evidence, one.fitted.ring, one.fitted.inlier, seen.pitch_px, rectifier)
         for one in visible
@@ -302,20 +301,6 @@ def _cut(
 def _first(rings: Iterable[Float64s]) -> tuple[float, float] | None:
     """The first of the places (x, y) told of rings one by one, (K, 2) each; None without any."""
     return next(((float(x), float(y)) for places in rings for x, y in places), None)
-
-
-def _untold(one: VisibleRing, light: Bytes, seen: BlockEvidence, exterior: bool) -> Float64s:
-    """Where nothing that is seen tells whether a ring is round or a corner, walls or floors, (K, 2), pixels."""
-    ring = one.fitted
-    floors = floor_edge(light, ring.ring, seen.pitch_px, bright=seen.polarity == "bright")
-    told = floors.tells(ring.untold, seen.pitch_px)
-    places = [floors.passed(one.on_line, seen.pitch_px)]
-    if exterior and seen.mask is not None:
-        scale = round(light.shape[0] / seen.mask.shape[0])
-        walls = corner_walls(seen.mask, scale, ring.ring, ring.untold, seen.pitch_px)
-        told |= walls.tells(ring.untold, seen.pitch_px)
-        places.append(walls.corners[walls.bare])
-    return np.concatenate([ring.untold[~told], *places])
 
 
 def looked_at(picture: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[BlockEvidence, TableLook]:

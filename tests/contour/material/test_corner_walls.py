@@ -11,10 +11,8 @@ import pytest
 from contour.geometry.arrays import Bytes, Float64s
 from contour.material.corner_walls import corner_walls
 from contour.synthetic import render
-from contour.tracing.trace import TraceSettings
-from contour.tracing.tracing import trace
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import traced_with_lens
 
 PITCH, SIZE, FIRST, LAST = 20.0, 380, 40.0, 340.0
 RING = np.array([[FIRST, FIRST], [FIRST, LAST], [LAST, LAST], [LAST, FIRST]])
@@ -81,8 +79,7 @@ def test_a_corner_at_the_pictures_border_and_a_picture_without_walls_are_none() 
 def test_a_corner_that_was_cut_by_a_cell_and_drawn_whole_is_told(seed: int) -> None:
     """0.6 to 0.7 of a cell off."""
     rendered = render(shop_floor_scene("corners", seed).scene)
-    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
-    traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+    traced = traced_with_lens(rendered)
     assert traced.untold_px is not None
     off = np.hypot(*(traced.contour.exterior - traced.untold_px).T).min()
     assert off < 0.1 * rendered.pitch_px, "at a corner of the outline"
@@ -94,6 +91,4 @@ def test_a_corner_that_was_cut_by_a_cell_and_drawn_whole_is_told(seed: int) -> N
 )
 def test_a_sharp_corner_that_may_have_been_cut_is_told_by_its_walls(kind: str, seed: int) -> None:
     """The last one's cells have no order, by which it was told to be cut."""
-    rendered = render(shop_floor_scene(kind, seed).scene)
-    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
-    assert trace(rendered.picture, TraceSettings(), rectifier=rectifier).untold_px is None
+    assert traced_with_lens(render(shop_floor_scene(kind, seed).scene)).untold_px is None

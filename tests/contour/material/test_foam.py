@@ -13,7 +13,7 @@ from service.measuring.measure import Measurer
 from service.reasons import Reason
 from tests.support.scenes.foam import foam_slab
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import measured
 
 
 @pytest.mark.parametrize("seed", [112, 117], ids=["a hard shadow along two sides", "bubbles as light as the table"])
@@ -45,6 +45,4 @@ def test_a_printed_code_is_flat_between_its_borders_and_no_foam() -> None:
 
 def test_a_slab_of_which_a_point_is_left_is_none() -> None:
     """Beside a blurred block with writing; nothing is divided by how long its outline is."""
-    rendered = render(shop_floor_scene("writing", 3_910_011).scene)
-    found = Measurer(calibration_for(rendered.camera)).measure(rendered.picture, PlainRecipe(), rendered.thickness_mm)
-    assert found.reasons
+    assert measured(render(shop_floor_scene("writing", 3_910_011).scene)).reasons

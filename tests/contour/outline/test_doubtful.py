@@ -11,7 +11,7 @@ from contour.tracing.tracing import trace
 from tests.support.scenes.random_scenes import random_scene
 from tests.support.scenes.shop_floor.corners import rounding
 from tests.support.scenes.shop_floor_scenes import ShopFloorScene, shop_floor_scene
-from tests.support.scenes.trials import calibration_for
+from tests.support.scenes.trials import traced_with_lens
 
 CUT = 8.2
 """Millimetres, of cells of 8."""
@@ -20,8 +20,7 @@ CUT = 8.2
 def assert_told(scene: ShopFloorScene, place: tuple[float, float], *, within: float) -> None:
     """It is told within so many pitches of a place, pixels."""
     rendered = render(scene.scene)
-    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
-    traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+    traced = traced_with_lens(rendered)
     assert traced.untold_px is not None
     assert np.hypot(*np.subtract(traced.untold_px, place)) < within * rendered.pitch_px
 
@@ -68,8 +67,7 @@ def test_a_corner_of_which_hardly_anything_is_seen_is_told() -> None:
 def test_a_line_that_two_ends_alone_put_across_a_corner_is_told() -> None:
     """The walls of the cell in it are inked as dark as the table, 0.7 of a cell of the block."""
     rendered = render(shop_floor_scene("writing", 1_310_004).scene)
-    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
-    traced = trace(rendered.picture, TraceSettings(), rectifier=rectifier)
+    traced = traced_with_lens(rendered)
     corner = max(rendered.truth_px.exterior.tolist())
     assert traced.untold_px is not None
     assert np.hypot(*np.subtract(traced.untold_px, corner)) < 1.5 * rendered.pitch_px
@@ -107,13 +105,9 @@ def test_a_corner_that_no_wall_ends_near_is_told_sooner(seed: int, place: tuple[
 def test_a_sharp_corner_that_no_wall_ends_near_is_none_to_tell_where_a_whole_cell_is_not_unseen() -> None:
     """No wall ends within a cell of it; nor of one of nine tenths of a cell, in another picture."""
     for kind, seed in (("mirror", 3_910_016), ("light_table", 3_910_001)):
-        rendered = render(shop_floor_scene(kind, seed).scene)
-        rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
-        assert trace(rendered.picture, TraceSettings(), rectifier=rectifier).untold_px is None
+        assert traced_with_lens(render(shop_floor_scene(kind, seed).scene)).untold_px is None
 
 
 def test_an_arc_that_a_cut_or_two_lines_lead_near_to_is_told_from_neither() -> None:
     """A rounding of five cells: a line across it, or two, are nowhere half a cell from it."""
-    rendered = render(shop_floor_scene("undisturbed", 3_700_019, alone=True).scene)
-    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
-    assert trace(rendered.picture, TraceSettings(), rectifier=rectifier).untold_px is None
+    assert traced_with_lens(render(shop_floor_scene("undisturbed", 3_700_019, alone=True).scene)).untold_px is None

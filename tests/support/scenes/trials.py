@@ -15,7 +15,7 @@ from contour.errors import ContourError, ParameterError
 from contour.geometry.rings import Contour
 from contour.polygon.polygon import cutting_polygon
 from contour.synthetic import CameraModel, Rendered
-from contour.tracing.trace import Method, TraceSettings
+from contour.tracing.trace import Method, Trace, TraceSettings
 from contour.tracing.tracing import trace
 from service.config.plain_recipe import PlainRecipe
 from service.config.recipes import AnyRecipe
@@ -52,6 +52,12 @@ class Trial:
     def total_ms(self) -> float:
         """All stages together."""
         return sum(self.milliseconds.values())
+
+
+def traced_with_lens(rendered: Rendered) -> Trace:
+    """What wall-tips traces in a picture, with the lens of its camera."""
+    rectifier = calibration_for(rendered.camera).rectifier(rendered.thickness_mm)
+    return trace(rendered.picture, TraceSettings(), rectifier=rectifier)
 
 
 def measured(rendered: Rendered, recipe: AnyRecipe | None = None) -> Measurement:

@@ -285,7 +285,7 @@ def _cut(
     found = _trace(seen, contour, light, uncertainty_px=bounds[0].whole_px)
     # What fills cells hides walls, too; but what is dark may be a hole in the block's shade.
     middles = seen.openings[:, :2]
-    clear = (look.foreign_at(middles) > 0.0) | ~look.lighter_at(middles)
+    clear = ((look.foreign_at(middles) > 0.0) | ~look.lighter_at(middles)) & ~look.solid_at(middles)
     opening = next(((float(x), float(y), 2.0 * float(radius)) for x, y, radius in seen.openings[clear]), None)
     return replace(
         found,

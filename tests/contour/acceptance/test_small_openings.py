@@ -10,10 +10,12 @@ import pytest
 from contour.geometry.rings import Contour
 from contour.synthetic import Rendered, render
 from contour.synthetic.outlines import disc_ring, rectangle, with_holes
-from contour.tracing.trace import Trace
+from contour.tracing.trace import Trace, TraceSettings
+from contour.tracing.tracing import trace
 from service.config.plain_recipe import PlainRecipe
 from service.reasons import Reason
 from tests.support.scenes.bench_scenes import easy
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 from tests.support.scenes.trials import measured
 
 PITCH_MM = 9.0
@@ -44,6 +46,11 @@ def test_a_hole_of_two_cells_is_refused_with_its_place_unless_the_recipe_asks_fo
     assert text.startswith("Walls are missing over ")
     assert "max_disagreement_pitches: 0" in text
     assert not measured(rendered, PlainRecipe(max_disagreement_pitches=0)).findings
+
+
+def test_grain_of_what_fills_cells_shows_no_table_and_is_no_hole() -> None:
+    rendered = render(shop_floor_scene("compound", 4_010_087).scene)
+    assert trace(rendered.picture, TraceSettings()).opening_px is None
 
 
 def test_its_place_moves_with_the_trace() -> None:

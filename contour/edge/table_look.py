@@ -55,6 +55,8 @@ _HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT, _SHADED_RIM, _BLOWN_OUT = (0.2, 0.5), (1.0,
 # Shadows, sides of the block and its mirror image make a band beside it that has no room for a disc of this radius, or
 # for few here and there; where walls are lost in a cell or two, the cells are flat.
 _BAND, _LONG_PITCHES = 0.55, 2.0
+# Where walls meet they are wider by half as much again than they are.
+_STROKE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +214,7 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
     flat = _grown(_wide((parts > 0) & ~table_part, roomy > 0), inside, reach)
     busy = _busy(slope, block, samples)
     quiet = (busy < _QUIET) & ~table
-    loose = None if seen.loose is None else _loose(seen.loose, (whole == 0) & light.alike, samples)
+    loose = None if seen.loose is None else _loose(_walls(seen, picture.shape), (whole == 0) & light.alike, samples)
     told = table_part if loose is None else table_part | (loose & ~quiet)  # what parts it from the block may hide some
     mean = channels.mean(small)
     other = (flat | quiet) & ~told
@@ -239,6 +241,20 @@ def table_look(picture: Bytes, seen: BlockEvidence, *, plain: bool = False, mirr
         within = (foreign & inside) | _mostly(beside_block, busy < _SMOOTH)
         look = replace(look, foreign=within, away=_away(within, step), plain=False)
     return look
+
+
+def _walls(seen: BlockEvidence, shape: tuple[int, ...]) -> Bytes:
+    """The walls that are told from the block in a picture of that shape, (h, w), without pieces most of which is wider:
+    print on labels.
+    """
+    walls = np.asarray(seen.loose)
+    reach = _STROKE * 0.5 * seen.wall_px * len(walls) / shape[0]
+    wide = deep(walls > 0, reach)
+    if not wide.any():
+        return walls
+    count, pieces = pieces_of(walls, 8)
+    size, of_strokes = (np.bincount(pieces[part], minlength=count) for part in (walls > 0, within(wide, reach) > 0))
+    return walls * (of_strokes <= _MOST * size).take(pieces)
 
 
 def _loose(walls: Bytes, alike: Bools, samples: float) -> Bools | None:

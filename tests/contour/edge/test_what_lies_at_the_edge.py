@@ -49,6 +49,12 @@ def test_where_nothing_lies_over_the_edge_all_of_it_is_seen(name: str) -> None:
     assert scene.off.max() < 0.1 * PITCH
 
 
+def test_a_dark_label_is_there_though_its_print_looks_like_a_piece_of_comb_in_a_shadow() -> None:
+    traced = trace(render(shop_floor_scene("tape", 4_060_059).scene).picture, TraceSettings())
+    assert traced.evidence is not None
+    assert "object" in {stretch.by for stretch in traced.evidence}
+
+
 @pytest.mark.parametrize("name", COVERED)
 def test_what_lies_over_a_straight_edge_is_found_there_and_the_edge_goes_on_beneath(name: str) -> None:
     scene = edge_scene(name)

@@ -21,7 +21,7 @@ from contour.edge.table_look import shaded_comb
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, Int32s, median, quantile
 from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.channels import largest
-from contour.image.opencv import fewer_vertices, pieces_and_areas, pieces_of
+from contour.image.opencv import fewer_vertices, pieces_and_areas, pieces_and_boxes, pieces_of, within
 from contour.image.pixel_grid import pixels_of, samples_of, whole_averaged
 
 _PITCH_PX = 6
@@ -38,14 +38,17 @@ _BLUR_PITCHES = 0.5
 # So far inside walls may be faint: there they are so busy of what comb is. In the middle of holes it is 0.08 of that,
 # of faded walls 0.17 or more; and nothing is a hole that is busier than the table and so much of what comb is.
 _FAR_INSIDE_PITCHES, _FAINTEST, _FAINTEST_IN_HOLES = 3.0, 0.12, 0.06
+# Fainter ones are none of a hole's where what lies around it, so far, is no busier than that of comb, and nearly all of
+# it busier than the table: at holes walls end, elsewhere they fade.
+_AROUND_PITCHES, _FADED, _NEARLY_ALL = 1.5, 0.45, 0.05
 # Comb in shade is wider: so far its means reach into dark things beside it.
 _SHADED_ROOM_PITCHES = 1.3
 # Up to so far within a hole its walls count: two windows of a pitch reach a pitch, and half as far again aslant.
 _RIM_PITCHES = 1.5
 # A corner is cut off by so many edges where both turns are more than the first, and together less than the second; and
-# the edges on both sides so long. A piece so wide lies there, so near the tip; the contour is followed so closely.
+# the edges on both sides so long. A piece lies so near the tip; the contour is followed so closely.
 _BEVEL, _SIDE_PITCHES, _EVEN_PITCHES = (np.radians(15.0), np.radians(125.0)), 1.5, 0.3
-_BEVEL_SIDES, _LEAST_PIECE, _TIP_PITCHES = (1, 2), 0.8, 2.0
+_BEVEL_SIDES, _TIP_PITCHES = (1, 2), 2.0
 # What a step aside and down counts for in a distance.
 _DIAGONAL = 1.37
 _FRACTION_BITS = 4
@@ -115,6 +118,7 @@ def disagreement(
     shaded = _but(np.asarray(shaded_comb(activity, largest(level), ours, of_table) * np.uint8(255), np.uint8), busy)
     busy = np.asarray(cv2.bitwise_or(busy, _opened(shaded, _square(_SHADED_ROOM_PITCHES * small_pitch_px))), np.uint8)
     busy[_far_inside(fainter, ours, _FAR_INSIDE_PITCHES * small_pitch_px)] = 255
+    busy |= _faded(activity, _but(ours, busy), ours, (of_table, _FADED * of_comb), small_pitch_px)
     # The picture's border is no block, and block ends there.
     outside = np.asarray(cv2.distanceTransform(_inverted(busy), cv2.DIST_L2, 3), np.float32)
     inside = _distances(theirs)
@@ -149,6 +153,26 @@ def _far_inside(fainter: Bools, ours: Bytes, far_px: float) -> Bools:
     square = np.ones((2 * int(far_px / _DIAGONAL) + 1,) * 2, np.uint8)
     fainter = fainter & (cv2.erode(ours, square, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0)
     return fainter & (_distances(ours) > far_px) if fainter.any() else fainter
+
+
+def _faded(activity: Float32s, quiet: Bytes, ours: Bytes, levels: tuple[float, float], small_pitch_px: float) -> Bytes:
+    """The quiet pieces, wide enough to count, that are busier than the first level, in surroundings less busy than the
+    other.
+    """
+    wide = _opened(quiet, _square(_SCRATCH_PITCHES * small_pitch_px))
+    found = np.zeros_like(quiet)
+    if not wide.any():
+        return found
+    labels, boxes = pieces_and_boxes(_touched(quiet, wide), 4)
+    reach = round(_AROUND_PITCHES * small_pitch_px)
+    for number, (x, y, across, down) in enumerate(boxes[1:, :4].tolist(), 1):
+        box = slice(max(0, y - reach), y + down + reach), slice(max(0, x - reach), x + across + reach)
+        piece = labels[box] == number
+        beside = (within(piece, reach) > 0) & (ours[box] > 0) & ~piece
+        busy = activity[box]
+        if beside.any() and quantile(busy[piece], _NEARLY_ALL) > levels[0] and median(busy[beside]) < levels[1]:
+            found[box][piece] = 255
+    return found
 
 
 def _faint_holes(activity: Float32s, holes: Bytes, level: float, rim_px: float) -> tuple[float, tuple[float, float]]:
@@ -241,7 +265,7 @@ def _beyond(busy: Bytes, ours: Bytes, tips: list[Ring], small_pitch_px: float) -
     within = np.zeros(busy.shape, np.uint8)
     for tip in tips:
         cv2.fillPoly(within, [_fixed_point(tip)], 255, cv2.LINE_8, _FRACTION_BITS)
-    pieces = _opened(_but(busy & within, ours), _disc(_LEAST_PIECE * small_pitch_px))
+    pieces = _opened(_but(busy, ours), _disc(_SCRATCH_PITCHES * small_pitch_px)) & within
     away = np.where(pieces > 0, cv2.distanceTransform(_inverted(ours), cv2.DIST_L2, 3), 0.0)
     y, x = np.unravel_index(int(away.argmax()), away.shape)
     return float(away[y, x]), (float(x), float(y))

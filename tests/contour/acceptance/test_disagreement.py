@@ -9,8 +9,9 @@ import shapely
 
 from contour.acceptance.disagreement import disagreement
 from contour.geometry.rings import Contour
-from contour.synthetic import Rendered
+from contour.synthetic import Rendered, render
 from tests.support.pictures.small_scenes import OUTLINES, block
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 KINDS = ("easy", "shop", "dim", "dark")
 LIMIT = 2.0
@@ -66,6 +67,20 @@ def test_a_corner_of_four_cells_cut_off_is_seen(kind: str) -> None:
     found = disagreement(scene.picture, contour(rest), scene.pitch_px)
     assert found.pitches > LIMIT
     assert corner.distance(shapely.Point(found.place_px)) < 4.5 * scene.pitch_px
+
+
+def test_a_fibre_where_the_sides_of_a_blunt_corner_would_meet_is_no_corner_cut_off() -> None:
+    scene = block("rectangle")
+    corner, one, other = (scene.truth_px.exterior[k] for k in (0, 1, -1))
+    ends = [corner + 4.0 * scene.pitch_px * (end - corner) / np.hypot(*(end - corner)) for end in (one, other)]
+    blunt = polygon(scene.truth_px) - shapely.Polygon([corner, *ends]).buffer(0.1)
+    picture = scene.picture.copy()
+    x, y = np.meshgrid(*(np.arange(size) for size in picture.shape[::-1]))
+    picture[~shapely.contains_xy(blunt, x, y)] = int(np.median(picture[:40, :40]))
+    assert disagreement(picture, contour(blunt), scene.pitch_px).pitches < LIMIT
+    x0, y0 = np.rint(corner + 0.2 * (np.mean(ends, axis=0) - corner)).astype(int)
+    picture[y0 - 3 : y0 + 4, x0 - 10 : x0 + 11] = 230
+    assert disagreement(picture, contour(blunt), scene.pitch_px).pitches < LIMIT
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -207,6 +222,16 @@ def test_walls_that_fade_far_inside_are_no_table() -> None:
     left = 1.0 - 0.8 * near
     faded = np.asarray(table + (scene.picture - table) * left, np.uint8)
     assert disagreement(faded, scene.truth_px, scene.pitch_px).pitches < 1.3
+
+
+def test_nor_are_those_that_all_but_vanish_where_all_around_have_faded() -> None:
+    scene = render(shop_floor_scene("fading", 4_010_008).scene)
+    assert disagreement(scene.picture, scene.truth_px, scene.pitch_px).pitches < LIMIT
+    middle = shapely.Point(940.0, 598.0).buffer(1.6 * scene.pitch_px)
+    x, y = np.meshgrid(*(np.arange(size) for size in scene.picture.shape[::-1]))
+    table = scene.picture.copy()
+    table[shapely.contains_xy(middle, x, y)] = int(np.median(scene.picture[:40]))
+    assert disagreement(table, scene.truth_px, scene.pitch_px).pitches > LIMIT
 
 
 def test_comb_in_a_shadow_is_no_table_and_what_is_as_dark_and_flat_may_be() -> None:

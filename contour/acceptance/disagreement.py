@@ -156,21 +156,23 @@ def _far_inside(fainter: Bools, ours: Bytes, far_px: float) -> Bools:
 
 
 def _faded(activity: Float32s, quiet: Bytes, ours: Bytes, levels: tuple[float, float], small_pitch_px: float) -> Bytes:
-    """The quiet pieces, wide enough to count, that are busier than the first level, in surroundings less busy than the
-    other.
+    """The quiet pieces, wide enough to count and far inside the contour, that are busier than the first level, in
+    surroundings less busy than the other.
     """
     wide = _opened(quiet, _square(_SCRATCH_PITCHES * small_pitch_px))
     found = np.zeros_like(quiet)
     if not wide.any():
         return found
     labels, boxes = pieces_and_boxes(_touched(quiet, wide), 4)
+    near_edge = _distances(ours) < _FAR_INSIDE_PITCHES * small_pitch_px
     reach = round(_AROUND_PITCHES * small_pitch_px)
     for number, (x, y, across, down) in enumerate(boxes[1:, :4].tolist(), 1):
         box = slice(max(0, y - reach), y + down + reach), slice(max(0, x - reach), x + across + reach)
         piece = labels[box] == number
-        beside = (within(piece, reach) > 0) & (ours[box] > 0) & ~piece
-        busy = activity[box]
-        if beside.any() and quantile(busy[piece], _NEARLY_ALL) > levels[0] and median(busy[beside]) < levels[1]:
+        if (piece & near_edge[box]).any():
+            continue
+        beside, busy = (within(piece, reach) > 0) & ~piece, activity[box]
+        if quantile(busy[piece], _NEARLY_ALL) > levels[0] and median(busy[beside]) < levels[1]:
             found[box][piece] = 255
     return found
 
@@ -262,10 +264,10 @@ def _beyond(busy: Bytes, ours: Bytes, tips: list[Ring], small_pitch_px: float) -
     """How far the farthest busy place in the tips lies from ours, in pixels, and that place (x, y)."""
     if not tips:
         return 0.0, (0.0, 0.0)
-    within = np.zeros(busy.shape, np.uint8)
+    in_tips = np.zeros(busy.shape, np.uint8)
     for tip in tips:
-        cv2.fillPoly(within, [_fixed_point(tip)], 255, cv2.LINE_8, _FRACTION_BITS)
-    pieces = _opened(_but(busy, ours), _disc(_SCRATCH_PITCHES * small_pitch_px)) & within
+        cv2.fillPoly(in_tips, [_fixed_point(tip)], 255, cv2.LINE_8, _FRACTION_BITS)
+    pieces = _opened(_but(busy, ours), _disc(_SCRATCH_PITCHES * small_pitch_px)) & in_tips
     away = np.where(pieces > 0, cv2.distanceTransform(_inverted(ours), cv2.DIST_L2, 3), 0.0)
     y, x = np.unravel_index(int(away.argmax()), away.shape)
     return float(away[y, x]), (float(x), float(y))

@@ -159,21 +159,21 @@ def _faded(activity: Float32s, quiet: Bytes, ours: Bytes, levels: tuple[float, f
     """The quiet pieces, wide enough to count and far inside the contour, that are busier than the first level, in
     surroundings less busy than the other.
     """
-    wide = _opened(quiet, _square(_SCRATCH_PITCHES * small_pitch_px))
     found = np.zeros_like(quiet)
+    wide = _opened(quiet, _square(_SCRATCH_PITCHES * small_pitch_px)) > 0
     if not wide.any():
         return found
-    labels, boxes = pieces_and_boxes(_touched(quiet, wide), 4)
-    near_edge = _distances(ours) < _FAR_INSIDE_PITCHES * small_pitch_px
+    far_inside = _far_inside(quiet > 0, ours, _FAR_INSIDE_PITCHES * small_pitch_px)
+    labels, boxes = pieces_and_boxes(quiet, 4)
     reach = round(_AROUND_PITCHES * small_pitch_px)
-    for number, (x, y, across, down) in enumerate(boxes[1:, :4].tolist(), 1):
+    for number in np.unique(labels[wide]).tolist():
+        x, y, across, down = boxes[number, :4].tolist()
         box = slice(max(0, y - reach), y + down + reach), slice(max(0, x - reach), x + across + reach)
-        piece = labels[box] == number
-        if (piece & near_edge[box]).any():
-            continue
-        beside, busy = (within(piece, reach) > 0) & ~piece, activity[box]
-        if quantile(busy[piece], _NEARLY_ALL) > levels[0] and median(busy[beside]) < levels[1]:
-            found[box][piece] = 255
+        piece, busy = labels[box] == number, activity[box]
+        if far_inside[box][piece].all() and quantile(busy[piece], _NEARLY_ALL) > levels[0]:
+            beside = (within(piece, reach) > 0) & ~piece
+            if median(busy[beside]) < levels[1]:
+                found[box][piece] = 255
     return found
 
 

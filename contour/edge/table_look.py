@@ -248,13 +248,8 @@ def _walls(seen: BlockEvidence, shape: tuple[int, ...]) -> Bytes:
     print on labels.
     """
     walls = np.asarray(seen.loose)
-    reach = _STROKE * 0.5 * seen.wall_px * len(walls) / shape[0]
-    wide = deep(walls > 0, reach)
-    if not wide.any():
-        return walls
-    count, pieces = pieces_of(walls, 8)
-    size, of_strokes = (np.bincount(pieces[part], minlength=count) for part in (walls > 0, within(wide, reach) > 0))
-    return walls * (of_strokes <= _MOST * size).take(pieces)
+    strokes = _opened(walls > 0, _STROKE * 0.5 * seen.wall_px * len(walls) / shape[0])
+    return walls * ~_mostly(walls > 0, strokes, _MOST) if strokes.any() else walls
 
 
 def _loose(walls: Bytes, alike: Bools, samples: float) -> Bools | None:
@@ -270,11 +265,11 @@ def _loose(walls: Bytes, alike: Bools, samples: float) -> Bools | None:
     return loose if loose.any() else None
 
 
-def _mostly(part: Bools, kind: Bools) -> Bools:
-    """The pieces of a part that are of that kind to a good share."""
+def _mostly(part: Bools, kind: Bools, share: float = _GOOD_SHARE) -> Bools:
+    """The pieces of a part of which more than that share is of that kind."""
     count, pieces = pieces_of(part, 8)
     size = np.maximum(np.bincount(pieces.ravel(), minlength=count), 1)
-    kept = np.bincount(pieces[kind], minlength=count) > _GOOD_SHARE * size
+    kept = np.bincount(pieces[kind], minlength=count) > share * size
     kept[0] = False
     return kept.take(pieces)
 

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 import shapely
+from numpy.typing import NDArray
 
 from contour.acceptance.disagreement import disagreement
 from contour.geometry.rings import Contour
@@ -29,6 +30,12 @@ def contour(shape: shapely.Geometry) -> Contour:
     largest = max(getattr(shape, "geoms", [shape]), key=lambda part: part.area)
     exterior, *holes = (np.array(ring.coords)[:-1] for ring in (largest.exterior, *largest.interiors))
     return Contour(exterior, tuple(holes))
+
+
+def bare(scene: Rendered, area: shapely.Geometry) -> NDArray[np.uint8]:
+    """The scene's picture with the light of its table all over an area."""
+    y, x = np.mgrid[: scene.picture.shape[0], : scene.picture.shape[1]]
+    return np.where(shapely.contains_xy(area, x, y), np.uint8(np.median(scene.picture[:40, :40])), scene.picture)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -74,9 +81,7 @@ def test_a_fibre_where_the_sides_of_a_blunt_corner_would_meet_is_no_corner_cut_o
     corner, one, other = (scene.truth_px.exterior[k] for k in (0, 1, -1))
     ends = [corner + 4.0 * scene.pitch_px * (end - corner) / np.hypot(*(end - corner)) for end in (one, other)]
     blunt = polygon(scene.truth_px) - shapely.Polygon([corner, *ends]).buffer(0.1)
-    picture = scene.picture.copy()
-    x, y = np.meshgrid(*(np.arange(size) for size in picture.shape[::-1]))
-    picture[~shapely.contains_xy(blunt, x, y)] = int(np.median(picture[:40, :40]))
+    picture = bare(scene, shapely.box(-1.0, -1.0, *scene.picture.shape[::-1]) - blunt)
     assert disagreement(picture, contour(blunt), scene.pitch_px).pitches < LIMIT
     x0, y0 = np.rint(corner + 0.2 * (np.mean(ends, axis=0) - corner)).astype(int)
     picture[y0 - 3 : y0 + 4, x0 - 10 : x0 + 11] = 230
@@ -228,10 +233,7 @@ def test_nor_are_those_that_all_but_vanish_where_all_around_have_faded() -> None
     scene = render(shop_floor_scene("fading", 4_010_008).scene)
     assert disagreement(scene.picture, scene.truth_px, scene.pitch_px).pitches < LIMIT
     middle = shapely.Point(940.0, 598.0).buffer(1.6 * scene.pitch_px)
-    x, y = np.meshgrid(*(np.arange(size) for size in scene.picture.shape[::-1]))
-    table = scene.picture.copy()
-    table[shapely.contains_xy(middle, x, y)] = int(np.median(scene.picture[:40]))
-    assert disagreement(table, scene.truth_px, scene.pitch_px).pitches > LIMIT
+    assert disagreement(bare(scene, middle), scene.truth_px, scene.pitch_px).pitches > LIMIT
 
 
 def test_comb_in_a_shadow_is_no_table_and_what_is_as_dark_and_flat_may_be() -> None:
@@ -300,9 +302,8 @@ def test_a_corner_beyond_a_cable_is_the_blocks_even_where_it_is_told_from_it(kin
     beyond = shapely.Polygon([corner, one, bend, other]).buffer(0.1)
     cut = contour(whole - beyond)
     band = shapely.LineString([one, bend, other]).buffer(0.8 * pitch)
-    picture = scene.picture.copy()
+    picture = bare(scene, band)
     y, x = np.mgrid[: picture.shape[0], : picture.shape[1]]
-    picture[shapely.contains_xy(band, x, y)] = int(np.median(scene.picture[:40, :40]))
     loose = shapely.contains_xy(beyond, x, y)
     assert disagreement(picture, cut, pitch, loose=cv2.resize(loose.astype(np.uint8), (160, 120))).pitches > LIMIT
 

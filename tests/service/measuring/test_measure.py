@@ -11,8 +11,7 @@ import pytest
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.edge.stretches import Stretch
 from contour.errors import ParameterError, PictureError
-from contour.geometry.agreement import distances_to, places_along
-from contour.geometry.rings import area, hausdorff, perimeter
+from contour.geometry.rings import area, farthest, hausdorff, perimeter
 from contour.synthetic import render
 from contour.tracing import tracing
 from contour.tracing.trace import Trace, TraceSettings
@@ -303,8 +302,7 @@ def test_compound_of_coarse_grain_that_was_cut_with_the_block_is_its_edge() -> N
     seen = measured(rendered)
     assert not seen.findings
     assert seen.pixels is not None
-    off = distances_to(places_along(rendered.truth_px, 1.0), seen.pixels)
-    assert off.max() < 0.15 * rendered.pitch_px
+    assert farthest(seen.pixels, rendered.truth_px, 1.0)[0] < 0.15 * rendered.pitch_px
 
 
 def test_a_table_without_any_cells_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:

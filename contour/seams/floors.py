@@ -65,10 +65,10 @@ def _of_two_kinds(light: Bytes, free: Openings) -> tuple[Float64s, Float64s, Kin
     """Middles of cells, (N, 2), the light of their floors, (N,), and its kinds; None where these are not two. Cells of
     another block may be the larger ones.
     """
-    if not free.cells.any():
+    walls = light[(free.numbers == 0) & (free.depth > NEAR_OUTLINE)]
+    if not (free.cells.any() and len(walls)):
         return None
-    floors = _floors(light, free)
-    wall = quantile(light[(free.numbers == 0) & (free.depth > NEAR_OUTLINE)], _WALL)
+    floors, wall = _floors(light, free), quantile(walls, _WALL)
     for cells in (free.cells, free.of_any_block):
         floor = floors[cells]
         kinds = two_kinds(floor)

@@ -71,11 +71,23 @@ def test_a_block_whose_floors_are_lighter_is_another_one() -> None:
     assert seam_in(shop_floor_scene("pushed_together", 1_420_099).scene) is not None
 
 
-def test_a_block_without_whole_cells_has_no_floors() -> None:
+@pytest.mark.parametrize("cells", [0, 1])
+def test_a_block_without_whole_cells_or_walls_far_from_its_outline_has_no_floors(cells: int) -> None:
     none = np.zeros((40, 40), np.int32)
+    numbers = none.copy()
+    numbers[15:25, 15:25] = cells
+    sizes = np.array([0, 100], np.int32)
     free = Openings(
-        1, (0, 0), 10.0, none.astype(np.float32), none, np.zeros(1), np.zeros(1, np.int32), np.zeros((1, 2))
+        1,
+        (0, 0),
+        10.0,
+        none.astype(np.float32),
+        numbers,
+        sizes / 100.0,
+        sizes * cells,
+        np.array([[0.0, 0.0], [19.5, 19.5]]),
     )
+    assert free.cells.any() == bool(cells)
     assert parted_by_floors(none.astype(np.uint8), free) is None
 
 

@@ -44,7 +44,7 @@ class Rendered:
 
 def render(scene: Scene) -> Rendered:
     """The scene's picture; the same scene always gives the same bytes."""
-    cover, light, filled = _tops(scene)
+    cover, light, filled = tops(scene)
     _texture(scene, light)
     block = relief(scene, cover, light)
     picture = expose(scene.sensor, _planes(scene, block, filled), scene.seed)
@@ -78,7 +78,7 @@ def _middle(scene: Scene) -> tuple[float, float]:
     return (x, y)
 
 
-def _tops(scene: Scene) -> tuple[Float32s, Float32s, Bytes | None]:
+def tops(scene: Scene) -> tuple[Float32s, Float32s, Bytes | None]:
     """Cover and light of the top planes of all pieces, shape (H, W), and what fills the block's cells, if anything."""
     shape = (scene.camera.height, scene.camera.width)
     cover, light = np.zeros(shape, dtype=np.float32), np.zeros(shape, dtype=np.float32)

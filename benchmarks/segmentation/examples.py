@@ -1,0 +1,68 @@
+"""Rendered blocks as the network is to see them: what of the picture is a wall, comb, and a thing over it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from contour.geometry.arrays import Bytes, Float32s, median
+from contour.image.opencv import grey
+from contour.segmentation.network import LEAST_SPREAD, PITCH_PX
+from contour.synthetic import area_coverage, render, truth_px
+from contour.synthetic.rendering import tops
+from contour.synthetic.shop_floor.covers import cover_areas
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+
+# By how much cells are larger or smaller than those that the network is asked about.
+_APART = 0.2
+_STRUCTURED = ("light_table", "wood", "brushed", "slots", "old_cuts")
+_OTHERS = (
+    *("undisturbed", "tape", "hand_or_cable", "clamp", "compound", "writing", "splice", "swarf", "dust", "jpeg"),
+    *("row_noise", "motion", "defocus", "glare", "shadow", "crushed", "fading", "dim", "mirror", "gamma", "coloured"),
+)
+KINDS = (*_STRUCTURED * 3, *_OTHERS)
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """A picture, (h, w) or (h, w, 3), uint8, with cells of about `PITCH_PX`, and how much of each pixel is the top of a
+    wall, of the block, and of a thing over it, 255 all, (h, w), uint8. mean, spread: of its light. dark: whether walls
+    are darker than what lies between them.
+    """
+
+    picture: Bytes
+    wall: Bytes
+    comb: Bytes
+    thing: Bytes
+    mean: float
+    spread: float
+    dark: bool
+
+
+def example(seed: int) -> Example:
+    """The example of this seed, the same for the same."""
+    rng = np.random.default_rng([seed, 77])
+    scene = shop_floor_scene(str(rng.choice(KINDS)), seed).scene
+    rendered = render(scene)
+    height, width = rendered.picture.shape[:2]
+    comb = area_coverage(truth_px(scene).rings, width, height)
+    thing = np.zeros_like(comb)
+    for area in cover_areas(scene):
+        thing = np.maximum(thing, area_coverage(area.rings, width, height))
+    share = PITCH_PX / rendered.pitch_px * math.exp(float(rng.uniform(-_APART, _APART)))
+    size = max(64, round(width * share)), max(64, round(height * share))
+    how = cv2.INTER_AREA if share < 1.0 else cv2.INTER_LINEAR
+    picture = np.asarray(cv2.resize(rendered.picture, size, interpolation=how), np.uint8)
+    wall, within, over = (_sized(one, size, how) for one in (tops(scene)[0] * comb, comb, thing))
+    light = grey(picture)
+    on, off = light[wall > 180], light[(wall < 20) & (within > 200)]
+    dark = len(on) > 0 and len(off) > 0 and median(on) < median(off)
+    return Example(picture, wall, within, over, float(light.mean()), max(float(light.std()), LEAST_SPREAD), dark)
+
+
+def _sized(share: Float32s, size: tuple[int, int], how: int) -> Bytes:
+    small = cv2.resize(share, size, interpolation=how)
+    return np.rint(255.0 * np.clip(small, 0.0, 1.0)).astype(np.uint8)

@@ -1,0 +1,168 @@
+"""Teaches the network: `python -m benchmarks.segmentation.teach --out FILE.onnx` (`--help`), an hour on two cores.
+
+What comes out differs in its last digits from machine to machine, and so from `contour/segmentation/comb.onnx`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+
+import cv2
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from benchmarks.segmentation.crops import crop
+from benchmarks.segmentation.examples import Example, example
+
+# Far from the seeds of every page and test.
+FIRST = 90_000_000
+_BATCH = 16
+_RATE = 3e-3
+# Near an outline, within half a pitch, what is told counts so many times as much.
+_NEAR_PX, _NEAR = 8, 4.0
+_WALL, _COMB, _THING = 2.0, 1.0, 0.5
+
+
+def _layer(before: int, after: int, apart: int = 1) -> nn.Sequential:
+    convolution = nn.Conv2d(before, after, 3, padding=apart, dilation=apart, bias=False)
+    return nn.Sequential(convolution, nn.BatchNorm2d(after), nn.ReLU(inplace=True))
+
+
+class Network(nn.Module):
+    """Four sizes, each half of the one above it, down and up again: a U-Net of 274,000 weights."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.down = nn.ModuleList(
+            [
+                nn.Sequential(_layer(1, 12), _layer(12, 12)),
+                nn.Sequential(_layer(12, 24), _layer(24, 24)),
+                nn.Sequential(_layer(24, 48), _layer(48, 48)),
+            ]
+        )
+        self.bottom = nn.Sequential(_layer(48, 64), _layer(64, 64, 2), _layer(64, 64, 4), _layer(64, 64, 2))
+        self.up = nn.ModuleList(
+            [
+                nn.Sequential(_layer(112, 48), _layer(48, 48)),
+                nn.Sequential(_layer(72, 24), _layer(24, 24)),
+                nn.Sequential(_layer(36, 12), _layer(12, 12)),
+            ]
+        )
+        self.told = nn.Conv2d(12, 3, 1)
+
+    def forward(self, light: Tensor) -> Tensor:
+        """Logits of a wall, comb and a thing, (N, 3, h, w)."""
+        kept = []
+        for step in self.down:
+            light = step(light)
+            kept.append(light)
+            light = functional.max_pool2d(light, 2)
+        light = self.bottom(light)
+        for step, beside in zip(self.up, reversed(kept), strict=True):
+            light = step(torch.cat([functional.interpolate(light, scale_factor=2, mode="nearest"), beside], 1))
+        told: Tensor = self.told(light)
+        return told
+
+
+class _Sure(nn.Module):
+    """The network's answer as shares."""
+
+    def __init__(self, network: Network) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, light: Tensor) -> Tensor:
+        return torch.sigmoid(self.network(light))
+
+
+class _Crops(torch.utils.data.IterableDataset[tuple[Tensor, ...]]):
+    def __init__(self, examples: Sequence[Example], seed: int) -> None:
+        self.examples, self.seed = examples, seed
+
+    def __iter__(self) -> Iterator[tuple[Tensor, ...]]:
+        cv2.setNumThreads(1)
+        worker = torch.utils.data.get_worker_info()
+        rng = np.random.default_rng([self.seed, 0 if worker is None else worker.id])
+        while True:
+            one = self.examples[int(rng.integers(len(self.examples)))]
+            yield tuple(torch.from_numpy(np.ascontiguousarray(plane)) for plane in crop(one, rng))
+
+
+def loss(told: Tensor, wall: Tensor, comb: Tensor, thing: Tensor) -> Tensor:
+    """By how much what is told, (N, 3, h, w), differs from what is true, each (N, h, w)."""
+    wide = 2 * _NEAR_PX + 1
+    near = functional.max_pool2d(comb[:, None], wide, 1, _NEAR_PX) + functional.max_pool2d(
+        -comb[:, None], wide, 1, _NEAR_PX
+    )
+    counts = 1.0 + (_NEAR - 1.0) * near[:, 0]
+    off = [
+        share * (functional.binary_cross_entropy_with_logits(told[:, number], true, reduction="none") * counts).mean()
+        for number, (share, true) in enumerate(((_WALL, wall), (_COMB, comb), (_THING, thing)))
+    ]
+    return off[0] + off[1] + off[2]
+
+
+def teach(network: Network, examples: Sequence[Example], minutes: float, rate: float, seed: int) -> None:
+    """Show it parts of the examples for so long, less and less of each of which it takes to heart."""
+    crops = torch.utils.data.DataLoader(_Crops(examples, seed), batch_size=_BATCH, num_workers=2, prefetch_factor=4)
+    taught = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=1e-3)
+    began, lately = time.monotonic(), []
+    for number, (light, *true) in enumerate(crops):
+        done = (time.monotonic() - began) / (60.0 * minutes)
+        if done >= 1.0:
+            return
+        for group in taught.param_groups:
+            group["lr"] = rate * min(1.0, (number + 1) / 100) * 0.5 * (1.0 + math.cos(math.pi * done)) + 1e-5
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            told = network(light[:, None].to(memory_format=torch.channels_last))
+        off = loss(told.float(), *true)
+        taught.zero_grad()
+        off.backward()
+        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        taught.step()
+        lately.append(off.item())
+        if number % 50 == 49:
+            print(f"{number + 1} batches, {100.0 * done:.0f} %, off {np.mean(lately[-50:]):.4f}", flush=True)
+
+
+def export(network: Network, path: str) -> None:
+    """Write the network as what OpenCV reads."""
+    light = torch.zeros(1, 1, 64, 96)
+    sides = {2: "h", 3: "w"}
+    axes = {"light": sides, "told": sides}
+    names = {"input_names": ["light"], "output_names": ["told"]}
+    torch.onnx.export(_Sure(network.eval()), light, path, dynamic_axes=axes, dynamo=False, opset_version=13, **names)
+
+
+def main() -> None:
+    """Render, teach, and write the network."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.segmentation.teach", description=__doc__)
+    parser.add_argument("--examples", type=int, default=1500, metavar="N", help="blocks to render")
+    parser.add_argument("--first", type=int, default=FIRST, metavar="SEED", help="the first one's seed")
+    parser.add_argument("--minutes", type=float, default=40.0, help="how long it is taught")
+    parser.add_argument("--seed", type=int, default=1, help="of what is drawn of the examples")
+    parser.add_argument("--rate", type=float, default=_RATE, help="how fast it learns at first")
+    parser.add_argument("--start", metavar="FILE", help="weights of a network that goes on learning")
+    parser.add_argument("--weights", metavar="FILE", help="where its weights go, to go on with")
+    parser.add_argument("--out", required=True, metavar="FILE", help="where the network goes, .onnx")
+    options = parser.parse_args()
+    seeds = range(options.first, options.first + options.examples)
+    with ProcessPoolExecutor(2, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
+        examples = list(pool.map(example, seeds, chunksize=4))
+    network = Network().to(memory_format=torch.channels_last)
+    if options.start is not None:
+        network.load_state_dict(torch.load(options.start))
+    teach(network, examples, options.minutes, options.rate, options.seed)
+    if options.weights is not None:
+        torch.save(network.state_dict(), options.weights)
+    export(network, options.out)
+
+
+if __name__ == "__main__":
+    main()

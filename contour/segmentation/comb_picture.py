@@ -1,0 +1,99 @@
+"""The comb of a picture as light walls on black, whatever table it lies on."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+
+from contour.errors import NoBlockFound
+from contour.geometry.arrays import Bytes, median, quantile
+from contour.image.opencv import box_mean, grown, shrunk_to, within
+from contour.segmentation.network import PITCH_PX, Segments, segments
+from contour.walls.cell_scale import probe
+from contour.walls.lightness import wall_light
+
+# Pitches that are tried, large ones first, which cost least: cells may be half or twice as large as it has learnt.
+_GUESSES = (40.0, 20.0, 11.0)
+# A comb that is seen so well is not looked for at another size; one that is seen worse than this is none.
+_GOOD, _LEAST = 0.3, 0.14
+# Between these shares of the pitch that the network has learnt walls are drawn well enough.
+_NEAR = (0.9, 1.4)
+# Pixels that the network is asked about at most, half a second and two seconds: of more the middle is tried.
+_TRIED_PX, _MOST_PX = 1e6, 4e6
+# What is surer than this is there. A thing at the edge of comb, of which so many pixels are looked at, need not be so
+# sure: of 60 that lay over an edge the least one was told by 0.11 in the mean of so many pixels, on 17 of 20 free edges
+# none by more than 0.07.
+_SURE, _LEAST_THING, _EDGE_PX, _MEAN_PX = 0.5, 0.1, 9, 7
+# Pitches beside the comb, where of the table so much is darker than what counts as its light; and how light that is, of
+# walls over floors: of 50 tables as light as walls by 0.5 at least. What surely is no wall.
+_BESIDE, _LIGHTER, _LIGHT, _NO_WALL = (0.5, 2.5), 0.75, 0.4, 0.15
+# Levels of black and, above it, of walls.
+_DARK, _WALL = 12.0, 230.0
+
+
+def comb_picture(picture: Bytes) -> Bytes | None:
+    """The comb in a picture, grey (H, W) or BGR (H, W, 3), uint8: walls light, all else dark, (H, W), uint8. None where
+    no comb is seen, on a dark table, and where something may lie over its edge.
+    """
+    light = wall_light(picture)
+    score, pitch_px, found = 0.0, 0.0, None
+    for guess in _GUESSES:
+        part = _middle(light, guess)
+        seen = segments(part, guess)
+        drawn = _drawn(seen)
+        try:
+            cells = probe(drawn, "bright")
+        except NoBlockFound:
+            continue
+        if cells.score > score:
+            near = _NEAR[0] < cells.pitch_px / PITCH_PX < _NEAR[1]
+            score, pitch_px = cells.score, cells.pitch_px * part.shape[1] / drawn.shape[1]
+            found = seen if near and part is light else None
+        if score > _GOOD:
+            break
+    if score < _LEAST or light.size * (PITCH_PX / pitch_px) ** 2 > _MOST_PX:
+        return None
+    found = segments(light, pitch_px) if found is None else found
+    if _something_beside(found) or not _on_light_table(found):
+        return None
+    drawn = _drawn(found)
+    return (grown if drawn.size < light.size else shrunk_to)(drawn, light.shape)
+
+
+def _middle(light: Bytes, pitch_px: float) -> Bytes:
+    """The picture, or as much of its middle as is tried at that pitch."""
+    share = math.sqrt(_TRIED_PX / light.size) * pitch_px / PITCH_PX
+    if share >= 1.0:
+        return light
+    inner = [slice(round(0.5 * (1.0 - share) * side), round(0.5 * (1.0 + share) * side)) for side in light.shape]
+    return np.ascontiguousarray(light[inner[0], inner[1]])
+
+
+def _on_light_table(seen: Segments) -> bool:
+    """Whether the table beside the comb is nearer to the walls' light than to that of what lies between them: on any
+    other one the picture tells by itself, and of what lies over an edge, or against it, more.
+    """
+    comb = seen.comb > _SURE
+    beside = (
+        (within(comb, _BESIDE[1] * PITCH_PX) > 0) & ~(within(comb, _BESIDE[0] * PITCH_PX) > 0) & (seen.thing < _SURE)
+    )
+    walls, floors = comb & (seen.wall > _SURE), comb & (seen.wall < _NO_WALL)
+    if not (beside.any() and walls.any() and floors.any()):
+        return False
+    floor, wall = median(seen.light[floors]), median(seen.light[walls])
+    lighter = quantile(seen.light[beside], _LIGHTER) - floor
+    return (lighter if wall > floor else -lighter) > _LIGHT * abs(wall - floor)
+
+
+def _something_beside(seen: Segments) -> bool:
+    """Whether something may lie over the edge of the comb, or in a hole of it."""
+    comb = (seen.comb > _SURE).astype(np.uint8)
+    edge = cv2.morphologyEx(comb, cv2.MORPH_GRADIENT, np.ones((_EDGE_PX, _EDGE_PX), np.uint8)) > 0
+    return bool((edge & (box_mean(seen.thing, _MEAN_PX) > _LEAST_THING)).any())
+
+
+def _drawn(seen: Segments) -> Bytes:
+    """What the network tells as a picture, (h, w), uint8."""
+    return (np.where(seen.comb > _SURE, _WALL * seen.wall, np.float32(0.0)) + _DARK).astype(np.uint8)

@@ -1,0 +1,58 @@
+"""A picture's comb is drawn on black, whatever its pitch; nothing is drawn where there is none, or it is in doubt."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from contour.segmentation import comb_picture as drawing
+from contour.segmentation.comb_picture import comb_picture
+from contour.segmentation.network import Segments
+from contour.synthetic import Rendered, pitch_px, render, render_empty_table
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+
+
+def scene_of(pitch: tuple[float, float]) -> Rendered:
+    """A block of that pitch, pixels, on wood."""
+    for seed in range(95_000_000, 95_000_100):
+        scene = shop_floor_scene("wood", seed, alone=True).scene
+        if pitch[0] < pitch_px(scene) < pitch[1]:
+            return render(scene)
+    raise AssertionError(pitch)
+
+
+@pytest.mark.parametrize("pitch", [(12.0, 15.0), (19.0, 23.0), (30.0, 40.0), (50.0, 60.0)])
+def test_cells_of_any_size_are_found(pitch: tuple[float, float]) -> None:
+    rendered = scene_of(pitch)
+    drawn = comb_picture(rendered.picture)
+    assert drawn is not None
+    assert drawn.shape == rendered.picture.shape[:2]
+    rows, columns = np.nonzero(drawn > 100)
+    truth = rendered.truth_px.exterior
+    for seen, ring in ((columns, truth[:, 0]), (rows, truth[:, 1])):
+        assert seen.min() == pytest.approx(ring.min(), abs=0.6 * rendered.pitch_px)
+        assert seen.max() == pytest.approx(ring.max(), abs=0.6 * rendered.pitch_px)
+
+
+@pytest.mark.parametrize("kind", ["undisturbed", "wood", "brushed", "slots", "old_cuts", "expanded", "cork", "ribbed"])
+def test_on_an_empty_table_nothing_is_drawn(kind: str) -> None:
+    scene = shop_floor_scene(kind, 95_000_003, alone=True).scene
+    assert comb_picture(render_empty_table(scene, 1)[0]) is None
+
+
+def test_a_thing_within_the_comb_may_be_a_hole_and_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    rendered = scene_of((19.0, 23.0))
+    assert comb_picture(rendered.picture) is not None
+    told = drawing.segments
+
+    def with_thing(light: np.ndarray, pitch: float) -> Segments:
+        seen = told(light, pitch)
+        rows, columns = np.nonzero(cv2.erode((seen.comb > 0.5).astype(np.uint8), np.ones((61, 61), np.uint8)))
+        if len(rows):
+            patch = slice(rows[0] - 20, rows[0] + 20), slice(columns[0] - 20, columns[0] + 20)
+            seen.comb[patch], seen.wall[patch], seen.thing[patch] = 0.0, 0.0, 1.0
+        return seen
+
+    monkeypatch.setattr(drawing, "segments", with_thing)
+    assert comb_picture(rendered.picture) is None

@@ -76,6 +76,13 @@ class Trace:
     wide: EdgePart | None = None
     parted: Piece | None = None
 
+    def less_sure(self, pitches: float) -> Trace:
+        """The same, known so much less well all along."""
+        more = pitches * (self.pitch_px or 0.0)
+        evidence = self.evidence and tuple(replace(part, bound_px=part.bound_px + more) for part in self.evidence)
+        bound_px = None if self.uncertainty_px is None else self.uncertainty_px + more
+        return replace(self, uncertainty_px=bound_px, evidence=evidence)
+
     def moved(self, first: Float64s) -> Trace:
         """The trace in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()

@@ -22,6 +22,7 @@ class PlainRecipe:
     thickness_tolerance_mm: float = 0.0
     max_uncertainty_mm: float = 0.0
     max_disagreement_pitches: float = 2.0
+    network: bool = True
     margin_mm: float = 0.0
     first_vertex: Start | None = None
     max_vertices: int = 4000

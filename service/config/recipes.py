@@ -144,6 +144,11 @@ class Recipe(Model):
         description="How far contour and busy part of the picture may be apart in one place, cell pitches, and an "
         "eighth of it everywhere; 0 = not checked.",
     )
+    network: bool = Field(
+        True,
+        description="Whether a network looks for the comb where the picture itself shows no outline, as on a table as "
+        "light as the walls.",
+    )
     margin_mm: float = Field(
         0,
         ge=-1000,

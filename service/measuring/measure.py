@@ -32,6 +32,7 @@ from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.material.even_table import even_table
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.relief.relief import Displacement, Relief
+from contour.segmentation.comb_picture import comb_picture
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
@@ -49,6 +50,8 @@ log = logging.getLogger("combtrace.measure")
 _ROI_STEPS = 12
 # Of the height of walls in the wider region: a table's grain and grooves rise less than most walls do.
 _STRONG_WALLS = 0.6
+# A network puts ends of walls so much farther in or out, all along: a share of a pitch that no scatter of them tells.
+_NETWORK_PITCHES = 0.1
 # What was seen to lie there is there, and where ends of walls are too few to tell an edge, those of fewer tell less.
 _LIES_THERE, _HARDLY_SEEN = {Reason.SEVERAL_BLOCKS, Reason.EDGE_COVERED}, {Reason.UNCERTAINTY_TOO_LARGE}
 
@@ -180,15 +183,18 @@ class Measurer:
         refused: NoBlockFound | None = None
         try:
             found = outlined(next(looks))
+            several = Reason.SEVERAL_BLOCKS in found.reasons
             lies_there, hardly_seen = bool(_LIES_THERE & {*found.reasons}), {*found.reasons} == _HARDLY_SEEN
             if not found.findings:
                 return found
         except NoBlockFound as error:
-            # Cells that nothing shows are nowhere.
-            refused, lies_there, hardly_seen = error, isinstance(error, NoCellsFound), False
+            refused, lies_there, several, hardly_seen = error, False, False, False
         for look in looks:
             watch.lap("table")
-            if (lies_there and look.relief is None) or (hardly_seen and look.least_rise is not None):
+            # Cells that nothing shows are nowhere, but in what differs from a table, or to a network.
+            nowhere = isinstance(refused, NoCellsFound)
+            out_of_sight = (lies_there or nowhere) and look.relief is None
+            if several if look.network else out_of_sight or (hardly_seen and look.least_rise is not None):
                 continue
             with contextlib.suppress(NoBlockFound, EdgeContradicted):
                 again = outlined(look)
@@ -225,6 +231,8 @@ class Measurer:
             if not plain_first:
                 yield _Look(picture)
         if recipe.method == "wall-tips":
+            if recipe.network:
+                yield _Look(picture, network=True)
             yield _Look(picture, least_rise=_STRONG_WALLS)
 
     def _outlined(
@@ -237,19 +245,22 @@ class Measurer:
         watch: _Stopwatch,
     ) -> Measurement:
         """The measurement of what is looked at."""
-        picture = look.picture
+        picture = _drawn(look.picture, watch) if look.network else look.picture
         height, width = picture.shape[:2]
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
         settings = replace(trace_settings(recipe), least_rise=look.least_rise)
         checked = _checked_trace(picture, settings, region, rectifier, watch, look.relief)
+        if look.network:
+            checked = replace(checked, trace=checked.trace.less_sure(_NETWORK_PITCHES))
         traced = checked.trace
         result = replace(
             result,
             polarity=traced.polarity,
             pitch_px=traced.pitch_px,
             edge=traced.edge,
+            network=look.network,
             pixels=traced.contour,
             quality=checked.quality,
         )
@@ -371,12 +382,13 @@ class Measurer:
 
 class _Look(NamedTuple):
     """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
-    settings of a trace.
+    settings of a trace; `network`: whether to look at what a network tells of it.
     """
 
     picture: NDArray[np.uint8]
     relief: Relief | None = None
     least_rise: float | None = None
+    network: bool = False
 
 
 def _over(
@@ -388,6 +400,15 @@ def _over(
     with contextlib.suppress(NoBlockFound, CalibrationError):
         return None if displacement is None else over_known_table(picture, look, recipe.polarity, displacement)
     return None
+
+
+def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch) -> NDArray[np.uint8]:
+    """What a network tells of the picture; raise NoBlockFound where it is not asked, or in doubt."""
+    drawn = comb_picture(picture)
+    watch.lap("network")
+    if drawn is None:
+        raise NoBlockFound("no block found: no comb on a table as light as its walls, with nothing over its edge")
+    return drawn
 
 
 def _checked_trace(

@@ -32,13 +32,15 @@ class Measurement:
     against it, (N, 2) each. edge: cut, cells or mixed, as the picture shows it. evidence: what the contour rests on,
     stretches along its rings; None where nobody says. part: the recipe's part in it; None where the recipe has none,
     or the contour was refused before it was tried. parts: those of a recipe with several that lie in it; wanted: how
-    many of each were to be laid. ribbon: where the core's runs; None where no part asks for it.
+    many of each were to be laid. ribbon: where the core's runs; None where no part asks for it. network: whether it was
+    seen in what a network tells of the picture.
     """
 
     method: str
     polarity: str | None = None
     pitch_px: float | None = None
     edge: str | None = None
+    network: bool = False
     pixels: Contour | None = None
     shown_px: tuple[Float64s, ...] = ()
     millimetres: Contour | None = None
@@ -111,6 +113,7 @@ class Measurement:
             "method": self.method,
             "polarity": self.polarity,
             "pitch_px": _rounded(self.pitch_px),
+            **({"network": True} if self.network else {}),
             "vertices": 0 if contour is None else contour.point_count,
             "area_mm2": _rounded(self.area_mm2),
             "uncertainty_mm": _rounded(self.uncertainty_mm),

@@ -56,6 +56,7 @@ def record_of(image: Path, measurement: Measurement) -> dict[str, Any]:
         "polarity": measurement.polarity,
         "pitch_px": measurement.pitch_px,
         "edge": measurement.edge,
+        **({"network": True} if measurement.network else {}),
         "pixels": _rings(measurement.pixels),
         "area_px2": measurement.area_px2,
         "uncertainty_px": measurement.uncertainty_px,

@@ -65,7 +65,7 @@ def test_threads_alone_are_no_block() -> None:
 def test_a_picture_whose_threads_touch_its_side_is_refused() -> None:
     """Where nothing else is left of them but fewer pixels than make an outline."""
     rendered = render(shop_floor_scene("blown_out", 1_560_082).scene)
-    assert Measurer(None).measure(rendered.picture, PlainRecipe(), 0.0).reasons
+    assert Measurer(None).measure(rendered.picture, PlainRecipe(network=False), 0.0).reasons
 
 
 @pytest.mark.parametrize(("wide", "high", "is_hole"), [(96, 96, True), (320, 22, False), (320, 26, True)])

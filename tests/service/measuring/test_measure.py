@@ -15,12 +15,16 @@ from contour.geometry.rings import area, farthest, hausdorff, perimeter
 from contour.synthetic import render
 from contour.tracing import tracing
 from contour.tracing.trace import Trace, TraceSettings
+from service.config.plain_recipe import PlainRecipe
 from service.config.recipes import Recipe
 from service.measuring import measure
 from service.measuring.calibration_file import load_record
 from service.measuring.measure import Measurer, trace_settings
 from service.reasons import Reason
 from tests.support.scenes.sample_scenes import THICKNESS_MM, sample_scenes
+from tests.support.scenes.shop_floor.blocks import shop_floor_block
+from tests.support.scenes.shop_floor.covers import clamp, hand_or_cable, tape
+from tests.support.scenes.shop_floor.light import Drawn, structured
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 from tests.support.scenes.trials import measured
 
@@ -262,6 +266,28 @@ def test_the_summary_for_the_journal_is_plain_json(rendered, measurer: Measurer)
     assert summary["vertices"] > 3
 
 
+def test_on_a_table_as_light_as_walls_a_network_finds_the_block_if_the_recipe_lets_it() -> None:
+    rendered = render(shop_floor_scene("expanded", 4_170_000, alone=True).scene)
+    seen = measured(rendered)
+    assert seen.findings == ()
+    assert seen.network
+    assert seen.summary()["network"] is True
+    assert seen.pixels is not None
+    assert farthest(seen.pixels, rendered.truth_px, 1.0)[0] < 0.5 * rendered.pitch_px
+    assert seen.uncertainty_px is not None
+    assert seen.uncertainty_px > 0.1 * rendered.pitch_px
+    without = measured(rendered, recipe=Recipe(number=1, name="default", network=False))
+    assert without.reasons == (Reason.NO_BLOCK_FOUND,)
+    assert "network" not in without.summary()
+
+
+@pytest.mark.parametrize(("cover", "seed"), [(tape, 4_160_000), (clamp, 4_160_002), (hand_or_cable, 4_160_001)])
+def test_what_lies_over_an_edge_on_such_a_table_is_not_drawn_away(cover: Drawn, seed: int) -> None:
+    rng = np.random.default_rng([seed, 5])
+    scene = cover(rng, structured("brushed")(rng, shop_floor_block(seed)))
+    assert measured(render(scene)).findings
+
+
 def test_on_a_tables_grain_a_block_is_found_by_its_strong_walls() -> None:
     """By walls of usual height grain leads away from it."""
     seen = measured(render(shop_floor_scene("wood", 1_880_020).scene))
@@ -286,9 +312,15 @@ def test_what_lies_over_an_edge_is_not_looked_past_nor_what_few_walls_tell(
         return tracing.trace(picture, settings, **known)
 
     monkeypatch.setattr(measure, "trace", traced)
-    seen = measured(render(shop_floor_scene(*scene, alone=True).scene))
+    seen = measured(render(shop_floor_scene(*scene, alone=True).scene), PlainRecipe(network=False))
     assert seen.reasons[0] == reason
     assert asked == looks
+
+
+def test_of_two_blocks_no_network_draws_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(measure, "comb_picture", lambda _: pytest.fail("asked"))
+    seen = measured(render(shop_floor_scene("pushed_together", 4_150_000, alone=True).scene))
+    assert Reason.SEVERAL_BLOCKS in seen.reasons
 
 
 def test_a_dark_cable_that_parts_a_corner_from_the_block_is_no_edge_of_it() -> None:

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from benchmarks.segmentation.examples import Example
-from benchmarks.segmentation.patterns import noise, pattern
-from contour.geometry.arrays import Bools, Bytes, Float32s, quantile
+from benchmarks.segmentation.patterns import lay, noise, pattern
+from contour.geometry.arrays import Bools, Bytes, Float32s, median, quantile
 from contour.image.opencv import grey
 
 SIZE = 192
@@ -98,7 +98,7 @@ def _cut_out(rng: np.random.Generator) -> Float32s:
     else:
         sides = rng.uniform(35.0, 120.0, 2).tolist()
         corners = cv2.boxPoints((middle.tolist(), sides, float(rng.uniform(0.0, 180.0))))
-        cv2.fillConvexPoly(mask, (np.asarray(corners) * 8.0).astype(np.int32), 255, cv2.LINE_AA, 3)
+        lay(mask, corners, 255)
     return mask.astype(np.float32) / np.float32(255.0)
 
 
@@ -122,8 +122,9 @@ def _on_other_table(
     own = light[there > _SURE]
     if len(own) > 50 and rng.random() < 0.7:
         shade = cv2.GaussianBlur(light * there, (0, 0), 3.0) / np.maximum(cv2.GaussianBlur(there, (0, 0), 3.0), 1e-3)
-        shade = np.where(gone > 0.0, np.float32(np.median(own)), shade)
-        table = table * np.clip(shade / max(float(np.median(own)), 1.0), 0.35, 1.1)
+        usual = median(own)
+        shade = np.where(gone > 0.0, np.float32(usual), shade)
+        table = table * np.clip(shade / max(usual, 1.0), 0.35, 1.1)
     return np.asarray(light * (1.0 - out) + np.clip(table, 0.0, 255.0) * out, np.float32)
 
 
@@ -135,8 +136,7 @@ def _covered(light: Float32s, thing: Float32s, rng: np.random.Generator) -> tupl
         corners = cv2.boxPoints((middle.tolist(), size, float(rng.uniform(0.0, 180.0))))
     else:
         corners = middle + rng.uniform(-50.0, 50.0, (6, 2))
-    hull = cv2.convexHull((np.asarray(corners) * 8.0).astype(np.int32))
-    cv2.fillConvexPoly(mask, hull, 255, cv2.LINE_AA, 3)
+    lay(mask, corners, 255)
     over = mask.astype(np.float32) / np.float32(255.0)
     if rng.random() < 0.5:
         away = tuple(rng.integers(-5, 6, 2).tolist())

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Float32s
+from contour.geometry.arrays import Bytes, Float32s
 
 # Lines are drawn to an eighth of a pixel.
 _SHIFT = 3
@@ -38,6 +39,12 @@ def turned(rng: np.random.Generator, drawn: Float32s, size: int) -> Float32s:
     matrix = cv2.getRotationMatrix2D((half, half), float(rng.uniform(0.0, 360.0)), 1.0)
     matrix[:, 2] += 0.5 * size - half
     return np.asarray(cv2.warpAffine(drawn, matrix, (size, size), borderMode=cv2.BORDER_REFLECT), np.float32)
+
+
+def lay(drawn: Float32s | Bytes, corners: np.ndarray[tuple[int, ...], np.dtype[Any]], level: float) -> None:
+    """Draw the convex hull of corners (N, 2) in that light, in place."""
+    hull = cv2.convexHull((np.asarray(corners) * _PARTS).astype(np.int32))
+    cv2.fillConvexPoly(drawn, hull, level, cv2.LINE_AA, _SHIFT)
 
 
 def _grid(size: int) -> tuple[Float32s, Float32s]:
@@ -115,8 +122,7 @@ def _patched(rng: np.random.Generator, size: int) -> Float32s:
     drawn = np.zeros((size, size), np.float32)
     for _ in range(int(rng.integers(2, 12))):
         corners = rng.uniform(0.0, size, 2) + rng.uniform(-80.0, 80.0, (int(rng.integers(3, 6)), 2))
-        hull = cv2.convexHull((corners * _PARTS).astype(np.int32))
-        cv2.fillConvexPoly(drawn, hull, float(rng.uniform(-1.5, 1.5)), cv2.LINE_AA, _SHIFT)
+        lay(drawn, corners, float(rng.uniform(-1.5, 1.5)))
     return drawn
 
 

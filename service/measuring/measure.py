@@ -181,20 +181,17 @@ class Measurer:
         outlined = partial(self._outlined, recipe=recipe, thickness_mm=thickness_mm, result=result, watch=watch)
         looks = self._looks(picture, known, recipe, thickness_mm)
         refused: NoBlockFound | None = None
+        reasons: set[Reason] = set()
         try:
             found = outlined(next(looks))
-            several = Reason.SEVERAL_BLOCKS in found.reasons
-            lies_there, hardly_seen = bool(_LIES_THERE & {*found.reasons}), {*found.reasons} == _HARDLY_SEEN
             if not found.findings:
                 return found
+            reasons = {*found.reasons}
         except NoBlockFound as error:
-            refused, lies_there, several, hardly_seen = error, False, False, False
+            refused = error
         for look in looks:
             watch.lap("table")
-            # Cells that nothing shows are nowhere, but in what differs from a table, or to a network.
-            nowhere = isinstance(refused, NoCellsFound)
-            out_of_sight = (lies_there or nowhere) and look.relief is None
-            if several if look.network else out_of_sight or (hardly_seen and look.least_rise is not None):
+            if not look.may_show_more(reasons, nowhere=isinstance(refused, NoCellsFound)):
                 continue
             with contextlib.suppress(NoBlockFound, EdgeContradicted):
                 again = outlined(look)
@@ -209,7 +206,7 @@ class Measurer:
         self, picture: NDArray[np.uint8], known: TableLook | None, recipe: AnyRecipe, thickness_mm: float
     ) -> Iterator[_Look]:
         """What to look at, one after the other until nothing speaks against what is found: what differs from a table
-        that is known, or need not be taught to be, the picture's walls, and those of them that rise high.
+        that is known, or need not be taught to be, the picture's walls, what a network tells, and walls that rise high.
         """
         displacement = self._displacement(recipe, thickness_mm, picture.shape[:2])
         if known is None:
@@ -389,6 +386,15 @@ class _Look(NamedTuple):
     relief: Relief | None = None
     least_rise: float | None = None
     network: bool = False
+
+    def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
+        """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""
+        if self.network:
+            return Reason.SEVERAL_BLOCKS not in reasons
+        if self.relief is not None:
+            return True
+        # What is nowhere in the picture is not in its high walls either.
+        return not (nowhere or reasons & _LIES_THERE or (reasons == _HARDLY_SEEN and self.least_rise is not None))
 
 
 def _over(

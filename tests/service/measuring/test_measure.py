@@ -290,7 +290,7 @@ def test_what_lies_over_an_edge_on_such_a_table_is_not_drawn_away(cover: Drawn, 
 
 def test_on_a_tables_grain_a_block_is_found_by_its_strong_walls() -> None:
     """By walls of usual height grain leads away from it."""
-    seen = measured(render(shop_floor_scene("wood", 1_880_020).scene))
+    seen = measured(render(shop_floor_scene("wood", 1_880_020).scene), PlainRecipe(network=False))
     assert seen.findings == ()
 
 

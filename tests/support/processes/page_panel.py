@@ -26,6 +26,7 @@ EXPECTED_NOISE = (  # of requests that a test has refused, held or broken off
     "ERR_CONNECTION_RESET",
     "ERR_FAILED",
     "ERR_INCOMPLETE_CHUNKED_ENCODING",
+    "ERR_CONTENT_LENGTH_MISMATCH",  # a daemon killed in the midst of an answer
     "401",
     "429",
     "503",

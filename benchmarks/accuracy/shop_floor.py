@@ -179,11 +179,10 @@ def overlay(rendered: Rendered, found: Contour | None) -> np.ndarray[tuple[int, 
     return np.asarray(drawn, dtype=np.uint8)
 
 
-def report(verdicts: Sequence[Verdict], seeds: Sequence[int], *, taught: bool = False) -> str:
-    """The section of the accuracy page, its table with a row a kind."""
+def report(verdicts: Sequence[Verdict], seeds: Sequence[int], said: str = _SAID) -> str:
+    """The section of the accuracy page, `said` of the {first} and {last} seed, and a table with a row a kind."""
     head = ["", "pictures", "right", "of them hidden", "wrong, accepted", "refused", "bound broken", "bound over true"]
     rows = [_row(name, [v for v in verdicts if v.row == name]) for name in dict.fromkeys(v.row for v in verdicts)]
-    said = _SAID_OF_TAUGHT if taught else _SAID
     return f"{said.format(first=seeds[0], last=seeds[-1])}\n\n{table(head, [*rows, _row('all', verdicts)])}"
 
 
@@ -238,7 +237,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         verdicts.append(verdict)
         if options.list:
             print(verdict.line(), flush=True)
-    text = report(verdicts, seeds, taught=options.taught)
+    text = report(verdicts, seeds, _SAID_OF_TAUGHT if options.taught else _SAID)
     print(text)
     if options.write:
         put_section("shop-floor-taught" if options.taught else "shop-floor", text)

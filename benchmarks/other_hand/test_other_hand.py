@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.other_hand.__main__ import main
 from benchmarks.other_hand.drawings import stroke, within
 from benchmarks.other_hand.scene import KINDS, Scene, scene
 from contour.geometry.arrays import Bools, Float32s
@@ -63,3 +64,13 @@ def test_comb_is_both_blocks_of_a_pair_and_an_offcut_too() -> None:
     assert len(pair.rings) == 2
     assert np.array_equal(pair.comb, within(pair.comb.shape, pair.rings) > 0)
     assert (offcut.comb & (within(offcut.comb.shape, offcut.rings) == 0)).sum() > offcut.pitch_px**2
+
+
+def test_the_command_judges_each_picture(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--kinds", "undisturbed,tape", "--seeds", "1", "--list"]) == 0
+    told = capsys.readouterr().out
+    assert "undisturbed 700000 right" in told
+    assert "tape 700000 refused" in told
+    with pytest.raises(SystemExit):
+        main(["--kinds", "tapes"])
+    assert "unknown kinds tapes" in capsys.readouterr().err

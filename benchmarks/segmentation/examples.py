@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
+from benchmarks.other_hand.scene import KINDS as OTHER_KINDS
+from benchmarks.other_hand.scene import scene as other_scene
 from contour.geometry.arrays import Bytes, Float32s, median
 from contour.image.opencv import grey
 from contour.segmentation.network import LEAST_SPREAD, PITCH_PX
@@ -24,6 +27,8 @@ _OTHERS = (
     *("row_noise", "motion", "defocus", "glare", "shadow", "crushed", "fading", "dim", "mirror", "gamma", "coloured"),
 )
 KINDS = (*_STRUCTURED * 3, *_OTHERS)
+# So many are drawn by another hand.
+_BY_ANOTHER = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,30 @@ class Example:
 def example(seed: int) -> Example:
     """The example of this seed, the same for the same."""
     rng = np.random.default_rng([seed, 77])
+    drawn = _by_another(rng, seed) if rng.random() < _BY_ANOTHER else _own(rng, seed)
+    height, width = drawn.picture.shape[:2]
+    share = PITCH_PX / drawn.pitch_px * math.exp(float(rng.uniform(-_APART, _APART)))
+    size = max(64, round(width * share)), max(64, round(height * share))
+    how = cv2.INTER_AREA if share < 1.0 else cv2.INTER_LINEAR
+    picture = np.asarray(cv2.resize(drawn.picture, size, interpolation=how), np.uint8)
+    wall, within, over = (_sized(one, size, how) for one in (drawn.wall * drawn.comb, drawn.comb, drawn.thing))
+    light = grey(picture)
+    on, off = light[wall > 180], light[(wall < 20) & (within > 200)]
+    dark = len(on) > 0 and len(off) > 0 and median(on) < median(off)
+    return Example(picture, wall, within, over, float(light.mean()), max(float(light.std()), LEAST_SPREAD), dark)
+
+
+class _Drawn(NamedTuple):
+    """A picture, the pitch of its cells, and how much of each pixel is a wall's top, block, and a thing, 0…1."""
+
+    picture: Bytes
+    pitch_px: float
+    wall: Float32s
+    comb: Float32s
+    thing: Float32s
+
+
+def _own(rng: np.random.Generator, seed: int) -> _Drawn:
     scene = shop_floor_scene(str(rng.choice(KINDS)), seed).scene
     rendered = render(scene)
     height, width = rendered.picture.shape[:2]
@@ -52,15 +81,13 @@ def example(seed: int) -> Example:
     thing = np.zeros_like(comb)
     for area in cover_areas(scene):
         thing = np.maximum(thing, area_coverage(area.rings, width, height))
-    share = PITCH_PX / rendered.pitch_px * math.exp(float(rng.uniform(-_APART, _APART)))
-    size = max(64, round(width * share)), max(64, round(height * share))
-    how = cv2.INTER_AREA if share < 1.0 else cv2.INTER_LINEAR
-    picture = np.asarray(cv2.resize(rendered.picture, size, interpolation=how), np.uint8)
-    wall, within, over = (_sized(one, size, how) for one in (tops(scene)[0] * comb, comb, thing))
-    light = grey(picture)
-    on, off = light[wall > 180], light[(wall < 20) & (within > 200)]
-    dark = len(on) > 0 and len(off) > 0 and median(on) < median(off)
-    return Example(picture, wall, within, over, float(light.mean()), max(float(light.std()), LEAST_SPREAD), dark)
+    return _Drawn(rendered.picture, rendered.pitch_px, tops(scene)[0], comb, thing)
+
+
+def _by_another(rng: np.random.Generator, seed: int) -> _Drawn:
+    one = other_scene(str(rng.choice(OTHER_KINDS)), seed)
+    wall, comb, thing = (np.asarray(part, np.float32) for part in (one.walls, one.comb, one.hidden))
+    return _Drawn(one.picture, one.pitch_px, wall, comb, thing)
 
 
 def _sized(share: Float32s, size: tuple[int, int], how: int) -> Bytes:

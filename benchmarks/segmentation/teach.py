@@ -1,15 +1,18 @@
-"""Teaches the network: `python -m benchmarks.segmentation.teach --out FILE.onnx` (`--help`), an hour on two cores.
+"""Teaches the networks: `python -m benchmarks.segmentation.teach --out FILE.onnx` (`--help`), an hour on two cores;
+with `--beyond` the light one that looks beyond outlines, a quarter of one.
 
-What comes out differs in its last digits from machine to machine, and so from `contour/segmentation/comb.onnx`.
+What comes out differs in its last digits from machine to machine, and so from what is in `contour/segmentation/`.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import math
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -17,16 +20,34 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from benchmarks.segmentation.crops import crop
+from benchmarks.segmentation.crops import Crop, crop
 from benchmarks.segmentation.examples import Example, example
+from contour.segmentation.network import PITCH_PX
 
 # Far from the seeds of every page and test.
 FIRST = 90_000_000
 _BATCH = 16
 _RATE = 3e-3
 # Near an outline, within half a pitch, what is told counts so many times as much.
-_NEAR_PX, _NEAR = 8, 4.0
-_WALL, _COMB, _THING = 2.0, 1.0, 0.5
+_NEAR = 4.0
+
+
+class _Plan(NamedTuple):
+    """A network: the channels of each of its sizes, how far apart its lowest layers look, how many layers lead up; what
+    it tells of, each with what it counts; and how many times smaller than crops are it sees pictures.
+    """
+
+    widths: tuple[int, int, int, int]
+    apart: tuple[int, ...]
+    layers_up: int
+    told: dict[str, float]
+    smaller: int
+
+
+PLANS = {
+    "comb": _Plan((12, 24, 48, 64), (1, 2, 4, 2), 2, {"wall": 2.0, "comb": 1.0, "thing": 0.5}, 1),
+    "beyond": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 1.0, "thing": 0.5}, 2),
+}
 
 
 def _layer(before: int, after: int, apart: int = 1) -> nn.Sequential:
@@ -35,29 +56,27 @@ def _layer(before: int, after: int, apart: int = 1) -> nn.Sequential:
 
 
 class Network(nn.Module):
-    """Four sizes, each half of the one above it, down and up again: a U-Net of 274,000 weights."""
+    """Four sizes, each half of the one above it, down and up again: a U-Net of 274,000 weights, or of 58,000."""
 
-    def __init__(self) -> None:
+    def __init__(self, plan: _Plan) -> None:
         super().__init__()
+        *widths, lowest = plan.widths
+        before = (1, *widths)
         self.down = nn.ModuleList(
-            [
-                nn.Sequential(_layer(1, 12), _layer(12, 12)),
-                nn.Sequential(_layer(12, 24), _layer(24, 24)),
-                nn.Sequential(_layer(24, 48), _layer(48, 48)),
-            ]
+            nn.Sequential(_layer(one, next_), _layer(next_, next_)) for one, next_ in itertools.pairwise(before)
         )
-        self.bottom = nn.Sequential(_layer(48, 64), _layer(64, 64, 2), _layer(64, 64, 4), _layer(64, 64, 2))
+        self.bottom = nn.Sequential(
+            _layer(widths[-1], lowest), *(_layer(lowest, lowest, far) for far in plan.apart[1:])
+        )
+        below = (lowest, *reversed(widths))
         self.up = nn.ModuleList(
-            [
-                nn.Sequential(_layer(112, 48), _layer(48, 48)),
-                nn.Sequential(_layer(72, 24), _layer(24, 24)),
-                nn.Sequential(_layer(36, 12), _layer(12, 12)),
-            ]
+            nn.Sequential(_layer(one + beside, beside), *(_layer(beside, beside) for _ in range(plan.layers_up - 1)))
+            for one, beside in itertools.pairwise(below)
         )
-        self.told = nn.Conv2d(12, 3, 1)
+        self.told = nn.Conv2d(widths[0], len(plan.told), 1)
 
     def forward(self, light: Tensor) -> Tensor:
-        """Logits of a wall, comb and a thing, (N, 3, h, w)."""
+        """Logits of what it tells, (N, K, h, w)."""
         kept = []
         for step in self.down:
             light = step(light)
@@ -94,34 +113,37 @@ class _Crops(torch.utils.data.IterableDataset[tuple[Tensor, ...]]):
             yield tuple(torch.from_numpy(np.ascontiguousarray(plane)) for plane in crop(one, rng))
 
 
-def loss(told: Tensor, wall: Tensor, comb: Tensor, thing: Tensor) -> Tensor:
-    """By how much what is told, (N, 3, h, w), differs from what is true, each (N, h, w)."""
-    wide = 2 * _NEAR_PX + 1
-    near = functional.max_pool2d(comb[:, None], wide, 1, _NEAR_PX) + functional.max_pool2d(
-        -comb[:, None], wide, 1, _NEAR_PX
-    )
-    counts = 1.0 + (_NEAR - 1.0) * near[:, 0]
-    off = [
-        share * (functional.binary_cross_entropy_with_logits(told[:, number], true, reduction="none") * counts).mean()
-        for number, (share, true) in enumerate(((_WALL, wall), (_COMB, comb), (_THING, thing)))
-    ]
-    return off[0] + off[1] + off[2]
+def loss(told: Tensor, true: dict[str, Tensor], plan: _Plan) -> Tensor:
+    """By how much what is told, (N, K, h, w), differs from what is true, each (N, 1, h, w)."""
+    near_px = round(0.5 * PITCH_PX / plan.smaller)
+    window = 2 * near_px + 1, 1, near_px
+    near = functional.max_pool2d(true["comb"], *window) + functional.max_pool2d(-true["comb"], *window)
+    counts = 1.0 + (_NEAR - 1.0) * near
+    off = torch.zeros(())
+    for number, (name, share) in enumerate(plan.told.items()):
+        one = told[:, number : number + 1]
+        off = (
+            off
+            + share * (functional.binary_cross_entropy_with_logits(one, true[name], reduction="none") * counts).mean()
+        )
+    return off
 
 
-def teach(network: Network, examples: Sequence[Example], minutes: float, rate: float, seed: int) -> None:
+def teach(network: Network, plan: _Plan, examples: Sequence[Example], minutes: float, rate: float, seed: int) -> None:
     """Show it parts of the examples for so long, less and less of each of which it takes to heart."""
     crops = torch.utils.data.DataLoader(_Crops(examples, seed), batch_size=_BATCH, num_workers=2, prefetch_factor=4)
     taught = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=1e-3)
     began, lately = time.monotonic(), []
-    for number, (light, *true) in enumerate(crops):
+    for number, planes in enumerate(crops):
+        light, *shares = (functional.avg_pool2d(plane[:, None], plan.smaller) for plane in planes)
         done = (time.monotonic() - began) / (60.0 * minutes)
         if done >= 1.0:
             return
         for group in taught.param_groups:
             group["lr"] = rate * min(1.0, (number + 1) / 100) * 0.5 * (1.0 + math.cos(math.pi * done)) + 1e-5
         with torch.autocast("cpu", dtype=torch.bfloat16):
-            told = network(light[:, None].to(memory_format=torch.channels_last))
-        off = loss(told.float(), *true)
+            told = network(light.to(memory_format=torch.channels_last))
+        off = loss(told.float(), dict(zip(Crop._fields[1:], shares, strict=True)), plan)
         taught.zero_grad()
         off.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -150,15 +172,17 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=_RATE, help="how fast it learns at first")
     parser.add_argument("--start", metavar="FILE", help="weights of a network that goes on learning")
     parser.add_argument("--weights", metavar="FILE", help="where its weights go, to go on with")
+    parser.add_argument("--beyond", action="store_true", help="the one that looks beyond outlines")
     parser.add_argument("--out", required=True, metavar="FILE", help="where the network goes, .onnx")
     options = parser.parse_args()
     seeds = range(options.first, options.first + options.examples)
     with ProcessPoolExecutor(2, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
         examples = list(pool.map(example, seeds, chunksize=4))
-    network = Network().to(memory_format=torch.channels_last)
+    plan = PLANS["beyond" if options.beyond else "comb"]
+    network = Network(plan).to(memory_format=torch.channels_last)
     if options.start is not None:
         network.load_state_dict(torch.load(options.start))
-    teach(network, examples, options.minutes, options.rate, options.seed)
+    teach(network, plan, examples, options.minutes, options.rate, options.seed)
     if options.weights is not None:
         torch.save(network.state_dict(), options.weights)
     export(network, options.out)

@@ -152,7 +152,7 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
     if traced is None or traced.disagreement is None or limit is None:
         return None
     shown_px = SHOWN_PITCHES * (traced.trace.pitch_px or 0.0)
-    at_edge = _odd_edge(traced, shown_px)
+    at_edge = _odd_edge(traced, shown_px) or _left_out(traced, shown_px)
     if at_edge is not None:
         return at_edge
     apart = traced.disagreement
@@ -226,6 +226,20 @@ def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
             "elsewhere. Look at the overlay; take away what lies beside the block, and check light and focus.",
         )
     return None
+
+
+def _left_out(traced: CheckedTrace, shown_px: float) -> Finding | None:
+    """Comb beyond the contour, by a second opinion."""
+    if traced.left_out is None:
+        return None
+    (x, y), far = traced.left_out.place_px, traced.left_out.pitches
+    return _disagreement_at(
+        (x, y),
+        shown_px,
+        f"Comb seems to reach {far:.1f} cells beyond the contour near ({x:.0f}, {y:.0f}) px: its walls may be faint "
+        "there, or something lies over the block or against it. Look at the overlay; check light and table, and clear "
+        "the edge.",
+    )
 
 
 def _disagreement_at(place_px: tuple[float, float], shown_px: float, text: str) -> Finding:

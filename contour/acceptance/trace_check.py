@@ -24,6 +24,7 @@ from contour.image.side_by_side import side_by_side
 from contour.narrow_features.feature import NarrowFeature
 from contour.narrow_features.narrow_feature import narrow_feature
 from contour.relief.relief import Relief
+from contour.segmentation.comb_beyond import CombBeyond
 from contour.tracing.trace import Trace
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
@@ -40,7 +41,7 @@ class CheckedTrace:
     without a pitch. `narrow`: its deepest bump or dent that is no wider than a chip. `alike`: the longest part of its
     edge along which the table is as light as the walls. `bare`: the longest part of its edge without cells behind it;
     `beyond`: the longest with comb beyond it. `runs_on`: a border on the table with which one of its edges goes on past
-    its corner.
+    its corner. `left_out`: how far comb reaches beyond it by a second opinion, where one was asked.
     """
 
     trace: Trace
@@ -51,6 +52,7 @@ class CheckedTrace:
     bare: EdgePart | None = None
     beyond: EdgePart | None = None
     runs_on: EdgePart | None = None
+    left_out: CombBeyond | None = None
 
     def moved(self, first: Float64s) -> CheckedTrace:
         """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""

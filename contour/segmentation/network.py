@@ -1,4 +1,4 @@
-"""The network, and what it tells of every pixel at one size of cells."""
+"""The networks, and what they tell of every pixel at one size of cells."""
 
 from __future__ import annotations
 
@@ -36,14 +36,22 @@ class Segments:
 
 def segments(light: Bytes, pitch_px: float) -> Segments:
     """What the picture, (H, W), shows of cells of that pitch, at `PITCH_PX` a pitch, its sides multiples of 8."""
-    shape = tuple(_HALVED * max(_HALVED, round(side * PITCH_PX / (pitch_px * _HALVED))) for side in light.shape)
-    sized = (shrunk_to if pitch_px > PITCH_PX else grown)(light, shape)
+    sized, told = tell("comb.onnx", 3, light, PITCH_PX / pitch_px)
+    return Segments(sized, *told)
+
+
+def tell(name: str, channels: int, light: Bytes, size: float) -> tuple[Bytes, Float32s]:
+    """The picture, (H, W), at so many times its size, its sides multiples of 8, (h, w), and what the network in that
+    file tells of each pixel of it, (channels, h, w), float32.
+    """
+    shape = tuple(_HALVED * max(_HALVED, round(side * size / _HALVED)) for side in light.shape)
+    sized = (shrunk_to if size < 1.0 else grown)(light, shape)
     even = sized.astype(np.float32)
     even -= even.mean()
     even /= max(float(even.std()), LEAST_SPREAD)
     # A net of OpenCV's holds what it computes, all layers of it: each thread has one of its own, for a tile at a time.
-    network = cv2.dnn.readNetFromONNX(_network())
-    told = np.empty((3, *shape), np.float32)
+    network = cv2.dnn.readNetFromONNX(_network(name))
+    told = np.empty((channels, *shape), np.float32)
     for top in range(0, shape[0], _TILE_PX):
         for left in range(0, shape[1], _TILE_PX):
             above, before = max(0, top - _AROUND_PX), max(0, left - _AROUND_PX)
@@ -52,11 +60,11 @@ def segments(light: Bytes, pitch_px: float) -> Segments:
             rows, columns = slice(top - above, top - above + _TILE_PX), slice(left - before, left - before + _TILE_PX)
             part = np.asarray(network.forward(), np.float32)[0, :, rows, columns]
             told[:, top : top + _TILE_PX, left : left + _TILE_PX] = part
-    return Segments(sized, *told)
+    return sized, told
 
 
 @cache
-def _network() -> Bytes:
+def _network(name: str) -> Bytes:
     from importlib.resources import files  # 6 ms, where few pictures ask
 
-    return np.frombuffer(files("contour.segmentation").joinpath("comb.onnx").read_bytes(), np.uint8)
+    return np.frombuffer(files("contour.segmentation").joinpath(name).read_bytes(), np.uint8)

@@ -146,8 +146,8 @@ class Recipe(Model):
     )
     network: bool = Field(
         True,
-        description="Whether a network looks for the comb where the picture itself shows no outline, as on a table as "
-        "light as the walls.",
+        description="Whether a network looks for the comb where the picture itself shows no outline, and for comb "
+        "beyond outlines that it does show.",
     )
     margin_mm: float = Field(
         0,

@@ -22,16 +22,18 @@ from contour.acceptance.trace_check import CheckedTrace, check_trace
 from contour.calibration.calibration import Calibration
 from contour.edge.known_table import OverTable, over_known_table
 from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, NoCellsFound, ParameterError
+from contour.geometry.agreement import rectified_edges
 from contour.geometry.arrays import Float64s
 from contour.geometry.rectifier import CroppedRectifier, Rectifier
 from contour.geometry.rings import Contour, Ring, densified
 from contour.image.line_noise import without_line_noise
 from contour.image.picture_check import check_picture
-from contour.image.region import Region
+from contour.image.region import Region, shifted
 from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.material.even_table import even_table
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.relief.relief import Displacement, Relief
+from contour.segmentation.comb_beyond import comb_beyond
 from contour.segmentation.comb_picture import comb_picture
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import TraceSettings
@@ -178,7 +180,9 @@ class Measurer:
             changes = judge_table(known, TableLimits())
             if changes:
                 return replace(result, findings=rejections(changes))
-        outlined = partial(self._outlined, recipe=recipe, thickness_mm=thickness_mm, result=result, watch=watch)
+        outlined = partial(
+            self._outlined, whole=picture, recipe=recipe, thickness_mm=thickness_mm, result=result, watch=watch
+        )
         looks = self._looks(picture, known, recipe, thickness_mm)
         refused: NoBlockFound | None = None
         reasons: set[Reason] = set()
@@ -236,12 +240,13 @@ class Measurer:
         self,
         look: _Look,
         *,
+        whole: NDArray[np.uint8],
         recipe: AnyRecipe,
         thickness_mm: float,
         result: Measurement,
         watch: _Stopwatch,
     ) -> Measurement:
-        """The measurement of what is looked at."""
+        """The measurement of what is looked at in the whole picture."""
         picture = _drawn(look.picture, watch) if look.network else look.picture
         height, width = picture.shape[:2]
         calibration = self._calibration
@@ -267,7 +272,10 @@ class Measurer:
         to_mm = self._to_mm(thickness_mm)
         limits = self._limits(recipe)
         view = View((width, height), region, picture)
-        findings = judge(polygon, view, limits, traced=checked, budget=budget, to_mm=to_mm)
+        judged = partial(judge, polygon, view, limits, budget=budget, to_mm=to_mm)
+        findings = judged(traced=checked)
+        if not findings and recipe.network and not look.network:
+            findings = judged(traced=_with_second_opinion(whole, checked, region, rectifier, watch))
         evidence = sent_evidence(traced, polygon, budget, to_mm)
         watch.lap("judge")
         return replace(
@@ -415,6 +423,24 @@ def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch) -> NDArray[np.uint8]:
     if drawn is None:
         raise NoBlockFound("no block found: no comb on a table as light as its walls, with nothing over its edge")
     return drawn
+
+
+def _with_second_opinion(
+    picture: NDArray[np.uint8],
+    checked: CheckedTrace,
+    region: Region | None,
+    rectifier: Rectifier | None,
+    watch: _Stopwatch,
+) -> CheckedTrace:
+    """The trace with what a network says of comb beyond it; closed cells are none that it knows."""
+    traced = checked.trace
+    if traced.edge != "cut" or traced.pitch_px is None or traced.look is None:
+        return checked
+    outline = traced.contour if rectifier is None else rectified_edges(traced.contour, rectifier)
+    part, first = (picture, np.zeros(2)) if region is None else region.cut(picture)
+    left_out = comb_beyond(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at)
+    watch.lap("network")
+    return replace(checked, left_out=left_out and left_out.moved(first))
 
 
 def _checked_trace(

@@ -60,7 +60,7 @@ def test_the_contour_in_millimetres_lies_near_the_true_outline(rendered, measure
 
 def test_each_stage_is_timed_and_total_is_their_sum(rendered, measurer: Measurer) -> None:
     times = measurer.measure(rendered.picture, RECIPE, THICKNESS_MM).timings_ms
-    assert set(times) == {"mask", "trace", "quality", "convert", "simplify", "judge", "total"}
+    assert set(times) == {"mask", "trace", "quality", "convert", "simplify", "judge", "network", "total"}
     assert times["total"] == pytest.approx(sum(value for name, value in times.items() if name != "total"))
 
 
@@ -318,9 +318,29 @@ def test_what_lies_over_an_edge_is_not_looked_past_nor_what_few_walls_tell(
 
 
 def test_of_two_blocks_no_network_draws_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measure, "comb_picture", lambda _: pytest.fail("asked"))
+    monkeypatch.setattr(measure, "comb_picture", lambda *_, **__: pytest.fail("asked"))
     seen = measured(render(shop_floor_scene("pushed_together", 4_150_000, alone=True).scene))
     assert Reason.SEVERAL_BLOCKS in seen.reasons
+
+
+@pytest.mark.parametrize("seed", [4_300_043, 4_300_054])
+def test_comb_that_a_cable_parts_off_is_seen_by_a_second_opinion(seed: int) -> None:
+    rendered = render(shop_floor_scene("hand_or_cable", seed).scene)
+    seen = measured(rendered)
+    assert seen.reasons == (Reason.METHODS_DISAGREE,)
+    assert seen.findings[0][1].startswith("Comb seems to reach")
+    assert seen.shown_px
+    assert measured(rendered, recipe=Recipe(number=1, name="default", network=False)).findings == ()
+
+
+def test_where_faint_walls_were_left_out_another_look_is_taken() -> None:
+    rendered = render(shop_floor_scene("light_table", 4_410_003).scene)
+    seen, without = measured(rendered), measured(rendered, recipe=Recipe(number=1, name="default", network=False))
+    assert seen.findings == without.findings == ()
+    assert seen.pixels is not None
+    assert without.pixels is not None
+    assert farthest(seen.pixels, rendered.truth_px, 1.0)[0] < 0.5 * rendered.pitch_px
+    assert farthest(without.pixels, rendered.truth_px, 1.0)[0] > 0.5 * rendered.pitch_px
 
 
 def test_a_dark_cable_that_parts_a_corner_from_the_block_is_no_edge_of_it() -> None:

@@ -1,0 +1,56 @@
+"""Comb that an outline leaves out is seen beyond it, and nothing beyond a right one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from contour.geometry.rings import Contour
+from contour.segmentation.comb_beyond import comb_beyond
+from contour.synthetic import Rendered, render
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+
+
+def nowhere(points: np.ndarray) -> np.ndarray:
+    return np.zeros(len(points), np.bool_)
+
+
+def scene_of(kind: str, seed: int) -> Rendered:
+    return render(shop_floor_scene(kind, seed, alone=True).scene)
+
+
+@pytest.mark.parametrize("kind", ["undisturbed", "compound", "mirror", "light_table", "dim", "motion"])
+def test_beyond_the_true_outline_there_is_none(kind: str) -> None:
+    rendered = scene_of(kind, 95_100_001)
+    assert comb_beyond(rendered.picture, rendered.truth_px, rendered.pitch_px, nowhere) is None
+
+
+@pytest.mark.parametrize("kind", ["undisturbed", "light_table"])
+def test_what_an_outline_leaves_out_is_seen_with_its_place(kind: str) -> None:
+    rendered = scene_of(kind, 95_100_001)
+    ring = rendered.truth_px.exterior
+    edge = ring[:, 0].max() - 2.0 * rendered.pitch_px
+    cut = np.column_stack((np.minimum(ring[:, 0], edge), ring[:, 1]))
+    found = comb_beyond(rendered.picture, Contour(cut, rendered.truth_px.holes), rendered.pitch_px, nowhere)
+    assert found is not None
+    assert found.pitches == pytest.approx(2.0, abs=0.5)
+    assert found.place_px[0] > edge
+
+
+def test_a_hole_that_was_drawn_too_large_leaves_comb_out() -> None:
+    rendered = scene_of("undisturbed", 95_100_001)
+    turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    middle = rendered.truth_px.exterior.mean(axis=0)
+    hole = middle + 3.0 * rendered.pitch_px * np.column_stack((np.cos(turn), np.sin(turn)))
+    found = comb_beyond(rendered.picture, Contour(rendered.truth_px.exterior, (hole,)), rendered.pitch_px, nowhere)
+    assert found is not None
+    assert np.hypot(*(np.array(found.place_px) - middle)) < 2.0 * rendered.pitch_px
+
+
+def test_pieces_that_are_known_to_be_none_of_the_blocks_do_not_count() -> None:
+    rendered = scene_of("undisturbed", 95_100_001)
+    ring = rendered.truth_px.exterior
+    cut = Contour(np.column_stack((np.minimum(ring[:, 0], ring[:, 0].max() - 2.0 * rendered.pitch_px), ring[:, 1])))
+    assert comb_beyond(rendered.picture, cut, rendered.pitch_px, nowhere) is not None
+    everywhere = lambda points: ~nowhere(points)  # noqa: E731
+    assert comb_beyond(rendered.picture, cut, rendered.pitch_px, everywhere) is None

@@ -67,10 +67,8 @@ def test_comb_is_both_blocks_of_a_pair_and_an_offcut_too() -> None:
 
 
 def test_the_command_judges_each_picture(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["--kinds", "undisturbed,tape", "--seeds", "1", "--list"]) == 0
-    told = capsys.readouterr().out
-    assert "undisturbed 700000 right" in told
-    assert "tape 700000 refused" in told
+    assert main(["--kinds", "undisturbed", "--seeds", "1", "--list"]) == 0
+    assert "undisturbed 700000 right" in capsys.readouterr().out
     with pytest.raises(SystemExit):
         main(["--kinds", "tapes"])
     assert "unknown kinds tapes" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pkgutil
 from dataclasses import dataclass
 from functools import cache
 
@@ -65,6 +66,6 @@ def tell(name: str, channels: int, light: Bytes, size: float) -> tuple[Bytes, Fl
 
 @cache
 def _network(name: str) -> Bytes:
-    from importlib.resources import files  # 6 ms, where few pictures ask
-
-    return np.frombuffer(files("contour.segmentation").joinpath(name).read_bytes(), np.uint8)
+    data = pkgutil.get_data("contour.segmentation", name)
+    assert data is not None
+    return np.frombuffer(data, np.uint8)

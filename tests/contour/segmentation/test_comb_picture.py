@@ -35,7 +35,7 @@ def test_cells_of_any_size_are_found(pitch: tuple[float, float]) -> None:
         assert seen.max() == pytest.approx(ring.max(), abs=0.6 * rendered.pitch_px)
 
 
-@pytest.mark.parametrize("kind", ["undisturbed", "wood", "brushed", "slots", "old_cuts", "expanded", "cork", "ribbed"])
+@pytest.mark.parametrize("kind", ["undisturbed", "wood", "slots", "expanded"])
 def test_on_an_empty_table_nothing_is_drawn(kind: str) -> None:
     scene = shop_floor_scene(kind, 95_000_003, alone=True).scene
     assert comb_picture(render_empty_table(scene, 1)[0]) is None

@@ -9,10 +9,11 @@ from four pictures, and the usual kinds are those in which it is no plain dark o
 from __future__ import annotations
 
 import sys
+from argparse import ArgumentParser, Namespace
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -37,6 +38,8 @@ FIRST = 500_000
 WRONG_PITCHES = 0.5
 SPACING_PX = 1.0
 TAUGHT_FROM = 4
+RECIPE = Recipe(number=1, name="default", min_area_mm2=0.0)
+"""It says nothing: with it nothing hidden is bridged."""
 STRUCTURED = ("light_table", "wood", "brushed", "slots", "old_cuts")
 TRUE, HIDDEN, FOUND = (80, 220, 60), (0, 200, 255), (60, 60, 255)
 
@@ -72,6 +75,17 @@ class Verdict:
     bound_px: float | None = None
     true_px: float | None = None
     within: float | None = None
+
+    def with_outline(self, found: Contour, bound_px: float, truth: Contour, visible: Float64s) -> Verdict:
+        """The same of a picture in which an outline was found, with its bound; `visible` are places of the true one."""
+        to_found, to_truth = distances_to(visible, found), distances_to(places_along(found, SPACING_PX), truth)
+        return replace(
+            self,
+            off_px=max(float(to_found.max()), float(to_truth.max())),
+            bound_px=bound_px,
+            true_px=float(np.percentile(to_found, 95)),
+            within=float(np.mean(to_found <= bound_px)),
+        )
 
     @property
     def accepted(self) -> bool:
@@ -128,7 +142,7 @@ def _measured(
     scene: ShopFloorScene, rendered: Rendered, empty: TableRecord | None = None
 ) -> tuple[Verdict, Contour | None]:
     calibration = calibration_for(rendered.camera)
-    seen = Measurer(calibration, table=empty).measure(rendered.picture, _recipe(), rendered.thickness_mm)
+    seen = Measurer(calibration, table=empty).measure(rendered.picture, RECIPE, rendered.thickness_mm)
     codes = tuple(int(reason) for reason in seen.reasons)
     places, clear = true_places(rendered)
     hidden_px = float(SPACING_PX * np.count_nonzero(~clear))
@@ -136,24 +150,7 @@ def _measured(
     if seen.pixels is None or seen.uncertainty_px is None:
         return verdict, seen.pixels
     outline = rectified_edges(seen.pixels, calibration.rectifier(rendered.thickness_mm))
-    to_found = distances_to(places[clear], outline)
-    to_truth = distances_to(places_along(outline, SPACING_PX), rendered.truth_px)
-    return Verdict(
-        scene.kinds,
-        scene.scene.seed,
-        codes,
-        rendered.pitch_px,
-        hidden_px,
-        max(float(to_found.max()), float(to_truth.max())),
-        seen.uncertainty_px,
-        float(np.percentile(to_found, 95)),
-        float(np.mean(to_found <= seen.uncertainty_px)),
-    ), outline
-
-
-def _recipe() -> Recipe:
-    """A recipe that says nothing: with it nothing hidden is bridged."""
-    return Recipe(number=1, name="default", min_area_mm2=0.0)
+    return verdict.with_outline(outline, seen.uncertainty_px, rendered.truth_px, places[clear]), outline
 
 
 def true_places(rendered: Rendered) -> tuple[Float64s, Bools]:
@@ -211,37 +208,54 @@ def run(
         yield from pool.map(judge, *zip(*jobs, strict=True))
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run; 0 when no wrong outline was accepted, else 1."""
-    parser = options_of_seeds("benchmarks.accuracy.shop_floor", __doc__, seeds=20, first=FIRST)
-    parser.add_argument(
-        "--kinds", help="comma-separated; all but guards if not given (with --taught: tables not plain)"
-    )
-    parser.add_argument("--alone", action="store_true", help="never two kinds at once")
-    parser.add_argument("--taught", action="store_true", help="teach the empty table before each picture")
+def add_kinds(parser: ArgumentParser, usual: str) -> None:
+    """The options which kinds, and whether each picture is listed."""
+    parser.add_argument("--kinds", help=f"comma-separated; {usual}")
     parser.add_argument("--list", action="store_true", help="a line for each picture as well")
-    parser.add_argument("--save", type=Path, metavar="DIR", help="overlays of wrong outlines go here")
-    options = parser.parse_args(arguments)
-    usual = STRUCTURED if options.taught else (*KINDS, *LATER)
+
+
+def chosen(parser: ArgumentParser, options: Namespace, usual: Sequence[str], known: Collection[str]) -> Sequence[str]:
+    """The kinds that were asked for, or the usual ones; an end with what is known where one is not."""
     kinds = options.kinds.split(",") if options.kinds else usual
-    known = KINDS | LATER | GUARDS
     unknown = [kind for kind in kinds if kind not in known]
     if unknown:
         parser.error(f"unknown kinds {', '.join(unknown)}; expected some of {', '.join(known)}")
-    if options.save is not None:
-        options.save.mkdir(parents=True, exist_ok=True)
-    seeds = range(options.first, options.first + options.seeds)
+    return kinds
+
+
+def told(judged: Iterable[Verdict], seeds: Sequence[int], options: Namespace, section: tuple[str, str]) -> int:
+    """Print what became of pictures as they are judged, and the section by its name and what it says first, which is
+    written where that was asked for; 0 when no wrong outline was accepted, else 1.
+    """
+    name, said = section
     verdicts = []
-    judge = partial(judged, alone=options.alone, taught=options.taught, save=options.save)
-    for verdict in run(kinds, seeds, judge, workers=options.workers):
+    for verdict in judged:
         verdicts.append(verdict)
         if options.list:
             print(verdict.line(), flush=True)
-    text = report(verdicts, seeds, _SAID_OF_TAUGHT if options.taught else _SAID)
+    text = report(verdicts, seeds, said)
     print(text)
     if options.write:
-        put_section("shop-floor-taught" if options.taught else "shop-floor", text)
+        put_section(name, text)
     return int(any(verdict.wrong for verdict in verdicts))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run; 0 when no wrong outline was accepted, else 1."""
+    parser = options_of_seeds("benchmarks.accuracy.shop_floor", __doc__, seeds=20, first=FIRST)
+    add_kinds(parser, "all but guards if not given (with --taught: tables not plain)")
+    parser.add_argument("--alone", action="store_true", help="never two kinds at once")
+    parser.add_argument("--taught", action="store_true", help="teach the empty table before each picture")
+    parser.add_argument("--save", type=Path, metavar="DIR", help="overlays of wrong outlines go here")
+    options = parser.parse_args(arguments)
+    usual = STRUCTURED if options.taught else (*KINDS, *LATER)
+    kinds = chosen(parser, options, usual, KINDS | LATER | GUARDS)
+    if options.save is not None:
+        options.save.mkdir(parents=True, exist_ok=True)
+    seeds = range(options.first, options.first + options.seeds)
+    judge = partial(judged, alone=options.alone, taught=options.taught, save=options.save)
+    section = ("shop-floor-taught", _SAID_OF_TAUGHT) if options.taught else ("shop-floor", _SAID)
+    return told(run(kinds, seeds, judge, workers=options.workers), seeds, options, section)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring, area, perimeter
 from contour.image.region import Region
+from contour.segmentation.comb_beyond import CombBeyond
 from contour.tracing.trace import Trace
 from contour.walls.comb_likeness import unlike_comb
 from contour.walls.pieces import STRIP_PITCHES, Piece
@@ -152,7 +153,7 @@ def disagrees(traced: CheckedTrace | None, limit: float | None) -> Finding | Non
     if traced is None or traced.disagreement is None or limit is None:
         return None
     shown_px = SHOWN_PITCHES * (traced.trace.pitch_px or 0.0)
-    at_edge = _odd_edge(traced, shown_px) or _left_out(traced, shown_px)
+    at_edge = _odd_edge(traced, shown_px)
     if at_edge is not None:
         return at_edge
     apart = traced.disagreement
@@ -228,14 +229,12 @@ def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
     return None
 
 
-def _left_out(traced: CheckedTrace, shown_px: float) -> Finding | None:
-    """Comb beyond the contour, by a second opinion."""
-    if traced.left_out is None:
-        return None
-    (x, y), far = traced.left_out.place_px, traced.left_out.pitches
+def comb_left_out(beyond: CombBeyond, pitch_px: float) -> Finding:
+    """Comb that reaches beyond the contour by a second opinion, its cells of that pitch."""
+    (x, y), far = beyond.place_px, beyond.pitches
     return _disagreement_at(
         (x, y),
-        shown_px,
+        SHOWN_PITCHES * pitch_px,
         f"Comb seems to reach {far:.1f} cells beyond the contour near ({x:.0f}, {y:.0f}) px: its walls may be faint "
         "there, or something lies over the block or against it. Look at the overlay; check light and table, and clear "
         "the edge.",

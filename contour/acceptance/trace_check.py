@@ -15,16 +15,16 @@ from contour.edge.border_beyond import border_beyond
 from contour.edge.edge_parts import EdgePart
 from contour.edge.reflection import reflection
 from contour.edge.table_look import TableLook
+from contour.geometry.agreement import rectified_edges
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
-from contour.geometry.rings import Contour, densified
+from contour.geometry.rings import Contour
 from contour.image.opencv import grey
 from contour.image.pixel_grid import drawn
 from contour.image.side_by_side import side_by_side
 from contour.narrow_features.feature import NarrowFeature
 from contour.narrow_features.narrow_feature import narrow_feature
 from contour.relief.relief import Relief
-from contour.segmentation.comb_beyond import CombBeyond
 from contour.tracing.trace import Trace
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
@@ -41,7 +41,7 @@ class CheckedTrace:
     without a pitch. `narrow`: its deepest bump or dent that is no wider than a chip. `alike`: the longest part of its
     edge along which the table is as light as the walls. `bare`: the longest part of its edge without cells behind it;
     `beyond`: the longest with comb beyond it. `runs_on`: a border on the table with which one of its edges goes on past
-    its corner. `left_out`: how far comb reaches beyond it by a second opinion, where one was asked.
+    its corner.
     """
 
     trace: Trace
@@ -52,7 +52,6 @@ class CheckedTrace:
     bare: EdgePart | None = None
     beyond: EdgePart | None = None
     runs_on: EdgePart | None = None
-    left_out: CombBeyond | None = None
 
     def moved(self, first: Float64s) -> CheckedTrace:
         """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
@@ -136,6 +135,4 @@ def _bent(traced: Trace, pitch_px: float, rectifier: Rectifier | None) -> Contou
     """The contour with vertices every few cells, on the curves that a lens makes of its straight edges."""
     if rectifier is None or traced.method != "wall-tips":
         return traced.contour
-    step = _BENT_PITCHES * pitch_px
-    exterior, *holes = (rectifier.unrectify(densified(rectifier.rectify(ring), step)) for ring in traced.contour.rings)
-    return Contour(exterior, tuple(holes))
+    return rectified_edges(traced.contour, rectifier, _BENT_PITCHES * pitch_px)

@@ -42,6 +42,11 @@ def fill(mask: Bytes, ring: Float64s, step: int, value: int = 1) -> None:
     cv2.fillPoly(mask, [np.rint(samples_of(ring, step)).astype(np.int32)], value)
 
 
+def fill_finely(mask: Bytes, rings: Sequence[Float64s], value: int) -> None:
+    """Set what lies within rings, (N, 2) each, in the mask's own pixels, to a sixteenth, but for rings in them."""
+    cv2.fillPoly(mask, [np.rint(ring * 16).astype(np.int32) for ring in rings], value, cv2.LINE_8, 4)
+
+
 def drawn(rings: Sequence[Float64s], shape: tuple[int, ...], step: int) -> Bytes:
     """A mask of `shape` (h, w) of samples, 1 inside of rings, (N, 2) each, pixels, and outside of those within them."""
     mask = np.zeros(shape[:2], np.uint8)

@@ -11,6 +11,7 @@ from contour.errors import ParameterError
 from contour.geometry.arrays import Bytes, Float64s, medians
 from contour.geometry.rings import Contour, Ring
 from contour.geometry.segments import contains, distances_to_ring
+from contour.image.pixel_grid import fill_finely
 
 _LEAST_PX = 32
 
@@ -43,8 +44,7 @@ class Region:
             )
         part = picture[low[1] : high[1] + 1, low[0] : high[0] + 1]
         inside = np.zeros(part.shape[:2], np.uint8)
-        corners = np.rint((self.ring - low) * 16).astype(np.int32)
-        cv2.fillPoly(inside, [corners], 1, cv2.LINE_8, 4)
+        fill_finely(inside, [self.ring - low], 1)
         if inside.all():
             return np.ascontiguousarray(part), low.astype(np.float64)
         rim = inside - cv2.erode(inside, np.ones((9, 9), np.uint8), borderValue=0)

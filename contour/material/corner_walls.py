@@ -15,7 +15,7 @@ from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, rolled
 from contour.geometry.rings import Ring, signed_area
 from contour.geometry.signed_distance import nearest
 from contour.image.opencv import slid
-from contour.image.pixel_grid import samples_of
+from contour.image.pixel_grid import fill_finely, samples_of
 
 # Corners turn by so much between sides so long, pitches.
 _TURN, _SIDE = np.radians(50.0), 2.5
@@ -103,7 +103,7 @@ def _tip(ways: Float64s) -> Bytes:
     # Unit ways add up to twice the cosine of half the angle between them.
     legs = 2.0 * _TIP * ways / max(float(np.hypot(*ways.sum(axis=0))), 0.1)
     corners = np.concatenate([[[0.0, 0.0]], legs]) * _SAMPLES + len(tip) // 2
-    cv2.fillPoly(tip, [np.rint(corners * 16).astype(np.int32)], 1, cv2.LINE_8, 4)
+    fill_finely(tip, [corners], 1)
     return tip
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from contour.geometry.arrays import Bytes, Float64s, median
 from contour.geometry.rings import Contour
+from contour.image.pixel_grid import fill_finely
 from contour.walls.wall_mask import wall_mask
 
 _AROUND_PITCHES = 4.0
@@ -25,8 +26,7 @@ def cell_centres(light: Bytes, block: Contour, pitch_px: float, *, bright: bool)
     part = np.ascontiguousarray(light[low[1] : high[1], low[0] : high[0]])
     free = cv2.bitwise_not(wall_mask(part, pitch_px, bright=bright).mask)
     inside = np.zeros(part.shape, np.uint8)
-    rings = [np.rint((ring - low) * 16).astype(np.int32).reshape(-1, 1, 2) for ring in block.rings]
-    cv2.fillPoly(inside, rings, 255, cv2.LINE_8, 4)
+    fill_finely(inside, [ring - low for ring in block.rings], 255)
     # What the outline cuts belongs to no whole cell: it hangs together with what lies outside.
     cv2.bitwise_or(free, cv2.bitwise_not(inside), dst=free)
     _, _, stats, centroids = cv2.connectedComponentsWithStats(free, connectivity=4, ltype=cv2.CV_32S)

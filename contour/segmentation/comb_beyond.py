@@ -11,6 +11,7 @@ import numpy as np
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.geometry.rings import Contour
 from contour.image.opencv import pieces_of, within
+from contour.image.pixel_grid import fill_finely
 from contour.segmentation.network import tell
 from contour.walls.lightness import wall_light
 
@@ -22,7 +23,6 @@ _SURE = 0.5
 # far. A thing on the rim, so far about a piece, parts it from the block. Narrower than so many pixels it is the
 # network's own uncertainty.
 _AROUND, _RIM, _FAR, _BESIDE, _LEAST_PX = 3.0, 0.38, 0.55, 0.75, 3
-_FRACTION_BITS = 4
 
 
 class CombBeyond(NamedTuple):
@@ -31,10 +31,9 @@ class CombBeyond(NamedTuple):
     pitches: float
     place_px: tuple[float, float]
 
-    def moved(self, first: Float64s) -> CombBeyond:
-        """The same in a picture of which this one's is a part, whose first pixel is `first` (x, y) of it."""
-        x, y = (np.array(self.place_px) + first).tolist()
-        return self._replace(place_px=(x, y))
+    def moved(self, x: float, y: float) -> CombBeyond:
+        """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
+        return self._replace(place_px=(self.place_px[0] + x, self.place_px[1] + y))
 
 
 def comb_beyond(
@@ -50,9 +49,8 @@ def comb_beyond(
     light = wall_light(np.ascontiguousarray(picture[top:bottom, left:right]))
     sized, (comb, thing) = tell("comb_beyond.onnx", 2, light, PITCH_PX / pitch_px)
     size = np.array(sized.shape[::-1]) / light.shape[::-1]
-    rings = [((ring - (left, top) + 0.5) * size - 0.5) * (1 << _FRACTION_BITS) for ring in contour.rings]
     block = np.zeros(sized.shape, np.uint8)
-    cv2.fillPoly(block, [np.rint(ring).astype(np.int32) for ring in rings], 1, shift=_FRACTION_BITS)
+    fill_finely(block, [(ring - (left, top) + 0.5) * size - 0.5 for ring in contour.rings], 1)
     beyond = ((comb > _SURE) & (block == 0)).astype(np.uint8)
     beyond = np.asarray(cv2.morphologyEx(beyond, cv2.MORPH_OPEN, np.ones((_LEAST_PX, _LEAST_PX), np.uint8)), np.uint8)
     away = np.asarray(cv2.distanceTransform(1 - block, cv2.DIST_L2, 5), np.float32)

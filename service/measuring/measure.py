@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.acceptance.acceptance import View, judge, judge_without_block
+from contour.acceptance.block_findings import comb_left_out
 from contour.acceptance.error_budget import ErrorBudget, error_budget
 from contour.acceptance.findings import Finding, Limits, Refusal, closed
 from contour.acceptance.picture_findings import judge_table
@@ -36,7 +37,7 @@ from contour.relief.relief import Displacement, Relief
 from contour.segmentation.comb_beyond import comb_beyond
 from contour.segmentation.comb_picture import comb_picture
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
-from contour.tracing.trace import TraceSettings
+from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.tracing import trace
 from service.measuring.measurement import Measurement
 from service.measuring.part_trial import PartTrial
@@ -272,10 +273,10 @@ class Measurer:
         to_mm = self._to_mm(thickness_mm)
         limits = self._limits(recipe)
         view = View((width, height), region, picture)
-        judged = partial(judge, polygon, view, limits, budget=budget, to_mm=to_mm)
-        findings = judged(traced=checked)
-        if not findings and recipe.network and not look.network:
-            findings = judged(traced=_with_second_opinion(whole, checked, region, rectifier, watch))
+        findings = judge(polygon, view, limits, traced=checked, budget=budget, to_mm=to_mm)
+        if not findings and recipe.network and limits.max_disagreement_pitches is not None and not look.network:
+            watch.lap("judge")
+            findings = _second_opinion(whole, traced, region, rectifier, watch)
         evidence = sent_evidence(traced, polygon, budget, to_mm)
         watch.lap("judge")
         return replace(
@@ -425,22 +426,21 @@ def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch) -> NDArray[np.uint8]:
     return drawn
 
 
-def _with_second_opinion(
+def _second_opinion(
     picture: NDArray[np.uint8],
-    checked: CheckedTrace,
+    traced: Trace,
     region: Region | None,
     rectifier: Rectifier | None,
     watch: _Stopwatch,
-) -> CheckedTrace:
-    """The trace with what a network says of comb beyond it; closed cells are none that it knows."""
-    traced = checked.trace
+) -> tuple[Finding, ...]:
+    """What a network says against the outline: comb beyond it. Closed cells are none that it knows."""
     if traced.edge != "cut" or traced.pitch_px is None or traced.look is None:
-        return checked
+        return ()
     outline = traced.contour if rectifier is None else rectified_edges(traced.contour, rectifier)
     part, first = (picture, np.zeros(2)) if region is None else region.cut(picture)
-    left_out = comb_beyond(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at)
+    beyond = comb_beyond(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at)
     watch.lap("network")
-    return replace(checked, left_out=left_out and left_out.moved(first))
+    return () if beyond is None else (comb_left_out(beyond.moved(*first.tolist()), traced.pitch_px),)
 
 
 def _checked_trace(

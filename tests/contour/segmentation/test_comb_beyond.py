@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,11 @@ def nowhere(points: np.ndarray) -> np.ndarray:
     return np.zeros(len(points), np.bool_)
 
 
+def everywhere(points: np.ndarray) -> np.ndarray:
+    return np.ones(len(points), np.bool_)
+
+
+@cache
 def scene_of(kind: str, seed: int) -> Rendered:
     return render(shop_floor_scene(kind, seed, alone=True).scene)
 
@@ -52,5 +59,4 @@ def test_pieces_that_are_known_to_be_none_of_the_blocks_do_not_count() -> None:
     ring = rendered.truth_px.exterior
     cut = Contour(np.column_stack((np.minimum(ring[:, 0], ring[:, 0].max() - 2.0 * rendered.pitch_px), ring[:, 1])))
     assert comb_beyond(rendered.picture, cut, rendered.pitch_px, nowhere) is not None
-    everywhere = lambda points: ~nowhere(points)  # noqa: E731
     assert comb_beyond(rendered.picture, cut, rendered.pitch_px, everywhere) is None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import cv2
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from contour.synthetic import Rendered, pitch_px, render, render_empty_table
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 
+@cache
 def scene_of(pitch: tuple[float, float]) -> Rendered:
     """A block of that pitch, pixels, on wood."""
     for seed in range(95_000_000, 95_000_100):
@@ -35,7 +38,7 @@ def test_cells_of_any_size_are_found(pitch: tuple[float, float]) -> None:
         assert seen.max() == pytest.approx(ring.max(), abs=0.6 * rendered.pitch_px)
 
 
-@pytest.mark.parametrize("kind", ["undisturbed", "wood", "slots", "expanded"])
+@pytest.mark.parametrize("kind", ["undisturbed", "wood", "brushed", "slots", "old_cuts", "expanded", "cork", "ribbed"])
 def test_on_an_empty_table_nothing_is_drawn(kind: str) -> None:
     scene = shop_floor_scene(kind, 95_000_003, alone=True).scene
     assert comb_picture(render_empty_table(scene, 1)[0]) is None

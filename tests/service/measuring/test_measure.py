@@ -318,7 +318,7 @@ def test_what_lies_over_an_edge_is_not_looked_past_nor_what_few_walls_tell(
 
 
 def test_of_two_blocks_no_network_draws_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measure, "comb_picture", lambda *_, **__: pytest.fail("asked"))
+    monkeypatch.setattr(measure, "comb_picture", lambda _: pytest.fail("asked"))
     seen = measured(render(shop_floor_scene("pushed_together", 4_150_000, alone=True).scene))
     assert Reason.SEVERAL_BLOCKS in seen.reasons
 

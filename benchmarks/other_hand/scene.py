@@ -41,12 +41,14 @@ class Scene:
     comb: Bools
 
 
-def scene(kind: str, seed: int) -> Scene:
-    """A scene of one of `KINDS`, the same for the same seed; ValueError for another kind."""
+def scene(kind: str, seed: int, on: str | None = None) -> Scene:
+    """A scene of one of `KINDS`, on the table of another one (`on`) if one is named, the same for the same seed;
+    ValueError for a kind that is none.
+    """
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     where = layout(rng, kind)
     of = core(rng, where.pitch)
-    light, colour = table(rng, kind, where.shape, of.light)
+    light, colour = table(rng, on or kind, where.shape, of.light)
     canvas = Canvas(rng, light, colour, coloured=kind == "coloured" or rng.random() < 0.18)
     over = int(kind == "sheet" and rng.random() < 0.4)
     for _ in range(rng.integers(1, 3) - over if kind == "sheet" else 0):

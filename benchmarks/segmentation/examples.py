@@ -17,6 +17,7 @@ from contour.segmentation.network import LEAST_SPREAD, PITCH_PX
 from contour.synthetic import area_coverage, render, truth_px
 from contour.synthetic.rendering import tops
 from contour.synthetic.shop_floor.covers import cover_areas
+from tests.support.scenes.shop_floor_scenes import KINDS as SHOP_FLOOR
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 # By how much cells are larger or smaller than those that the network is asked about.
@@ -27,8 +28,10 @@ _OTHERS = (
     *("row_noise", "motion", "defocus", "glare", "shadow", "crushed", "fading", "dim", "mirror", "gamma", "coloured"),
 )
 KINDS = (*_STRUCTURED * 3, *_OTHERS)
-# So many are drawn by another hand.
-_BY_ANOTHER = 0.7
+# So many are drawn by another hand; and so many of the things that lie over an edge do so on a table with structure.
+_BY_ANOTHER, _ON_STRUCTURED = 0.5, 0.5
+_THINGS = ("tape", "clamp", "hand_or_cable")
+_OTHER_THINGS = ("tape", "clamp", "hand", "cable")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +77,11 @@ class _Drawn(NamedTuple):
 
 
 def _own(rng: np.random.Generator, seed: int) -> _Drawn:
-    scene = shop_floor_scene(str(rng.choice(KINDS)), seed).scene
+    kind = str(rng.choice(KINDS))
+    over = kind in _STRUCTURED and rng.random() < _ON_STRUCTURED
+    scene = shop_floor_scene(kind, seed, alone=over).scene
+    if over:
+        scene = SHOP_FLOOR[str(rng.choice(_THINGS))](rng, scene)
     rendered = render(scene)
     height, width = rendered.picture.shape[:2]
     comb = area_coverage(truth_px(scene).rings, width, height)
@@ -85,7 +92,9 @@ def _own(rng: np.random.Generator, seed: int) -> _Drawn:
 
 
 def _by_another(rng: np.random.Generator, seed: int) -> _Drawn:
-    one = other_scene(str(rng.choice(OTHER_KINDS)), seed)
+    kind = str(rng.choice(OTHER_KINDS))
+    on = str(rng.choice(_STRUCTURED)) if kind in _OTHER_THINGS and rng.random() < _ON_STRUCTURED else None
+    one = other_scene(kind, seed, on)
     wall, comb, thing = (np.asarray(part, np.float32) for part in (one.walls, one.comb, one.hidden))
     return _Drawn(one.picture, one.pitch_px, wall, comb, thing)
 

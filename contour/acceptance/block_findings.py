@@ -11,7 +11,7 @@ from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring, area, perimeter
 from contour.image.region import Region
-from contour.segmentation.comb_beyond import CombBeyond
+from contour.segmentation.second_opinion import Doubt, SecondOpinion
 from contour.tracing.trace import Trace
 from contour.walls.comb_likeness import unlike_comb
 from contour.walls.pieces import STRIP_PITCHES, Piece
@@ -229,8 +229,17 @@ def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
     return None
 
 
-def comb_left_out(beyond: CombBeyond, pitch_px: float) -> Finding:
-    """Comb that reaches beyond the contour by a second opinion, its cells of that pitch."""
+def judge_opinion(opinion: SecondOpinion, pitch_px: float) -> tuple[Finding, ...]:
+    """What a second opinion says against the contour of a block with cells of that pitch."""
+    findings = []
+    if opinion.beyond is not None:
+        findings.append(_left_out(opinion.beyond, pitch_px))
+    if opinion.over is not None:
+        findings.append(_lies_over(opinion.over, pitch_px))
+    return tuple(findings)
+
+
+def _left_out(beyond: Doubt, pitch_px: float) -> Finding:
     (x, y), far = beyond.place_px, beyond.pitches
     return _disagreement_at(
         (x, y),
@@ -238,6 +247,16 @@ def comb_left_out(beyond: CombBeyond, pitch_px: float) -> Finding:
         f"Comb seems to reach {far:.1f} cells beyond the contour near ({x:.0f}, {y:.0f}) px: its walls may be faint "
         "there, or something lies over the block or against it. Look at the overlay; check light and table, and clear "
         "the edge.",
+    )
+
+
+def _lies_over(over: Doubt, pitch_px: float) -> Finding:
+    (x, y), long = over.place_px, over.pitches
+    return Finding(
+        Refusal.EDGE_COVERED,
+        f"Something seems to lie over {long:.1f} cells of the block's edge near ({x:.0f}, {y:.0f}) px, or glare to hide "
+        "it. Look at the overlay; clear the edge, and check the light.",
+        (around(x, y, SHOWN_PITCHES * pitch_px),),
     )
 
 

@@ -9,13 +9,15 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, median, quantile
-from contour.image.opencv import box_mean, grown, shrunk_to, within
-from contour.segmentation.network import PITCH_PX, Segments, segments
+from contour.image.opencv import box_mean, grown, pieces_of, shrunk_to, within
+from contour.segmentation.network import LIGHT_PITCH_PX, PITCH_PX, Segments, comb_and_things, glare, segments
 from contour.walls.cell_scale import probe
 from contour.walls.lightness import wall_light
 
-# Pitches that are tried, large ones first, which cost least: cells may be half or twice as large as it has learnt.
-_GUESSES = (40.0, 20.0, 11.0)
+# Pitches that are tried: cells may be half or twice as large as it has learnt. The light network is asked first, of
+# large ones first, which cost least: a comb is a piece of so many cells, specks left out. One that takes so much of the
+# picture is not looked for at the smallest, which costs most.
+_GUESSES, _CELLS, _SPECK_PX, _MUCH = (40.0, 20.0, 11.0), 100, 9, 0.2
 # A comb that is seen so well is not looked for at another size; one that is seen worse than this is none.
 _GOOD, _LEAST = 0.3, 0.14
 # Between these shares of the pitch that the network has learnt walls are drawn well enough.
@@ -25,21 +27,23 @@ _TRIED_PX, _MOST_PX = 1e6, 4e6
 # What is surer than this is there. A thing at the edge of comb, of which so many pixels are looked at, need not be so
 # sure: of 60 that lay over an edge the least one was told by 0.11 in the mean of so many pixels, on 17 of 20 free edges
 # none by more than 0.07.
-_SURE, _LEAST_THING, _EDGE_PX, _MEAN_PX = 0.5, 0.1, 9, 7
+_SURE, _LEAST_THING, _EDGE_PX, _MEAN_PX = 0.5, 0.25, 9, 7
 # Pitches beside the comb, where of the table so much is darker than what counts as its light; and how light that is, of
 # walls over floors: of 50 tables as light as walls by 0.5 at least. What surely is no wall.
 _BESIDE, _LIGHTER, _LIGHT, _NO_WALL = (0.5, 2.5), 0.75, 0.4, 0.15
+# The area of a cell, of its pitch's square.
+_CELL = math.sqrt(0.75)
 # Levels of black and, above it, of walls.
 _DARK, _WALL = 12.0, 230.0
 
 
-def comb_picture(picture: Bytes) -> Bytes | None:
+def comb_picture(picture: Bytes, *, on_dark: bool = False) -> Bytes | None:
     """The comb in a picture, grey (H, W) or BGR (H, W, 3), uint8: walls light, all else dark, (H, W), uint8. None where
-    no comb is seen, on a dark table, and where something may lie over its edge.
+    no comb is seen, where something may lie over its edge and, unless `on_dark`, on a dark table.
     """
     light = wall_light(picture)
     score, pitch_px, found = 0.0, 0.0, None
-    for guess in _GUESSES:
+    for guess in _pitches(light):
         part = _middle(light, guess)
         seen = segments(part, guess)
         drawn = _drawn(seen)
@@ -56,10 +60,24 @@ def comb_picture(picture: Bytes) -> Bytes | None:
     if score < _LEAST or light.size * (PITCH_PX / pitch_px) ** 2 > _MOST_PX:
         return None
     found = segments(light, pitch_px) if found is None else found
-    if _something_beside(found) or not _on_light_table(found):
+    if _something_over(found, picture) or not (on_dark or _on_light_table(found)):
         return None
     drawn = _drawn(found)
     return (grown if drawn.size < light.size else shrunk_to)(drawn, light.shape)
+
+
+def _pitches(light: Bytes) -> list[float]:
+    """At which pitches the light network sees comb, that first of which it sees most."""
+    speck, areas = np.ones((_SPECK_PX, _SPECK_PX), np.uint8), dict[float, float]()
+    for guess in _GUESSES:
+        if guess == _GUESSES[-1] and max(areas.values(), default=0.0) > _MUCH:
+            break
+        comb = (comb_and_things(light, guess)[0] > _SURE).astype(np.uint8)
+        area = np.bincount(pieces_of(cv2.morphologyEx(comb, cv2.MORPH_OPEN, speck).astype(np.uint8), 8)[1].ravel())[1:]
+        most = int(area.max(initial=0))
+        if most > _CELLS * _CELL * LIGHT_PITCH_PX**2:
+            areas[guess] = most / comb.size
+    return sorted(areas, key=lambda guess: -areas[guess])
 
 
 def _middle(light: Bytes, pitch_px: float) -> Bytes:
@@ -87,11 +105,12 @@ def _on_light_table(seen: Segments) -> bool:
     return (lighter if wall > floor else -lighter) > _LIGHT * abs(wall - floor)
 
 
-def _something_beside(seen: Segments) -> bool:
-    """Whether something may lie over the edge of the comb, or in a hole of it."""
-    comb = (seen.comb > _SURE).astype(np.uint8)
-    edge = cv2.morphologyEx(comb, cv2.MORPH_GRADIENT, np.ones((_EDGE_PX, _EDGE_PX), np.uint8)) > 0
-    return bool((edge & (box_mean(seen.thing, _MEAN_PX) > _LEAST_THING)).any())
+def _something_over(seen: Segments, picture: Bytes) -> bool:
+    """Whether a thing, or glare, may lie over the edge of the comb, or in a hole of it."""
+    comb = seen.comb > _SURE
+    edge = cv2.morphologyEx(comb.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((_EDGE_PX, _EDGE_PX), np.uint8)) > 0
+    lies = (box_mean(seen.thing, _MEAN_PX) > _LEAST_THING) | glare(picture, comb, PITCH_PX)
+    return bool((edge & lies).any())
 
 
 def _drawn(seen: Segments) -> Bytes:

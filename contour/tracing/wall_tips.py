@@ -81,13 +81,15 @@ def wall_tips(
     *,
     rectifier: Rectifier | None = None,
     relief: Relief | None = None,
+    taken: Bytes | None = None,
     on_stage: OnStage = lambda _name: None,
 ) -> Trace:
     """The outline of the largest block in `picture`, grey (H, W) or BGR (H, W, 3), uint8, exterior and holes, in
     pixels.
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `relief`: of a
-    picture that is the difference from a known table. `on_stage` hears "mask" and "trace". Raises PictureError,
+    picture that is the difference from a known table. `taken`: the picture as it was taken, where `picture` is drawn
+    from it. `on_stage` hears "mask" and "trace". Raises PictureError,
     ParameterError, NoBlockFound, EdgeContradicted.
     """
     if settings.binarize != "flat":
@@ -104,14 +106,14 @@ def wall_tips(
     if settings.least_rise is not None:
         walls = strong_walls(walls, settings.least_rise)
     foam = None if walls.cells.comb.cellular else solid.foam()
-    return foam or _of_comb(solid, walls, settings.edge, rectifier)
+    return foam or _of_comb(solid, walls, settings.edge, rectifier, taken)
 
 
-def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None) -> Trace:
+def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None, taken: Bytes | None) -> Trace:
     """The outline of a block of cells, or of a sheet with holes, whose border is `auto`, or promised to be `cut`."""
     light, on_stage = solid.light, solid.on_stage
     lit = solid.picture if walls.relief is None else walls.relief.lit
-    seen, look = looked_at(lit, walls, on_stage)
+    seen, look = looked_at(lit if taken is None else taken, walls, on_stage)
     plate = _plate(solid, seen) if promise == "auto" else None
     if isinstance(plate, Trace):
         return plate

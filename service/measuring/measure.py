@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.acceptance.acceptance import View, judge, judge_without_block
-from contour.acceptance.block_findings import comb_left_out
+from contour.acceptance.block_findings import judge_opinion
 from contour.acceptance.error_budget import ErrorBudget, error_budget
 from contour.acceptance.findings import Finding, Limits, Refusal, closed
 from contour.acceptance.picture_findings import judge_table
@@ -26,6 +26,7 @@ from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, NoC
 from contour.geometry.agreement import rectified_edges
 from contour.geometry.arrays import Float64s
 from contour.geometry.rectifier import CroppedRectifier, Rectifier
+from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, densified
 from contour.image.line_noise import without_line_noise
 from contour.image.picture_check import check_picture
@@ -34,8 +35,8 @@ from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.material.even_table import even_table
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.relief.relief import Displacement, Relief
-from contour.segmentation.comb_beyond import comb_beyond
 from contour.segmentation.comb_picture import comb_picture
+from contour.segmentation.second_opinion import second_opinion
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.tracing import trace
@@ -199,7 +200,7 @@ class Measurer:
             if not look.may_show_more(reasons, nowhere=isinstance(refused, NoCellsFound)):
                 continue
             with contextlib.suppress(NoBlockFound, EdgeContradicted):
-                again = outlined(look)
+                again = outlined(look._replace(on_dark=not reasons & _LIES_THERE))
                 if not again.findings:
                     return again
         watch.lap("table")
@@ -248,13 +249,14 @@ class Measurer:
         watch: _Stopwatch,
     ) -> Measurement:
         """The measurement of what is looked at in the whole picture."""
-        picture = _drawn(look.picture, watch) if look.network else look.picture
+        picture = _drawn(look.picture, watch, on_dark=look.on_dark) if look.network else look.picture
         height, width = picture.shape[:2]
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
         settings = replace(trace_settings(recipe), least_rise=look.least_rise)
-        checked = _checked_trace(picture, settings, region, rectifier, watch, look.relief)
+        taken = look.picture if look.network else None
+        checked = _checked_trace(picture, settings, region, rectifier, watch, look.relief, taken)
         if look.network:
             checked = replace(checked, trace=checked.trace.less_sure(_NETWORK_PITCHES))
         traced = checked.trace
@@ -274,7 +276,7 @@ class Measurer:
         limits = self._limits(recipe)
         view = View((width, height), region, picture)
         findings = judge(polygon, view, limits, traced=checked, budget=budget, to_mm=to_mm)
-        if not findings and recipe.network and limits.max_disagreement_pitches is not None and not look.network:
+        if not findings and recipe.network and limits.max_disagreement_pitches is not None:
             watch.lap("judge")
             findings = _second_opinion(whole, traced, region, rectifier, watch)
         evidence = sent_evidence(traced, polygon, budget, to_mm)
@@ -388,13 +390,14 @@ class Measurer:
 
 class _Look(NamedTuple):
     """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
-    settings of a trace; `network`: whether to look at what a network tells of it.
+    settings of a trace; `network`: whether to look at what a network tells of it, `on_dark` on a dark table, too.
     """
 
     picture: NDArray[np.uint8]
     relief: Relief | None = None
     least_rise: float | None = None
     network: bool = False
+    on_dark: bool = False
 
     def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
         """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""
@@ -417,9 +420,9 @@ def _over(
     return None
 
 
-def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch) -> NDArray[np.uint8]:
+def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch, *, on_dark: bool) -> NDArray[np.uint8]:
     """What a network tells of the picture; raise NoBlockFound where it is not asked, or in doubt."""
-    drawn = comb_picture(picture)
+    drawn = comb_picture(picture, on_dark=on_dark)
     watch.lap("network")
     if drawn is None:
         raise NoBlockFound("no block found: no comb on a table as light as its walls, with nothing over its edge")
@@ -433,14 +436,19 @@ def _second_opinion(
     rectifier: Rectifier | None,
     watch: _Stopwatch,
 ) -> tuple[Finding, ...]:
-    """What a network says against the outline: comb beyond it. Closed cells are none that it knows."""
+    """What a network says against the outline: comb beyond it, things over it. Closed cells are none that it knows."""
     if traced.edge != "cut" or traced.pitch_px is None or traced.look is None:
         return ()
     outline = traced.contour if rectifier is None else rectified_edges(traced.contour, rectifier)
     part, first = (picture, np.zeros(2)) if region is None else region.cut(picture)
-    beyond = comb_beyond(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at)
+    told = [
+        RingLengths.of(traced.contour.rings[one.ring]).path(one.from_px, one.to_px) - first
+        for one in traced.evidence or ()
+        if one.state != "seen" or one.by is not None
+    ]
+    opinion = second_opinion(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at, told)
     watch.lap("network")
-    return () if beyond is None else (comb_left_out(beyond.moved(*first.tolist()), traced.pitch_px),)
+    return judge_opinion(opinion.moved(*first.tolist()), traced.pitch_px)
 
 
 def _checked_trace(
@@ -450,17 +458,19 @@ def _checked_trace(
     rectifier: Rectifier | None,
     watch: _Stopwatch,
     relief: Relief | None = None,
+    taken: NDArray[np.uint8] | None = None,
 ) -> CheckedTrace:
     """The block traced in the region alone, and checked there, in pixels of the whole picture."""
     if region is None:
-        traced = trace(picture, settings, rectifier=rectifier, relief=relief, on_stage=watch.lap)
+        traced = trace(picture, settings, rectifier=rectifier, relief=relief, taken=taken, on_stage=watch.lap)
         checked = check_trace(picture, traced, rectifier, relief)
         watch.lap("quality")
         return checked
     part, first = region.cut(picture)
     within = None if rectifier is None else CroppedRectifier(rectifier, first)
     there = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
-    return _checked_trace(part, settings, None, within, watch, there).moved(first)
+    taken = None if taken is None else region.cut(taken)[0]
+    return _checked_trace(part, settings, None, within, watch, there, taken).moved(first)
 
 
 def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:

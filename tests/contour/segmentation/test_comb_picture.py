@@ -44,6 +44,20 @@ def test_on_an_empty_table_nothing_is_drawn(kind: str) -> None:
     assert comb_picture(render_empty_table(scene, 1)[0]) is None
 
 
+def test_where_the_light_network_sees_no_comb_the_other_one_is_not_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drawing, "segments", lambda *_: pytest.fail("asked"))
+    scene = shop_floor_scene("wood", 95_000_003, alone=True).scene
+    assert comb_picture(render_empty_table(scene, 1)[0]) is None
+    noise = np.random.default_rng(1).integers(60, 80, (900, 1200), dtype=np.uint8)
+    assert comb_picture(noise) is None
+
+
+def test_on_a_dark_table_comb_is_drawn_where_that_is_asked() -> None:
+    rendered = render(shop_floor_scene("undisturbed", 95_000_003, alone=True).scene)
+    assert comb_picture(rendered.picture) is None
+    assert comb_picture(rendered.picture, on_dark=True) is not None
+
+
 def test_a_thing_within_the_comb_may_be_a_hole_and_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     rendered = scene_of((19.0, 23.0))
     assert comb_picture(rendered.picture) is not None
@@ -59,3 +73,11 @@ def test_a_thing_within_the_comb_may_be_a_hole_and_is_not_drawn(monkeypatch: pyt
 
     monkeypatch.setattr(drawing, "segments", with_thing)
     assert comb_picture(rendered.picture) is None
+
+
+def test_beside_glare_nothing_is_drawn() -> None:
+    rendered = scene_of((19.0, 23.0))
+    corner = rendered.truth_px.exterior[0]
+    lit = cv2.circle(rendered.picture.copy(), np.rint(corner).astype(int).tolist(), 60, (255, 255, 255), -1)
+    assert comb_picture(rendered.picture) is not None
+    assert comb_picture(lit) is None

@@ -318,7 +318,7 @@ def test_what_lies_over_an_edge_is_not_looked_past_nor_what_few_walls_tell(
 
 
 def test_of_two_blocks_no_network_draws_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(measure, "comb_picture", lambda _: pytest.fail("asked"))
+    monkeypatch.setattr(measure, "comb_picture", lambda *_, **__: pytest.fail("asked"))
     seen = measured(render(shop_floor_scene("pushed_together", 4_150_000, alone=True).scene))
     assert Reason.SEVERAL_BLOCKS in seen.reasons
 
@@ -327,10 +327,28 @@ def test_of_two_blocks_no_network_draws_one(monkeypatch: pytest.MonkeyPatch) -> 
 def test_comb_that_a_cable_parts_off_is_seen_by_a_second_opinion(seed: int) -> None:
     rendered = render(shop_floor_scene("hand_or_cable", seed).scene)
     seen = measured(rendered)
-    assert seen.reasons == (Reason.METHODS_DISAGREE,)
+    assert seen.reasons[0] == Reason.METHODS_DISAGREE
     assert seen.findings[0][1].startswith("Comb seems to reach")
     assert seen.shown_px
     assert measured(rendered, recipe=Recipe(number=1, name="default", network=False)).findings == ()
+
+
+def test_a_cable_no_wider_than_a_cell_over_the_edge_is_seen_by_a_second_opinion() -> None:
+    rendered = render(shop_floor_scene("hand_or_cable", 8_200_000, alone=True).scene)
+    seen = measured(rendered)
+    assert seen.reasons == (Reason.EDGE_COVERED,)
+    assert seen.findings[0][1].startswith("Something seems to lie over")
+    assert measured(rendered, recipe=Recipe(number=1, name="default", network=False)).findings == ()
+
+
+def test_what_lies_over_an_edge_shows_in_the_picture_beside_what_a_network_draws(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A tape, black beside glare: no thing to the network, which draws what it leaves of the comb."""
+    rendered = render(shop_floor_scene("glare", 8_300_007).scene)
+    assert measured(rendered).findings
+    monkeypatch.setattr(measure, "trace", lambda *shown, **known: tracing.trace(*shown, **{**known, "taken": None}))
+    assert measured(rendered).findings == ()
 
 
 def test_where_faint_walls_were_left_out_another_look_is_taken() -> None:

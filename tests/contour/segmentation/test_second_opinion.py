@@ -1,0 +1,91 @@
+"""Comb that an outline leaves out is seen beyond it, and nothing beyond a right one."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from contour.geometry.rings import Contour
+from contour.segmentation.second_opinion import second_opinion
+from contour.synthetic import Rendered, render
+from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+
+
+def nowhere(points: np.ndarray) -> np.ndarray:
+    return np.zeros(len(points), np.bool_)
+
+
+def everywhere(points: np.ndarray) -> np.ndarray:
+    return np.ones(len(points), np.bool_)
+
+
+@cache
+def scene_of(kind: str, seed: int) -> Rendered:
+    return render(shop_floor_scene(kind, seed, alone=True).scene)
+
+
+@pytest.mark.parametrize("kind", ["undisturbed", "compound", "mirror", "light_table", "dim", "motion"])
+def test_nothing_speaks_against_the_true_outline(kind: str) -> None:
+    rendered = scene_of(kind, 95_100_001)
+    assert second_opinion(rendered.picture, rendered.truth_px, rendered.pitch_px, nowhere) == (None, None)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("tape", 95_100_005), ("hand_or_cable", 95_100_006)])
+def test_a_thing_over_the_edge_is_seen_with_its_place_unless_it_is_known(kind: str, seed: int) -> None:
+    rendered = scene_of(kind, seed)
+    ring, pitch = rendered.truth_px.exterior, rendered.pitch_px
+    over = second_opinion(rendered.picture, rendered.truth_px, pitch, nowhere).over
+    assert over is not None
+    hidden = ring[rendered.visible[0] < 0.5]
+    assert np.hypot(*(hidden - over.place_px).T).min() < pitch
+    assert over.pitches > 1.0
+    assert second_opinion(rendered.picture, rendered.truth_px, pitch, nowhere, [ring]).over is None
+
+
+def test_glare_beside_the_edge_hides_it_and_a_table_at_full_scale_does_not() -> None:
+    rendered = scene_of("undisturbed", 95_100_001)
+    ring, pitch = rendered.truth_px.exterior, rendered.pitch_px
+    lit = rendered.picture.copy()
+    cv2.circle(lit, np.rint(ring[ring[:, 0].argmax()]).astype(int).tolist(), round(3.0 * pitch), (255, 255, 255), -1)
+    over = second_opinion(lit, rendered.truth_px, pitch, nowhere).over
+    assert over is not None
+    assert over.pitches > 3.0
+    block = cv2.fillPoly(np.zeros(lit.shape[:2], np.uint8), [np.rint(ring).astype(np.int32)], 1)
+    white = lit.copy()
+    white[block == 0] = 255
+    assert second_opinion(white, rendered.truth_px, pitch, nowhere).over is None
+
+
+@pytest.mark.parametrize("kind", ["undisturbed", "light_table"])
+def test_what_an_outline_leaves_out_is_seen_with_its_place(kind: str) -> None:
+    rendered = scene_of(kind, 95_100_001)
+    ring = rendered.truth_px.exterior
+    edge = ring[:, 0].max() - 2.0 * rendered.pitch_px
+    cut = np.column_stack((np.minimum(ring[:, 0], edge), ring[:, 1]))
+    found = second_opinion(rendered.picture, Contour(cut, rendered.truth_px.holes), rendered.pitch_px, nowhere).beyond
+    assert found is not None
+    assert found.pitches == pytest.approx(2.0, abs=0.5)
+    assert found.place_px[0] > edge
+
+
+def test_a_hole_that_was_drawn_too_large_leaves_comb_out() -> None:
+    rendered = scene_of("undisturbed", 95_100_001)
+    turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    middle = rendered.truth_px.exterior.mean(axis=0)
+    hole = middle + 3.0 * rendered.pitch_px * np.column_stack((np.cos(turn), np.sin(turn)))
+    found = second_opinion(
+        rendered.picture, Contour(rendered.truth_px.exterior, (hole,)), rendered.pitch_px, nowhere
+    ).beyond
+    assert found is not None
+    assert np.hypot(*(np.array(found.place_px) - middle)) < 2.0 * rendered.pitch_px
+
+
+def test_pieces_that_are_known_to_be_none_of_the_blocks_do_not_count() -> None:
+    rendered = scene_of("undisturbed", 95_100_001)
+    ring = rendered.truth_px.exterior
+    cut = Contour(np.column_stack((np.minimum(ring[:, 0], ring[:, 0].max() - 2.0 * rendered.pitch_px), ring[:, 1])))
+    assert second_opinion(rendered.picture, cut, rendered.pitch_px, nowhere).beyond is not None
+    assert second_opinion(rendered.picture, cut, rendered.pitch_px, everywhere).beyond is None

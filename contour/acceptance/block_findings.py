@@ -254,8 +254,8 @@ def _lies_over(over: Doubt, pitch_px: float) -> Finding:
     (x, y), long = over.place_px, over.pitches
     return Finding(
         Refusal.EDGE_COVERED,
-        f"Something seems to lie over {long:.1f} cells of the block's edge near ({x:.0f}, {y:.0f}) px, or glare to hide "
-        "it. Look at the overlay; clear the edge, and check the light.",
+        f"Something seems to lie over {long:.1f} cells of the block's edge near ({x:.0f}, {y:.0f}) px, or glare to "
+        "hide it. Look at the overlay; clear the edge, and check the light.",
         (around(x, y, SHOWN_PITCHES * pitch_px),),
     )
 

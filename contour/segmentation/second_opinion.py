@@ -21,8 +21,8 @@ _SURE = 0.5
 # network's own uncertainty.
 _AROUND, _RIM, _FAR, _BESIDE, _LEAST_PX = 3.0, 0.38, 0.55, 0.75, 3
 # A thing lies over the edge where it lies on the block so near to it, along so much of it, and farther than that from
-# where it is known what does: of 360 right outlines of all kinds on one it lies along more. Glare
-# lies beside, twice as far.
+# where it is known what does: of 360 right outlines of all kinds on one it lies along more. Glare lies beside, up to
+# twice as far.
 _DEEP, _LONG, _KNOWN = 0.375, 0.8, 1.0
 
 

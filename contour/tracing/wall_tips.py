@@ -89,8 +89,7 @@ def wall_tips(
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `relief`: of a
     picture that is the difference from a known table. `taken`: the picture as it was taken, where `picture` is drawn
-    from it. `on_stage` hears "mask" and "trace". Raises PictureError,
-    ParameterError, NoBlockFound, EdgeContradicted.
+    from it. `on_stage` hears "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound, EdgeContradicted.
     """
     if settings.binarize != "flat":
         raise ParameterError(

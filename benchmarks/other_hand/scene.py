@@ -42,9 +42,11 @@ class Scene:
 
 
 def scene(kind: str, seed: int, on: str | None = None) -> Scene:
-    """A scene of one of `KINDS`, on the table of another one (`on`) if one is named, the same for the same seed;
+    """A scene of one of `KINDS`, on the table of another one if it is named (`on`), the same for the same seed;
     ValueError for a kind that is none.
     """
+    if on is not None and on not in KINDS:
+        raise ValueError(f"{on!r} is no kind: expected one of {', '.join(KINDS)}")
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     where = layout(rng, kind)
     of = core(rng, where.pitch)

@@ -34,6 +34,11 @@ class Stretch:
     """Bridged along a line; False: along an arc or a curve."""
 
     @property
+    def hidden_or_filled(self) -> bool:
+        """Whether it is known what lies there, or that something does."""
+        return self.state != "seen" or self.by is not None
+
+    @property
     def length_px(self) -> float:
         """How long it is, pixels."""
         return self.to_px - self.from_px
@@ -48,6 +53,6 @@ def bound_with_bridges(bound_px: float | None, stretches: Iterable[Stretch]) -> 
 
 def hidden_or_filled(evidence: Sequence[Stretch], ring: int, at: Float64s, beside_px: float) -> Bools:
     """Which lengths along a ring, (N,), lie where its edge is hidden or filled, or so near to that, shape (N,)."""
-    told = [one for one in evidence if one.ring == ring and (one.state != "seen" or one.by is not None)]
+    told = [one for one in evidence if one.ring == ring and one.hidden_or_filled]
     within = [(at > one.from_px - beside_px) & (at < one.to_px + beside_px) for one in told]
     return np.asarray(np.any(within, axis=0) if within else np.zeros(at.shape, np.bool_))

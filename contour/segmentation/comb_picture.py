@@ -9,15 +9,17 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bytes, median, quantile
-from contour.image.opencv import box_mean, grown, pieces_of, shrunk_to, within
-from contour.segmentation.network import LIGHT_PITCH_PX, PITCH_PX, Segments, comb_and_things, glare, segments
+from contour.image.opencv import box_mean, grown, pieces_and_areas, shrunk_to, within
+from contour.segmentation.glare import glare
+from contour.segmentation.network import LIGHT_PITCH_PX, PITCH_PX, Segments, comb_and_things, segments
 from contour.walls.cell_scale import probe
 from contour.walls.lightness import wall_light
 
 # Pitches that are tried: cells may be half or twice as large as it has learnt. The light network is asked first, of
 # large ones first, which cost least: a comb is a piece of so many cells, specks left out. One that takes so much of the
-# picture is not looked for at the smallest, which costs most.
-_GUESSES, _CELLS, _SPECK_PX, _MUCH = (40.0, 20.0, 11.0), 100, 9, 0.2
+# picture is not looked for at the smallest, which costs most; nor at one at which it could not be drawn though cells
+# were so many times as large.
+_GUESSES, _CELLS, _SPECK_PX, _MUCH, _TWICE = (40.0, 20.0, 11.0), 100, 9, 0.2, 2.0
 # A comb that is seen so well is not looked for at another size; one that is seen worse than this is none.
 _GOOD, _LEAST = 0.3, 0.14
 # Between these shares of the pitch that the network has learnt walls are drawn well enough.
@@ -71,12 +73,14 @@ def _pitches(light: Bytes) -> list[float]:
     for guess in _GUESSES:
         if guess == _GUESSES[-1] and max(areas.values(), default=0.0) > _MUCH:
             break
+        if light.size * (PITCH_PX / (_TWICE * guess)) ** 2 > _MOST_PX:
+            continue
         comb = (comb_and_things(light, guess)[0] > _SURE).astype(np.uint8)
-        area = np.bincount(pieces_of(cv2.morphologyEx(comb, cv2.MORPH_OPEN, speck).astype(np.uint8), 8)[1].ravel())[1:]
-        most = int(area.max(initial=0))
+        _, area = pieces_and_areas(np.asarray(cv2.morphologyEx(comb, cv2.MORPH_OPEN, speck), np.uint8), 8)
+        most = int(area.max())
         if most > _CELLS * _CELL * LIGHT_PITCH_PX**2:
             areas[guess] = most / comb.size
-    return sorted(areas, key=lambda guess: -areas[guess])
+    return sorted(areas, key=areas.__getitem__, reverse=True)
 
 
 def _middle(light: Bytes, pitch_px: float) -> Bytes:

@@ -9,9 +9,8 @@ from functools import cache
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes, Float32s, median
-from contour.image import channels
-from contour.image.opencv import box_mean, grown, shrunk_to, within
+from contour.geometry.arrays import Bytes, Float32s
+from contour.image.opencv import grown, shrunk_to
 
 PITCH_PX = 16.0
 """The pitch at which the network has learnt what cells look like; cells half or twice as large are told as well."""
@@ -24,9 +23,6 @@ _HALVED = 8
 _TILE_PX, _AROUND_PX = 504, 48
 # Grey levels: what spreads less is noise.
 LEAST_SPREAD = 4.0
-# In glare nothing shows: the mean light within that of a place, noise included. What lies beside a comb is looked at so
-# far, pitches.
-_GLARE, _GLARE_PITCHES, _BESIDE_PITCHES = 242.0, 0.19, 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,19 +50,10 @@ def comb_and_things(light: Bytes, pitch_px: float) -> Float32s:
     return _tell("comb_beyond.onnx", 2, light, LIGHT_PITCH_PX / pitch_px)[1]
 
 
-def glare(picture: Bytes, comb: Bools, pitch_px: float) -> Bools:
-    """Where a picture, grey (H, W) or BGR (H, W, 3), uint8, is at full scale all around, at the size of a map of comb
-    that lies in it, (h, w), with cells of that pitch there; nowhere if most of what lies beside the comb is.
-    """
-    light = channels.mean(np.asarray(cv2.resize(picture, comb.shape[::-1], interpolation=cv2.INTER_AREA), np.uint8))
-    around = box_mean(light.astype(np.float32), 2 * round(_GLARE_PITCHES * pitch_px) + 1)
-    beside = around[~comb & (within(comb, _BESIDE_PITCHES * pitch_px) > 0)]
-    if not len(beside) or median(beside) > _GLARE:
-        return np.zeros(comb.shape, np.bool_)
-    return np.asarray(around > _GLARE)
-
-
 def _tell(name: str, channels: int, light: Bytes, size: float) -> tuple[Bytes, Float32s]:
+    """The picture, (H, W), at so many times its size, its sides multiples of 8, (h, w), and what the network in that
+    file tells of each pixel of it, (channels, h, w), float32.
+    """
     shape = tuple(_HALVED * max(_HALVED, round(side * size / _HALVED)) for side in light.shape)
     sized = (shrunk_to if size < 1.0 else grown)(light, shape)
     even = sized.astype(np.float32)

@@ -10,9 +10,10 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s
 from contour.geometry.rings import Contour
-from contour.image.opencv import pieces_of, within
+from contour.image.opencv import pieces_and_areas, pieces_of, within
 from contour.image.pixel_grid import fill_finely
-from contour.segmentation.network import LIGHT_PITCH_PX, comb_and_things, glare
+from contour.segmentation.glare import glare
+from contour.segmentation.network import LIGHT_PITCH_PX, comb_and_things
 from contour.walls.lightness import wall_light
 
 _SURE = 0.5
@@ -66,42 +67,56 @@ def second_opinion(
     left, top = np.maximum(contour.exterior.min(axis=0) - around, 0.0).astype(int).tolist()
     right, bottom = np.ceil(contour.exterior.max(axis=0) + around).astype(int).tolist()
     part = np.ascontiguousarray(picture[top:bottom, left:right])
-    light = wall_light(part)
-    comb, thing = comb_and_things(light, pitch_px)
-    size = np.array(comb.shape[::-1]) / light.shape[::-1]
+    comb, thing = comb_and_things(wall_light(part), pitch_px)
+    grid = _Grid(np.array([left, top]), np.array(comb.shape[::-1]) / part.shape[1::-1])
     block = np.zeros(comb.shape, np.uint8)
-    fill_finely(block, [(ring - (left, top) + 0.5) * size - 0.5 for ring in contour.rings], 1)
+    fill_finely(block, [grid.there(ring) for ring in contour.rings], 1)
+    over = _over(block, thing, glare(part, block > 0, LIGHT_PITCH_PX), [grid.there(path) for path in told], grid)
+    return SecondOpinion(_beyond(block, comb, thing, loose, grid), over)
+
+
+class _Grid(NamedTuple):
+    """The network's map of a part of a picture: the part's first pixel, (2,), and samples of the map a pixel, (2,)."""
+
+    first: Float64s
+    size: Float64s
+
+    def there(self, points: Float64s) -> Float64s:
+        """Places in the map of places in the picture, (N, 2)."""
+        return (points - self.first + 0.5) * self.size - 0.5
+
+    def back(self, samples: Float64s) -> Float64s:
+        """Places in the picture of places in the map, (N, 2)."""
+        return (samples + 0.5) / self.size - 0.5 + self.first
+
+
+def _beyond(
+    block: Bytes, comb: Float32s, thing: Float32s, loose: Callable[[Float64s], Bools], grid: _Grid
+) -> Doubt | None:
+    """How far comb reaches beyond the block, and where it reaches farthest in the first piece that reaches too far."""
     beyond = ((comb > _SURE) & (block == 0)).astype(np.uint8)
     beyond = np.asarray(cv2.morphologyEx(beyond, cv2.MORPH_OPEN, np.ones((_LEAST_PX, _LEAST_PX), np.uint8)), np.uint8)
     away = np.asarray(cv2.distanceTransform(1 - block, cv2.DIST_L2, 5), np.float32)
     count, pieces = pieces_of(beyond, 8)
     rows, columns = np.nonzero(beyond)
-    places = (np.column_stack((columns, rows)) + 0.5) / size - 0.5 + (left, top)
+    places = grid.back(np.column_stack((columns, rows)).astype(np.float64))
     piece, far = pieces[rows, columns], away[rows, columns] / np.float32(LIGHT_PITCH_PX)
     reach = np.zeros(count, np.float32)
     np.maximum.at(reach, piece, far)
     area, own = np.bincount(piece, minlength=count), np.bincount(piece, ~loose(places), count)
     touches = np.bincount(piece, far < _RIM, count) > 0
     rim = (block == 0) & (within(block, _RIM * LIGHT_PITCH_PX) > 0)
-    over = _over(
-        block,
-        (thing, glare(part, block > 0, LIGHT_PITCH_PX)),
-        [(path - (left, top) + 0.5) * size - 0.5 for path in told],
-    )
-    if over is not None:
-        x, y = ((np.array(over.place_px) + 0.5) / size - 0.5 + (left, top)).tolist()
-        over = over._replace(place_px=(x, y))
     for number in np.flatnonzero(touches & (reach > _FAR)).tolist():
         between = rim & (within(pieces == number, _BESIDE * LIGHT_PITCH_PX) > 0)
         if own[number] > _SURE * area[number] or np.mean(thing[between]) > _SURE:
             x, y = places[np.where(piece == number, far, np.float32(0.0)).argmax()].tolist()
-            return SecondOpinion(Doubt(float(reach[number]), (x, y)), over)
-    return SecondOpinion(None, over)
+            return Doubt(float(reach[number]), (x, y))
+    return None
 
 
-def _over(block: Bytes, hides: tuple[Float32s, Bools], told: Sequence[Float64s]) -> Doubt | None:
-    """The longest part of the block's edge over which a thing lies, or glare beside it, in the network's pixels."""
-    (thing, blinds), deep = hides, _DEEP * LIGHT_PITCH_PX
+def _over(block: Bytes, thing: Float32s, blinds: Bools, told: Sequence[Float64s], grid: _Grid) -> Doubt | None:
+    """The longest part of the edge over which a thing lies, or glare beside it; `told` in places of the map."""
+    deep = _DEEP * LIGHT_PITCH_PX
     lies = (block > 0) & (within(1 - block, deep) > 0) & (thing > _SURE)
     lies |= (block == 0) & (within(block, 2.0 * deep) > 0) & blinds
     if told and lies.any():
@@ -109,11 +124,10 @@ def _over(block: Bytes, hides: tuple[Float32s, Bools], told: Sequence[Float64s])
         paths = [np.rint(path).astype(np.int32) for path in told]
         cv2.polylines(known, paths, False, 1, 2 * round(_KNOWN * LIGHT_PITCH_PX) + 1)
         lies &= known == 0
-    _, pieces = pieces_of(lies, 8)
-    area = np.bincount(pieces.ravel())
-    area[0] = 0
+    pieces, area = pieces_and_areas(lies.astype(np.uint8), 8)
     long = float(area.max()) / (deep * LIGHT_PITCH_PX)
     if long < _LONG:
         return None
     rows, columns = np.nonzero(pieces == area.argmax())
-    return Doubt(long, (float(columns.mean()), float(rows.mean())))
+    x, y = grid.back(np.array([columns.mean(), rows.mean()])).tolist()
+    return Doubt(long, (x, y))

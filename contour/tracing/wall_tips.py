@@ -131,7 +131,7 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
         return _cut_off(light, seen, on_stage)
     try:
         found = _cut_or_mirrored(lit, light, walls, (seen, look), rectifier, on_stage)
-        if kind == "mixed" and all(part.state == "seen" and part.by is None for part in found.evidence or ()):
+        if kind == "mixed" and not any(part.hidden_or_filled for part in found.evidence or ()):
             # What seemed to hide it does not.
             check_promise(promise, kind, traced=closed is not None)
             found = closed or found

@@ -425,7 +425,7 @@ def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch, *, on_dark: bool) -> N
     drawn = comb_picture(picture, on_dark=on_dark)
     watch.lap("network")
     if drawn is None:
-        raise NoBlockFound("no block found: no comb on a table as light as its walls, with nothing over its edge")
+        raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")
     return drawn
 
 
@@ -444,7 +444,7 @@ def _second_opinion(
     told = [
         RingLengths.of(traced.contour.rings[one.ring]).path(one.from_px, one.to_px) - first
         for one in traced.evidence or ()
-        if one.state != "seen" or one.by is not None
+        if one.hidden_or_filled
     ]
     opinion = second_opinion(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at, told)
     watch.lap("network")

@@ -52,6 +52,21 @@ def test_where_the_light_network_sees_no_comb_the_other_one_is_not_asked(monkeyp
     assert comb_picture(noise) is None
 
 
+@pytest.mark.parametrize(("shape", "asked"), [((1200, 1600), 3), ((3000, 4000), 2), ((6000, 8000), 1)])
+def test_of_a_large_picture_no_more_is_asked_than_could_be_drawn(
+    shape: tuple[int, int], asked: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    guesses: list[float] = []
+
+    def nothing(_: np.ndarray, guess: float) -> np.ndarray:
+        guesses.append(guess)
+        return np.zeros((2, 8, 8), np.float32)
+
+    monkeypatch.setattr(drawing, "comb_and_things", nothing)
+    assert comb_picture(np.zeros(shape, np.uint8)) is None
+    assert guesses == [40.0, 20.0, 11.0][:asked]
+
+
 def test_on_a_dark_table_comb_is_drawn_where_that_is_asked() -> None:
     rendered = render(shop_floor_scene("undisturbed", 95_000_003, alone=True).scene)
     assert comb_picture(rendered.picture) is None

@@ -1,4 +1,4 @@
-"""Comb that an outline leaves out is seen beyond it, and nothing beyond a right one."""
+"""Comb that an outline leaves out is seen, so are things and glare along it, and nothing against a right one."""
 
 from __future__ import annotations
 

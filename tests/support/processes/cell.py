@@ -32,6 +32,7 @@ class Cell:
         more: str = "",
         recipe: int = 0,
         scenario: str = "",
+        timeout_s: float = 0.5,
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
         self._trigger_every += ("--recipe", str(recipe))
@@ -46,7 +47,7 @@ class Cell:
         (folder / "config.yaml").write_text(
             f"camera: {camera}\n"
             f"calibration: {{file: {calibration or SAMPLES / 'calibration.yaml'}}}\n"
-            f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: 0.5, ack_timeout_s: 1{link}}}\n"
+            f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: {timeout_s}, ack_timeout_s: 1{link}}}\n"
             f"triggers: {triggers}\n"
             f"service: {service}\n"
             f"journal: {journal}\n"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -50,14 +51,19 @@ class Layout:
         return tuple(ring for block in self.blocks for ring in block)
 
     @cached_property
+    def pieces(self) -> tuple[Bytes, ...]:
+        """255 where each block, and then each offcut, lies, (H, W) each."""
+        return tuple(within(self.shape, piece) for piece in (*self.blocks, *([offcut] for offcut in self.offcuts)))
+
+    @cached_property
     def block(self) -> Bytes:
         """255 where a block lies, (H, W)."""
-        return _united([within(self.shape, block) for block in self.blocks])
+        return _united(self.pieces[: len(self.blocks)])
 
     @cached_property
     def comb(self) -> Bytes:
         """255 where a block or an offcut lies, (H, W)."""
-        return _united([self.block, *(within(self.shape, [offcut]) for offcut in self.offcuts)])
+        return _united(self.pieces)
 
     @cached_property
     def middle(self) -> Float64s:
@@ -81,7 +87,7 @@ class Layout:
         return Place(point, across(outward), outward)
 
 
-def _united(drawn: list[Bytes]) -> Bytes:
+def _united(drawn: Sequence[Bytes]) -> Bytes:
     return np.asarray(np.bitwise_or.reduce(drawn), np.uint8)
 
 

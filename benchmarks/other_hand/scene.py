@@ -30,7 +30,7 @@ class Scene:
 
     `rings` are exteriors and holes of the block, or both of a pair, each (N, 2) in pixels, no offcut's; `pitch_px`
     is its cells'. The rest is (H, W): where a thing lies over the block and beside it (`hidden`), where walls' tops are
-    seen, an offcut's too (`walls`), and what lies within any block or offcut, holes not (`comb`).
+    seen, an offcut's too (`walls`), and what lies within each block and offcut, holes not (`pieces`).
     """
 
     picture: Bytes
@@ -38,7 +38,12 @@ class Scene:
     pitch_px: float
     hidden: Bools
     walls: Bools
-    comb: Bools
+    pieces: tuple[Bools, ...]
+
+    @property
+    def comb(self) -> Bools:
+        """What lies within any block or offcut, (H, W)."""
+        return np.asarray(np.logical_or.reduce(self.pieces))
 
 
 def scene(kind: str, seed: int, on: str | None = None) -> Scene:
@@ -63,7 +68,8 @@ def scene(kind: str, seed: int, on: str | None = None) -> Scene:
     light_up(canvas, where, kind)
     picture = photograph(rng, canvas.picture.squeeze(), kind, where.pitch, of.light)
     seen = (canvas.tops > 0.38 * min(1.0, of.wall)) & ~canvas.hidden
-    return Scene(picture, where.rings, where.pitch, canvas.hidden, seen, where.comb > 0)
+    pieces = tuple(piece > 0 for piece in where.pieces)
+    return Scene(picture, where.rings, where.pitch, canvas.hidden, seen, pieces)
 
 
 def _paint_block(canvas: Canvas, where: Layout, of: Core, kind: str) -> None:

@@ -10,60 +10,185 @@ import numpy as np
 
 from benchmarks.segmentation.examples import Example
 from benchmarks.segmentation.patterns import lay, noise, pattern
-from contour.geometry.arrays import Bools, Bytes, Float32s, median, quantile
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
 from contour.image.opencv import grey
+from contour.segmentation.network import PITCH_PX
 
 SIZE = 192
 _SURE = 0.9
+# So many are made of two parts, as of two blocks; and so many of the others of a seam lie about it.
+_JOINED, _AT_SEAM = 0.18, 0.4
+# Of those of two parts, so many have one on the other, and so many a splice between them. What is seam.
+_STACKED, _GLUED, _BESIDE = 0.15, 0.35, 0.55
 
 
 class Crop(NamedTuple):
-    """What the network is shown, and what it is to say of it: shares of a wall's top, comb, a thing, each (SIZE, SIZE),
-    float32.
+    """What the network is shown, and what it is to say of it: shares of a wall's top, comb, a thing, and a seam, each
+    (SIZE, SIZE), float32.
     """
 
     light: Float32s
     wall: Float32s
     comb: Float32s
     thing: Float32s
+    seam: Float32s
 
 
 def crop(one: Example, rng: np.random.Generator) -> Crop:
     """A part of the example, drawn at random."""
-    light, (wall, comb, thing) = _part(one, rng)
+    light, (wall, comb, thing, seam) = _joined(one, rng) if rng.random() < _JOINED else _part(one, rng)
+    if rng.random() < 0.12:
+        light = _lined(light, wall, thing, rng)
+    if rng.random() < 0.08:
+        light, (wall, comb, thing, seam) = _crushed(light, [wall, comb, thing, seam], rng)
     if rng.random() < 0.3:
         light = _of_other_foil(light, comb, rng)
     if rng.random() < 0.5:
         gone = _cut_out(rng) if rng.random() < 0.4 else np.zeros_like(comb)
-        wall, comb = wall * (1.0 - gone), comb * (1.0 - gone)
+        wall, comb, seam = wall * (1.0 - gone), comb * (1.0 - gone), seam * (1.0 - gone)
         light = _on_other_table(light, comb, thing, gone, rng, dark=one.dark)
+    if rng.random() < 0.25:
+        light = _with_flanks(light, comb * (1.0 - thing), rng)
+    if rng.random() < 0.1:
+        light = light * (
+            1.0
+            - np.float32(rng.uniform(-0.3, 0.5)) * np.clip(0.5 + _line(rng) / float(rng.uniform(1.0, 10.0)), 0.0, 1.0)
+        )
     if rng.random() < 0.2:
         light, thing = _covered(light, thing, rng)
     light = (_seen(light, rng) - np.float32(one.mean)) / np.float32(one.spread)
     light = light * np.float32(math.exp(rng.uniform(-0.4, 0.4))) + np.float32(rng.uniform(-0.5, 0.5))
     if rng.random() < 0.08:
         light = -light
-    return Crop(light, wall * (1.0 - thing), comb * (1.0 - thing), thing)
+    free = 1.0 - thing
+    return Crop(light, wall * free, comb * free, thing, seam * free)
 
 
 def _part(one: Example, rng: np.random.Generator) -> tuple[Float32s, list[Float32s]]:
     """Light of the picture, or of one of its channels, about a place that mostly is near the outline, turned, mirrored
-    and sized at random; and the shares of walls, comb and things there.
+    and sized at random; and the shares of walls, comb, things and seams there.
     """
-    channel = grey(one.picture)
+    which = rng.random()
+    places = one.seam[::4, ::4] > 100 if rng.random() < _AT_SEAM else _places(one.comb[::4, ::4], which)
+    if not places.any():
+        places = _places(one.comb[::4, ::4], which)
+    view = _View(float(rng.uniform(0.0, 360.0)), math.exp(rng.uniform(-0.12, 0.12)), rng.random() < 0.5)
+    return _seen_by(one, view, _channel(one, rng), _place(places, rng))
+
+
+class _View(NamedTuple):
+    """How a part is turned, degrees, how many times as large it is, and whether it is mirrored."""
+
+    turn: float
+    size: float
+    mirrored: bool
+
+
+def _channel(one: Example, rng: np.random.Generator) -> Bytes:
+    """Light of the picture, or of one of its channels."""
     if one.picture.ndim == 3 and rng.random() < 0.3:
-        channel = np.ascontiguousarray(one.picture[..., int(rng.integers(3))])
-    rows, columns = np.nonzero(_places(one.comb[::4, ::4], rng.random()))
-    place = int(rng.integers(len(rows)))
-    middle = 4.0 * np.array([columns[place], rows[place]]) + rng.uniform(-60.0, 60.0, 2)
-    matrix = cv2.getRotationMatrix2D(
-        middle.tolist(), float(rng.uniform(0.0, 360.0)), math.exp(rng.uniform(-0.12, 0.12))
-    )
+        return np.ascontiguousarray(one.picture[..., int(rng.integers(3))])
+    return grey(one.picture)
+
+
+def _place(places: Bools, rng: np.random.Generator) -> Float64s:
+    """Somewhere about one of these places, of every fourth sample, (2,), x and y."""
+    rows, columns = np.nonzero(places)
+    number = int(rng.integers(len(rows)))
+    return 4.0 * np.array([columns[number], rows[number]]) + rng.uniform(-60.0, 60.0, 2)
+
+
+def _seen_by(one: Example, view: _View, channel: Bytes, middle: Float64s) -> tuple[Float32s, list[Float32s]]:
+    """Light and the shares of walls, comb, things and seams about a place."""
+    matrix = cv2.getRotationMatrix2D(middle.tolist(), view.turn, view.size)
     matrix[:, 2] += 0.5 * SIZE - middle
-    if rng.random() < 0.5:
+    if view.mirrored:
         matrix = np.diag([-1.0, 1.0]) @ matrix + np.array([[0.0, 0.0, SIZE - 1.0], [0.0, 0.0, 0.0]])
-    shares = [_moved(plane, matrix, cv2.INTER_LINEAR) / np.float32(255.0) for plane in (one.wall, one.comb, one.thing)]
+    planes = (one.wall, one.comb, one.thing, one.seam)
+    shares = [_moved(plane, matrix, cv2.INTER_LINEAR) / np.float32(255.0) for plane in planes]
     return _moved(channel, matrix, cv2.INTER_CUBIC), shares
+
+
+def _joined(one: Example, rng: np.random.Generator) -> tuple[Float32s, list[Float32s]]:
+    """Two parts of one example as two blocks, alike or turned, that lie against each other or one on the other; or as a
+    block with a splice, of which no seam is to be told.
+    """
+    channel, turn = _channel(one, rng), float(rng.uniform(0.0, 360.0))
+    alike = turn + (float(rng.normal(0.0, 2.0)) if rng.random() < 0.6 else float(rng.uniform(0.0, 360.0)))
+    size, mirrored = math.exp(rng.uniform(-0.12, 0.12)), rng.random() < 0.5
+    larger = size * math.exp(rng.uniform(-0.3, 0.3) * (rng.random() < 0.25))
+    within = _places(one.comb[::4, ::4], 0.8)
+    first, second = (
+        _seen_by(one, view, channel, _place(within, rng))
+        for view in (_View(turn, size, mirrored), _View(alike, larger, mirrored))
+    )
+    off, how = _line(rng), rng.random()
+    if how < _STACKED:
+        through = np.minimum(first[0], second[0]) if one.dark else np.maximum(first[0], second[0])
+        stacked = first[0], [*first[1][:3], np.zeros_like(off)]
+        first = np.asarray(through, np.float32), second[1]
+        second = stacked
+    glued = how > 1.0 - _GLUED
+    gap = (float(rng.uniform(0.2, 1.6 if glued else 1.0)) * (glued or rng.random() < 0.7)) * PITCH_PX
+    both = np.minimum(*(cv2.blur(part[1][1], (9, 9)) for part in (first, second))) > 0.3
+    apart = np.float32(0.5 * gap * (how >= _STACKED)) * both
+    sides = [np.clip(0.5 + away - apart, 0.0, 1.0) for away in (-off, off)]
+    wall, comb, thing, seam = (
+        sides[0] * one_side + sides[1] * other_side for one_side, other_side in zip(first[1], second[1], strict=True)
+    )
+    between = 1.0 - sides[0] - sides[1]
+    if glued:
+        fill = _glue(first[0], rng)
+        comb = np.maximum(comb, between)
+    else:
+        fill = quantile(first[0], rng.uniform(0.0, 0.3) if rng.random() < 0.6 else rng.uniform(0.3, 1.0))
+        seam = np.maximum(seam, (np.abs(off) < max(_BESIDE * PITCH_PX, 0.5 * gap)) & both)
+    light = sides[0] * first[0] + sides[1] * second[0] + between * fill
+    return np.asarray(light, np.float32), [np.asarray(part, np.float32) for part in (wall, comb, thing, seam)]
+
+
+def _glue(light: Float32s, rng: np.random.Generator) -> Float32s:
+    """Foamed adhesive: as light as floors to lighter than walls, in bubbles."""
+    level = quantile(light, rng.uniform(0.1, 1.0)) * float(rng.uniform(0.8, 1.2)) + float(rng.uniform(0.0, 30.0))
+    bubbles = noise(rng, SIZE, float(rng.uniform(1.0, 4.0)))
+    return np.asarray(level * np.clip(1.0 + np.float32(rng.uniform(0.03, 0.35)) * bubbles, 0.2, 2.0), np.float32)
+
+
+def _lined(light: Float32s, wall: Float32s, thing: Float32s, rng: np.random.Generator) -> Float32s:
+    """On a table with lines, darker or lighter, which show between walls, too: no seams."""
+    lines, apart = np.zeros_like(light), float(rng.uniform(20.0, 80.0))
+    off, wide = _line(rng), float(rng.uniform(1.0, 8.0))
+    for number in range(-int(rng.integers(0, 3)), 1 + int(rng.integers(0, 3))):
+        lines = np.maximum(lines, np.clip(0.5 * wide + 0.5 - np.abs(off - number * apart), 0.0, 1.0))
+    shade = np.float32(rng.uniform(-0.75, 0.6)) * lines * (1.0 - np.clip(wall, 0.0, 1.0)) * (1.0 - thing)
+    return np.asarray(light * (1.0 + shade), np.float32)
+
+
+def _crushed(light: Float32s, shares: list[Float32s], rng: np.random.Generator) -> tuple[Float32s, list[Float32s]]:
+    """With a row of cells that is pressed together or drawn out: no seam, as walls go on through it."""
+    off, wide = _line(rng), float(rng.uniform(0.5, 1.5)) * PITCH_PX
+    y, x = np.mgrid[:SIZE, :SIZE].astype(np.float32)
+    rough = 1.0 + 0.5 * noise(rng, SIZE, float(rng.uniform(4.0, 16.0)))
+    push = np.asarray(rng.uniform(-0.5, 0.5) * off * np.exp(-((off / wide) ** 2)) * rough, np.float32)
+    across_y, across_x = np.gradient(off)
+    aside = np.float32(rng.uniform(0.0, 0.2) * PITCH_PX) * np.exp(-((off / wide) ** 2)).astype(np.float32)
+    to_x = (x + push * across_x + aside * noise(rng, SIZE, 6.0)).astype(np.float32)
+    to_y = (y + push * across_y + aside * noise(rng, SIZE, 6.0)).astype(np.float32)
+    light, *shares = (
+        np.asarray(cv2.remap(plane, to_x, to_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT), np.float32)
+        for plane in (light, *shares)
+    )
+    shade = 1.0 + np.float32(rng.uniform(-0.4, 0.3)) * np.exp(-((off / wide) ** 2)) * shares[1]
+    return np.asarray(light * shade, np.float32), shares
+
+
+def _line(rng: np.random.Generator) -> Float32s:
+    """How far each sample lies from a line through the part, straight or not quite, to one side of it, (SIZE, SIZE)."""
+    turn, bend = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.0, 12.0) * (rng.random() < 0.3)
+    y, x = np.mgrid[:SIZE, :SIZE] - 0.5 * SIZE
+    along, off = x * math.cos(turn) + y * math.sin(turn), y * math.cos(turn) - x * math.sin(turn)
+    wave = bend * np.sin(along / rng.uniform(20.0, 60.0) + rng.uniform(0.0, 6.0))
+    return np.asarray(off + wave - rng.uniform(-0.3, 0.3) * SIZE, np.float32)
 
 
 def _places(comb: Bytes, which: float) -> Bools:
@@ -96,7 +221,7 @@ def _cut_out(rng: np.random.Generator) -> Float32s:
         axes = rng.uniform(18.0, 60.0, 2).astype(int) * 8
         cv2.ellipse(mask, (middle * 8).astype(int).tolist(), axes.tolist(), 0.0, 0.0, 360.0, 255, -1, cv2.LINE_AA, 3)
     else:
-        sides = rng.uniform(35.0, 120.0, 2).tolist()
+        sides = [float(rng.uniform(16.0 if rng.random() < 0.5 else 35.0, 120.0)), float(rng.uniform(35.0, 120.0))]
         corners = cv2.boxPoints((middle.tolist(), sides, float(rng.uniform(0.0, 180.0))))
         lay(mask, corners, 255)
     return mask.astype(np.float32) / np.float32(255.0)
@@ -128,6 +253,18 @@ def _on_other_table(
     return np.asarray(light * (1.0 - out) + np.clip(table, 0.0, 255.0) * out, np.float32)
 
 
+def _with_flanks(light: Float32s, comb: Float32s, rng: np.random.Generator) -> Float32s:
+    """As seen from aside: beyond the block's edge the walls that end there, down to the table, as deep as a cell."""
+    turn, shade = float(rng.uniform(0.0, 2.0 * math.pi)), np.float32(rng.uniform(0.4, 1.0))
+    flank, seen = light * comb, comb
+    for deep in range(1, round(float(rng.uniform(0.15, 1.1)) * PITCH_PX)):
+        down = np.array([[1.0, 0.0, deep * math.cos(turn)], [0.0, 1.0, deep * math.sin(turn)]])
+        lower, there = (cv2.warpAffine(plane, down, (SIZE, SIZE)) for plane in (light * comb, comb))
+        more = np.maximum(there - seen, 0.0)
+        flank, seen = flank + shade * lower * more / np.maximum(there, 1e-3), np.maximum(seen, there)
+    return np.asarray(light * (1.0 - seen) + flank, np.float32)
+
+
 def _covered(light: Float32s, thing: Float32s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
     """Beneath a strip or something with corners, half of them with a shadow."""
     middle, mask = rng.uniform(0.0, SIZE, 2), np.zeros((SIZE, SIZE), np.uint8)
@@ -142,7 +279,7 @@ def _covered(light: Float32s, thing: Float32s, rng: np.random.Generator) -> tupl
         away = tuple(rng.integers(-5, 6, 2).tolist())
         cast = np.roll(cv2.GaussianBlur(over, (0, 0), float(rng.uniform(1.0, 5.0))), away, (0, 1))
         light = light * (1.0 - np.float32(rng.uniform(0.1, 0.6)) * cast)
-    printed = rng.uniform(0.0, 0.25) * (rng.random() < 0.7)
+    printed = rng.uniform(0.0, 0.25 if rng.random() < 0.7 else 0.8) * (rng.random() < 0.8)
     body = np.float32(rng.uniform(15.0, 240.0)) * (1.0 + np.float32(printed) * pattern(rng, SIZE))
     return np.asarray(light * (1.0 - over) + body * over, np.float32), np.maximum(thing, over)
 

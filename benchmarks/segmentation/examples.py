@@ -1,9 +1,10 @@
-"""Rendered blocks as the network is to see them: what of the picture is a wall, comb, and a thing over it."""
+"""Rendered blocks as the network is to see them: what of the picture is a wall, comb, a thing over it, and a seam."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -12,9 +13,9 @@ import numpy as np
 from benchmarks.other_hand.scene import KINDS as OTHER_KINDS
 from benchmarks.other_hand.scene import scene as other_scene
 from contour.geometry.arrays import Bytes, Float32s, median
-from contour.image.opencv import grey
+from contour.image.opencv import grey, within
 from contour.segmentation.network import LEAST_SPREAD, PITCH_PX
-from contour.synthetic import area_coverage, render, truth_px
+from contour.synthetic import Strip, area_coverage, render, truth_px
 from contour.synthetic.rendering import tops
 from contour.synthetic.shop_floor.covers import cover_areas
 from tests.support.scenes.shop_floor_scenes import KINDS as SHOP_FLOOR
@@ -28,6 +29,9 @@ _OTHERS = (
     *("row_noise", "motion", "defocus", "glare", "shadow", "crushed", "fading", "dim", "mirror", "gamma", "coloured"),
 )
 KINDS = (*_STRUCTURED * 3, *_OTHERS)
+# So many are two blocks, or a block and an offcut, that lie against each other. Within so many pitches of both is seam.
+_TOGETHER, _BESIDE = 0.2, 0.55
+_OWN_TOGETHER, _OTHERS_TOGETHER = ("pushed_together", "pushed_together", "offcut"), ("pair", "pair", "offcut")
 # So many are drawn by another hand; and so many of the things that lie over an edge do so on a table with structure.
 _BY_ANOTHER, _ON_STRUCTURED = 0.5, 0.5
 _THINGS = ("tape", "clamp", "hand_or_cable")
@@ -37,7 +41,8 @@ _OTHER_THINGS = ("tape", "clamp", "hand", "cable")
 @dataclass(frozen=True, eq=False)
 class Example:
     """A picture, (h, w) or (h, w, 3), uint8, with cells of about `PITCH_PX`, and how much of each pixel is the top of a
-    wall, of the block, and of a thing over it, 255 all, (h, w), uint8. mean, spread: of its light. dark: whether walls
+    wall, of a block, of a thing over it, and of a seam between two blocks, 255 all, (h, w), uint8. mean, spread: of its
+    light. dark: whether walls
     are darker than what lies between them.
     """
 
@@ -45,6 +50,7 @@ class Example:
     wall: Bytes
     comb: Bytes
     thing: Bytes
+    seam: Bytes
     mean: float
     spread: float
     dark: bool
@@ -59,44 +65,56 @@ def example(seed: int) -> Example:
     size = max(64, round(width * share)), max(64, round(height * share))
     how = cv2.INTER_AREA if share < 1.0 else cv2.INTER_LINEAR
     picture = np.asarray(cv2.resize(drawn.picture, size, interpolation=how), np.uint8)
-    wall, within, over = (_sized(one, size, how) for one in (drawn.wall * drawn.comb, drawn.comb, drawn.thing))
+    comb = np.maximum.reduce(drawn.pieces)
+    wall, block, over = (_sized(one, size, how) for one in (drawn.wall * comb, comb, drawn.thing))
+    seam = _seam_between([_sized(piece, size, how) for piece in drawn.pieces])
     light = grey(picture)
-    on, off = light[wall > 180], light[(wall < 20) & (within > 200)]
+    on, off = light[wall > 180], light[(wall < 20) & (block > 200)]
     dark = len(on) > 0 and len(off) > 0 and median(on) < median(off)
-    return Example(picture, wall, within, over, float(light.mean()), max(float(light.std()), LEAST_SPREAD), dark)
+    return Example(picture, wall, block, over, seam, float(light.mean()), max(float(light.std()), LEAST_SPREAD), dark)
+
+
+def _seam_between(pieces: Sequence[Bytes]) -> Bytes:
+    """255 where two pieces, 255 each in (h, w), with cells of `PITCH_PX` lie against each other."""
+    beside = [within((piece > 127).astype(np.uint8), _BESIDE * PITCH_PX) for piece in pieces]
+    return np.where(np.add.reduce(beside) > 1, np.uint8(255), np.uint8(0))
 
 
 class _Drawn(NamedTuple):
-    """A picture, the pitch of its cells, and how much of each pixel is a wall's top, block, and a thing, 0…1."""
+    """A picture, the pitch of its cells, and how much of each pixel is a wall's top, each block, and a thing, 0…1."""
 
     picture: Bytes
     pitch_px: float
     wall: Float32s
-    comb: Float32s
+    pieces: list[Float32s]
     thing: Float32s
 
 
 def _own(rng: np.random.Generator, seed: int) -> _Drawn:
-    kind = str(rng.choice(KINDS))
+    kind = str(rng.choice(_OWN_TOGETHER if rng.random() < _TOGETHER else KINDS))
     over = kind in _STRUCTURED and rng.random() < _ON_STRUCTURED
     scene = shop_floor_scene(kind, seed, alone=over).scene
     if over:
         scene = SHOP_FLOOR[str(rng.choice(_THINGS))](rng, scene)
     rendered = render(scene)
     height, width = rendered.picture.shape[:2]
-    comb = area_coverage(truth_px(scene).rings, width, height)
-    thing = np.zeros_like(comb)
+    outlines = [truth_px(scene)]
+    if kind in _OWN_TOGETHER:
+        others = (thing.outline for thing in scene.things if isinstance(thing, Strip))
+        outlines += [truth_px(replace(scene, outline=outline)) for outline in others]
+    pieces = [area_coverage(outline.rings, width, height) for outline in outlines]
+    thing = np.zeros_like(pieces[0])
     for area in cover_areas(scene):
         thing = np.maximum(thing, area_coverage(area.rings, width, height))
-    return _Drawn(rendered.picture, rendered.pitch_px, tops(scene)[0], comb, thing)
+    return _Drawn(rendered.picture, rendered.pitch_px, tops(scene)[0], pieces, thing)
 
 
 def _by_another(rng: np.random.Generator, seed: int) -> _Drawn:
-    kind = str(rng.choice(OTHER_KINDS))
+    kind = str(rng.choice(_OTHERS_TOGETHER if rng.random() < _TOGETHER else OTHER_KINDS))
     on = str(rng.choice(_STRUCTURED)) if kind in _OTHER_THINGS and rng.random() < _ON_STRUCTURED else None
     one = other_scene(kind, seed, on)
-    wall, comb, thing = (np.asarray(part, np.float32) for part in (one.walls, one.comb, one.hidden))
-    return _Drawn(one.picture, one.pitch_px, wall, comb, thing)
+    wall, thing, *pieces = (np.asarray(part, np.float32) for part in (one.walls, one.hidden, *one.pieces))
+    return _Drawn(one.picture, one.pitch_px, wall, pieces, thing)
 
 
 def _sized(share: Float32s, size: tuple[int, int], how: int) -> Bytes:

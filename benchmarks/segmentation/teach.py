@@ -1,5 +1,6 @@
 """Teaches the networks: `python -m benchmarks.segmentation.teach --out FILE.onnx` (`--help`), an hour on two cores;
-with `--beyond` the light one that looks beyond outlines, a quarter of one.
+with `--plan beyond` the light one that looks beyond outlines, a quarter of one, and with `--plan seams`, mostly
+from that one on (`--start`), its like that tells seams.
 
 What comes out differs in its last digits from machine to machine, and so from what is in `contour/segmentation/`.
 """
@@ -12,10 +13,12 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
 import cv2
 import numpy as np
+import onnx
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
@@ -30,6 +33,8 @@ _BATCH = 16
 _RATE = 3e-3
 # Near an outline, within half a pitch, what is told counts so many times as much.
 _NEAR = 4.0
+# By so many crops a network that goes on learning is normed at first.
+_FEW = 96
 
 
 class _Plan(NamedTuple):
@@ -47,6 +52,7 @@ class _Plan(NamedTuple):
 PLANS = {
     "comb": _Plan((12, 24, 48, 64), (1, 2, 4, 2), 2, {"wall": 2.0, "comb": 1.0, "thing": 1.0}, 1),
     "beyond": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 1.0, "thing": 0.5}, 2),
+    "seams": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 1.0, "thing": 0.5, "seam": 1.0}, 2),
 }
 
 
@@ -153,6 +159,37 @@ def teach(network: Network, plan: _Plan, examples: Sequence[Example], minutes: f
             print(f"{number + 1} batches, {100.0 * done:.0f} %, off {np.mean(lately[-50:]):.4f}", flush=True)
 
 
+def take_up(network: Network, path: str, light: Tensor) -> None:
+    """Have a network begin as what is in the file of one of its kind; of what that doesn't tell it knows nothing yet.
+
+    In the file what each layer is normed by has gone into its weights. It is norms again, of what `light` leads to.
+    """
+    graph = onnx.load(path).graph
+    kept = {one.name: torch.from_numpy(onnx.numpy_helper.to_array(one).copy()) for one in graph.initializer}
+    layers = [[kept[name] for name in node.input[1:]] for node in graph.node if node.op_type == "Conv"]
+    convolutions = (one for one in network.modules() if isinstance(one, nn.Conv2d))
+    norms = [one for one in network.modules() if isinstance(one, nn.BatchNorm2d)]
+    with torch.no_grad():
+        for convolution, (weight, _) in zip(convolutions, layers, strict=True):
+            convolution.weight[: len(weight)] = weight
+        network.told.bias[: len(layers[-1][1])] = layers[-1][1]
+        hooks = [
+            norm.register_forward_pre_hook(partial(_nothing_normed, more=bias))
+            for norm, (_, bias) in zip(norms, layers[:-1], strict=True)
+        ]
+        network(light)
+    for hook in hooks:
+        hook.remove()
+
+
+def _nothing_normed(norm: nn.BatchNorm2d, into: tuple[Tensor, ...], *, more: Tensor) -> None:
+    """Have a norm add so much to what comes into it, and no more."""
+    var, mean = torch.var_mean(into[0], (0, 2, 3), correction=0)
+    norm.running_mean, norm.running_var = mean, var
+    norm.weight.copy_(torch.sqrt(var + norm.eps))
+    norm.bias.copy_(mean + more)
+
+
 def export(network: Network, path: str) -> None:
     """Write the network as what OpenCV reads."""
     light = torch.zeros(1, 1, 64, 96)
@@ -170,21 +207,21 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=40.0, help="how long it is taught")
     parser.add_argument("--seed", type=int, default=1, help="of what is drawn of the examples")
     parser.add_argument("--rate", type=float, default=_RATE, help="how fast it learns at first")
-    parser.add_argument("--start", metavar="FILE", help="weights of a network that goes on learning")
-    parser.add_argument("--weights", metavar="FILE", help="where its weights go, to go on with")
-    parser.add_argument("--beyond", action="store_true", help="the one that looks beyond outlines")
+    parser.add_argument("--start", metavar="FILE", help="a network that goes on learning, .onnx")
+    parser.add_argument("--plan", choices=PLANS, default="comb", help="which network")
     parser.add_argument("--out", required=True, metavar="FILE", help="where the network goes, .onnx")
     options = parser.parse_args()
+    cv2.setNumThreads(1)  # what is forked has none of its threads, and would wait for them
     seeds = range(options.first, options.first + options.examples)
     with ProcessPoolExecutor(2, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
         examples = list(pool.map(example, seeds, chunksize=4))
-    plan = PLANS["beyond" if options.beyond else "comb"]
+    plan = PLANS[options.plan]
     network = Network(plan).to(memory_format=torch.channels_last)
     if options.start is not None:
-        network.load_state_dict(torch.load(options.start))
+        crops = (crop(examples[number % len(examples)], np.random.default_rng(number)).light for number in range(_FEW))
+        light = torch.from_numpy(np.stack(list(crops)))[:, None]
+        take_up(network, options.start, functional.avg_pool2d(light, plan.smaller))
     teach(network, plan, examples, options.minutes, options.rate, options.seed)
-    if options.weights is not None:
-        torch.save(network.state_dict(), options.weights)
     export(network, options.out)
 
 

@@ -33,7 +33,8 @@ def test_an_example_has_cells_of_about_the_size_that_is_learnt_and_walls_within_
 def test_an_example_is_the_same_for_the_same_seed(one: Example, seed: int) -> None:
     again = example(seed)
     assert all(
-        np.array_equal(getattr(one, name), getattr(again, name)) for name in ("picture", "wall", "comb", "thing")
+        np.array_equal(getattr(one, name), getattr(again, name))
+        for name in ("picture", "wall", "comb", "thing", "seam")
     )
 
 
@@ -47,3 +48,5 @@ def test_of_a_crop_no_pixel_is_comb_and_a_thing_over_it_or_wall_without_comb(one
         assert (part.wall <= part.comb + 0.02).all()
     assert sum(part.thing.max() > 0.9 for part in seen) >= 5
     assert sum(part.comb.max() > 0.9 for part in seen) >= 40
+    assert sum(part.seam.max() > 0.9 for part in seen) >= 3
+    assert sum(part.seam.max() < 0.1 for part in seen) >= 3

@@ -193,13 +193,7 @@ def _odd_edge(traced: CheckedTrace, shown_px: float) -> Finding | None:
         )
     if traced.bare is not None:
         x, y = traced.bare.place_px
-        return _disagreement_at(
-            (x, y),
-            shown_px,
-            f"Along {traced.bare.length_pitches:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, no cells lie "
-            "just within it: it may run over the table, a label or along a cable there. Look at the overlay; clear the "
-            "edge, check light and table, or set max_disagreement_pitches: 0 for blocks with filled cells.",
-        )
+        return _no_cells(traced.bare.length_pitches, (x, y), shown_px)
     if traced.trace.opening_px is not None:
         x, y, wide = traced.trace.opening_px
         return _disagreement_at(
@@ -236,6 +230,10 @@ def judge_opinion(opinion: SecondOpinion, pitch_px: float) -> tuple[Finding, ...
         findings.append(_left_out(opinion.beyond, pitch_px))
     if opinion.over is not None:
         findings.append(_lies_over(opinion.over, pitch_px))
+    if opinion.bare is not None:
+        findings.append(_no_cells(opinion.bare.pitches, opinion.bare.place_px, SHOWN_PITCHES * pitch_px))
+    if opinion.seam is not None:
+        findings.append(_seam(opinion.seam, pitch_px))
     return tuple(findings)
 
 
@@ -256,6 +254,28 @@ def _lies_over(over: Doubt, pitch_px: float) -> Finding:
         Refusal.EDGE_COVERED,
         f"Something seems to lie over {long:.1f} cells of the block's edge near ({x:.0f}, {y:.0f}) px, or glare to "
         "hide it. Look at the overlay; clear the edge, and check the light.",
+        (around(x, y, SHOWN_PITCHES * pitch_px),),
+    )
+
+
+def _no_cells(long: float, place_px: tuple[float, float], shown_px: float) -> Finding:
+    x, y = place_px
+    return _disagreement_at(
+        (x, y),
+        shown_px,
+        f"Along {long:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, no cells lie just within it: it may run "
+        "over the table, a label or along a cable there. Look at the overlay; clear the edge, check light and table, "
+        "or set max_disagreement_pitches: 0 for blocks with filled cells.",
+    )
+
+
+def _seam(seam: Doubt, pitch_px: float) -> Finding:
+    (x, y), long = seam.place_px, seam.pitches
+    return Finding(
+        Refusal.SEVERAL_BLOCKS,
+        f"A seam of {long:.0f} cells seems to run through the block near ({x:.0f}, {y:.0f}) px, as between two that "
+        "lie against each other. Look at the overlay; leave one on the table, or more than a cell between them, or set "
+        "max_disagreement_pitches: 0 for blocks with such a seam.",
         (around(x, y, SHOWN_PITCHES * pitch_px),),
     )
 

@@ -50,6 +50,13 @@ def comb_and_things(light: Bytes, pitch_px: float) -> Float32s:
     return _tell("comb_beyond.onnx", 2, light, LIGHT_PITCH_PX / pitch_px)[1]
 
 
+def seams(light: Bytes, pitch_px: float) -> tuple[Bytes, Float32s]:
+    """The picture at the light network's size, (h, w), uint8, and how surely each pixel of it is comb, a thing over it,
+    and a seam between two blocks, by one that was taught on from it: 0…1, (3, h, w), float32.
+    """
+    return _tell("seams.onnx", 3, light, LIGHT_PITCH_PX / pitch_px)
+
+
 def _tell(name: str, channels: int, light: Bytes, size: float) -> tuple[Bytes, Float32s]:
     """The picture, (H, W), at so many times its size, its sides multiples of 8, (h, w), and what the network in that
     file tells of each pixel of it, (channels, h, w), float32.

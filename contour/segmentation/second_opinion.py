@@ -10,10 +10,10 @@ import numpy as np
 
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s
 from contour.geometry.rings import Contour
-from contour.image.opencv import pieces_and_areas, pieces_of, within
+from contour.image.opencv import box_mean, pieces_and_areas, pieces_of, within
 from contour.image.pixel_grid import fill_finely
 from contour.segmentation.glare import glare
-from contour.segmentation.network import LIGHT_PITCH_PX, comb_and_things
+from contour.segmentation.network import LIGHT_PITCH_PX, comb_and_things, seams
 from contour.walls.lightness import wall_light
 
 _SURE = 0.5
@@ -25,6 +25,18 @@ _AROUND, _RIM, _FAR, _BESIDE, _LEAST_PX = 3.0, 0.38, 0.55, 0.75, 3
 # where it is known what does: of 360 right outlines of all kinds on one it lies along more. Glare lies beside, up to
 # twice as far.
 _DEEP, _LONG, _KNOWN = 0.375, 0.8, 1.0
+# Cells are missing within the edge where, so deep in the block, there surely is no comb, over more than that; narrower
+# than so many pixels it is what lies between walls. It is as light as what lies beyond up to so much of what light
+# changes by in the block.
+_WITHIN, _NO_COMB, _LONG_BARE, _LEAST_WIDE_PX = (0.3, 0.9), 0.25, 1.15, 4
+_ALIKE, _CONTRAST = 0.3, (0.05, 0.95)
+# A seam parts what lies so far within the outline into pieces of so many square pitches; its parts may be twice so far
+# apart.
+_INNER, _CELLS, _LINK = 1.0, 6.0, 0.8
+# In the middle of a seam, without half so many pixels at both sides, at most so many times as much is as light as a
+# wall as in comb so far from it, pitches: of 19 seams 1.37 times at most, of eight splices and rows of crushed cells
+# 1.55 at least.
+_RIMS_PX, _FILLED, _BESIDE_SEAM = 5, 1.45, (1.0, 4.0)
 
 
 class Doubt(NamedTuple):
@@ -39,12 +51,15 @@ class Doubt(NamedTuple):
 
 
 class SecondOpinion(NamedTuple):
-    """What speaks against an outline: how far comb reaches `beyond` it, and along how much of it something seems to lie
-    `over` it. None where it reaches less than about half a cell, and along less than that.
+    """What speaks against an outline: how far comb reaches `beyond` it, along how much of it something seems to lie
+    `over` it or no cells within it (`bare`), and how long a `seam` is that parts the block. None where it reaches less
+    than about half a cell, and along less than that.
     """
 
     beyond: Doubt | None
     over: Doubt | None
+    bare: Doubt | None
+    seam: Doubt | None
 
     def moved(self, x: float, y: float) -> SecondOpinion:
         """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
@@ -57,22 +72,33 @@ def second_opinion(
     pitch_px: float,
     loose: Callable[[Float64s], Bools],
     told: Sequence[Float64s] = (),
+    *,
+    dark: bool = False,
 ) -> SecondOpinion:
     """What the picture, grey (H, W) or BGR (H, W, 3), uint8, shows against the outline, in its pixels, of a block with
     cells of that pitch. `loose` tells of points, (N, 2), which lie on pieces of comb that are told from the block,
     (N,): these are none of it unless a thing parts them from it. Along paths that are `told`, (M, 2) each, it is known
-    what lies over the edge.
+    what lies over the edge. dark: whether walls are darker than what lies between them.
     """
     around = _AROUND * pitch_px
     left, top = np.maximum(contour.exterior.min(axis=0) - around, 0.0).astype(int).tolist()
     right, bottom = np.ceil(contour.exterior.max(axis=0) + around).astype(int).tolist()
     part = np.ascontiguousarray(picture[top:bottom, left:right])
-    comb, thing = comb_and_things(wall_light(part), pitch_px)
+    light = wall_light(part)
+    comb, thing = comb_and_things(light, pitch_px)
+    sized, (sure_comb, _, seam) = seams(light, pitch_px)
     grid = _Grid(np.array([left, top]), np.array(comb.shape[::-1]) / part.shape[1::-1])
     block = np.zeros(comb.shape, np.uint8)
     fill_finely(block, [grid.there(ring) for ring in contour.rings], 1)
-    over = _over(block, thing, glare(part, block > 0, LIGHT_PITCH_PX), [grid.there(path) for path in told], grid)
-    return SecondOpinion(_beyond(block, comb, thing, loose, grid), over)
+    known = _known(block.shape, [grid.there(path) for path in told])
+    over = _over(block, thing, glare(part, block > 0, LIGHT_PITCH_PX), known, grid)
+    bare = _bare(block, sure_comb, sized, known, grid) if over is None else None
+    return SecondOpinion(
+        _beyond(block, comb, thing, loose, grid),
+        over,
+        bare,
+        _seam(block, sure_comb, seam, 255 - sized if dark else sized, grid),
+    )
 
 
 class _Grid(NamedTuple):
@@ -114,20 +140,86 @@ def _beyond(
     return None
 
 
-def _over(block: Bytes, thing: Float32s, blinds: Bools, told: Sequence[Float64s], grid: _Grid) -> Doubt | None:
-    """The longest part of the edge over which a thing lies, or glare beside it; `told` in places of the map."""
+def _known(shape: tuple[int, ...], told: Sequence[Float64s]) -> Bools:
+    """Where it is known what lies over the edge, about these paths in the map, (h, w)."""
+    known = np.zeros(shape, np.uint8)
+    paths = [np.rint(path).astype(np.int32) for path in told]
+    cv2.polylines(known, paths, False, 1, 2 * round(_KNOWN * LIGHT_PITCH_PX) + 1)
+    return known > 0
+
+
+def _over(block: Bytes, thing: Float32s, blinds: Bools, known: Bools, grid: _Grid) -> Doubt | None:
+    """The longest part of the edge over which a thing lies, or glare beside it."""
     deep = _DEEP * LIGHT_PITCH_PX
     lies = (block > 0) & (within(1 - block, deep) > 0) & (thing > _SURE)
     lies |= (block == 0) & (within(block, 2.0 * deep) > 0) & blinds
-    if told and lies.any():
-        known = np.zeros(block.shape, np.uint8)
-        paths = [np.rint(path).astype(np.int32) for path in told]
-        cv2.polylines(known, paths, False, 1, 2 * round(_KNOWN * LIGHT_PITCH_PX) + 1)
-        lies &= known == 0
-    pieces, area = pieces_and_areas(lies.astype(np.uint8), 8)
-    long = float(area.max()) / (deep * LIGHT_PITCH_PX)
-    if long < _LONG:
+    return _longest(lies & ~known, _DEEP, _LONG, grid)
+
+
+def _bare(block: Bytes, comb: Float32s, light: Bytes, known: Bools, grid: _Grid) -> Doubt | None:
+    """The longest part of the edge within which there are no cells, and that is as light within as beyond: compound
+    that was cut with the block ends there.
+    """
+    none = ((block > 0) & (comb < _NO_COMB)).astype(np.uint8)
+    wide = np.ones((_LEAST_WIDE_PX, _LEAST_WIDE_PX), np.uint8)
+    none = np.asarray(cv2.morphologyEx(none, cv2.MORPH_OPEN, wide), np.uint8)
+    deep, away = (np.asarray(cv2.distanceTransform(part, cv2.DIST_L2, 5), np.float32) for part in (block, 1 - block))
+    near, far = (share * LIGHT_PITCH_PX for share in _WITHIN)
+    bare = (none > 0) & (deep > near) & (deep < far) & ~known
+    if not bare.any():
+        return None
+    step = np.abs(_light_of(light, bare) - _light_of(light, (away > near) & (away < far)))
+    bare &= step < _ALIKE * float(np.ptp(np.quantile(light[block > 0], _CONTRAST)))
+    return _longest(bare, _WITHIN[1] - _WITHIN[0], _LONG_BARE, grid)
+
+
+def _light_of(light: Bytes, part: Bools) -> Float32s:
+    """The mean light of a part within a cell of each place, (h, w)."""
+    side = 2 * round(LIGHT_PITCH_PX) + 1
+    share = box_mean(part.astype(np.float32), side)
+    return np.asarray(box_mean(np.where(part, light, 0).astype(np.float32), side) / np.maximum(share, 1e-6), np.float32)
+
+
+def _longest(part: Bools, wide: float, least: float, grid: _Grid) -> Doubt | None:
+    """The largest piece of a part of a band so wide along the edge, pitches, if it is longer than that."""
+    pieces, area = pieces_and_areas(part.astype(np.uint8), 8)
+    long = float(area.max()) / (wide * LIGHT_PITCH_PX**2)
+    if long < least:
         return None
     rows, columns = np.nonzero(pieces == area.argmax())
     x, y = grid.back(np.array([columns.mean(), rows.mean()])).tolist()
     return Doubt(long, (x, y))
+
+
+def _seam(block: Bytes, comb: Float32s, seam: Float32s, light: Bytes, grid: _Grid) -> Doubt | None:
+    """The longest part of a seam that parts the block, well within its outline, into pieces of many cells, and is no
+    lighter than these: adhesive in a splice is, and a row of cells that were pressed together.
+    """
+    inner = np.asarray(cv2.distanceTransform(block, cv2.DIST_L2, 5), np.float32) > _INNER * LIGHT_PITCH_PX
+    line = (block > 0) & (seam > _SURE)
+    if not line.any() or _fills(block, comb, line, light):
+        return None
+    rest = inner & (within(line, _LINK * LIGHT_PITCH_PX) == 0)
+    count, whole = pieces_of(inner.astype(np.uint8), 8)
+    pieces, areas = pieces_and_areas(rest.astype(np.uint8), 8)
+    large = areas > _CELLS * LIGHT_PITCH_PX**2
+    large[0] = False
+    of_whole = np.zeros(len(areas), np.intp)
+    of_whole[pieces[rest]] = whole[rest]
+    if np.bincount(of_whole[large], minlength=count).max() < 2:
+        return None
+    lines, lengths = pieces_and_areas(line.astype(np.uint8), 8)
+    rows, columns = np.nonzero(lines == lengths.argmax())
+    x, y = grid.back(np.array([np.median(columns), np.median(rows)])).tolist()
+    return Doubt(float(np.hypot(np.ptp(rows), np.ptp(columns))) / LIGHT_PITCH_PX, (x, y))
+
+
+def _fills(block: Bytes, comb: Float32s, line: Bools, light: Bytes) -> bool:
+    """Whether more of a seam is as light as walls than of the comb beside it."""
+    middle = cv2.erode(line.astype(np.uint8), np.ones((_RIMS_PX, _RIMS_PX), np.uint8)) > 0
+    near, far = (within(line, pitches * LIGHT_PITCH_PX) > 0 for pitches in _BESIDE_SEAM)
+    beside = far & ~near & (block > 0) & (comb > _SURE)
+    if not (middle.any() and beside.any()):
+        return False
+    wall = float(np.mean(np.quantile(light[beside], (0.1, 0.9))))
+    return bool(np.mean(light[middle] > wall) > _FILLED * np.mean(light[beside] > wall))

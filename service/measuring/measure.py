@@ -436,7 +436,10 @@ def _second_opinion(
     rectifier: Rectifier | None,
     watch: _Stopwatch,
 ) -> tuple[Finding, ...]:
-    """What a network says against the outline: comb beyond it, things over it. Closed cells are none that it knows."""
+    """What networks say against the outline: comb beyond it, things over it, no cells within it, a seam through it.
+
+    Closed cells are none that they know.
+    """
     if traced.edge != "cut" or traced.pitch_px is None or traced.look is None:
         return ()
     outline = traced.contour if rectifier is None else rectified_edges(traced.contour, rectifier)
@@ -446,7 +449,8 @@ def _second_opinion(
         for one in traced.evidence or ()
         if one.hidden_or_filled
     ]
-    opinion = second_opinion(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at, told)
+    dark = traced.polarity == "dark"
+    opinion = second_opinion(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at, told, dark=dark)
     watch.lap("network")
     return judge_opinion(opinion.moved(*first.tolist()), traced.pitch_px)
 

@@ -1,4 +1,4 @@
-"""Comb that an outline leaves out is seen, so are things and glare along it, and nothing against a right one."""
+"""Comb that an outline leaves out is seen, so are things and glare along it, and seams; nothing against a right one."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def scene_of(kind: str, seed: int) -> Rendered:
     return render(shop_floor_scene(kind, seed, alone=True).scene)
 
 
-@pytest.mark.parametrize("kind", ["undisturbed", "compound", "mirror", "light_table", "dim", "motion"])
+@pytest.mark.parametrize("kind", ["undisturbed", "mirror", "light_table", "dim", "motion", "splice", "crushed"])
 def test_nothing_speaks_against_the_true_outline(kind: str) -> None:
     rendered = scene_of(kind, 95_100_001)
-    assert second_opinion(rendered.picture, rendered.truth_px, rendered.pitch_px, nowhere) == (None, None)
+    assert second_opinion(rendered.picture, rendered.truth_px, rendered.pitch_px, nowhere) == (None, None, None, None)
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("tape", 95_100_005), ("hand_or_cable", 95_100_006)])
@@ -89,3 +89,35 @@ def test_pieces_that_are_known_to_be_none_of_the_blocks_do_not_count() -> None:
     cut = Contour(np.column_stack((np.minimum(ring[:, 0], ring[:, 0].max() - 2.0 * rendered.pitch_px), ring[:, 1])))
     assert second_opinion(rendered.picture, cut, rendered.pitch_px, nowhere).beyond is not None
     assert second_opinion(rendered.picture, cut, rendered.pitch_px, everywhere).beyond is None
+
+
+@pytest.mark.parametrize("kind", ["undisturbed", "light_table"])
+def test_an_outline_across_a_notch_has_no_cells_within_unless_it_is_known_what_lies_there(kind: str) -> None:
+    rendered = scene_of(kind, 95_100_001)
+    ring, pitch = rendered.truth_px.exterior, rendered.pitch_px
+    place, picture = ring[ring[:, 0].argmax()], rendered.picture.astype(np.float64)
+    table = np.median(picture[:20]) + np.random.default_rng(1).normal(0.0, 2.0, picture.shape)
+    low, high = np.rint(place - pitch * np.array([4.0, 1.6])).astype(int), round(place[1] + 1.6 * pitch)
+    picture[low[1] : high, low[0] :] = table[low[1] : high, low[0] :]
+    notched = picture.clip(0, 255).astype(np.uint8)
+    bare = second_opinion(notched, rendered.truth_px, pitch, nowhere).bare
+    assert bare is not None
+    assert np.hypot(*(np.array(bare.place_px) - place)) < 1.5 * pitch
+    assert second_opinion(notched, rendered.truth_px, pitch, nowhere, [ring]).bare is None
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.3])
+def test_a_seam_between_two_blocks_is_seen_with_its_place(apart: float) -> None:
+    rendered = scene_of("undisturbed", 95_100_001)
+    ring, pitch = rendered.truth_px.exterior, rendered.pitch_px
+    middle = round(float(ring[:, 0].mean()))
+    both = rendered.picture.copy()
+    down, right = round(0.4 * pitch), round((2.4 + apart) * pitch)
+    both[down:, middle:] = np.roll(rendered.picture, right, axis=1)[:-down, middle:]
+    both[:, middle : middle + round(apart * pitch)] = 0
+    beyond = ring[:, 0] > middle
+    outline = Contour(ring + np.where(beyond[:, None], [right, down], 0))
+    seam = second_opinion(both, outline, pitch, nowhere).seam
+    assert seam is not None
+    assert seam.place_px[0] == pytest.approx(middle, abs=pitch)
+    assert seam.pitches > 5.0

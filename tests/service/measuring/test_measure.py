@@ -344,6 +344,14 @@ def test_a_cable_no_wider_than_a_cell_over_the_edge_is_seen_by_a_second_opinion(
     assert measured(rendered, recipe=Recipe(number=1, name="default", network=False)).findings == ()
 
 
+def test_a_seam_between_two_blocks_that_no_wall_tells_is_seen_by_a_second_opinion() -> None:
+    rendered = render(shop_floor_scene("pushed_together", 7_100_005).scene)
+    seen = measured(rendered)
+    assert seen.reasons == (Reason.SEVERAL_BLOCKS,)
+    assert seen.findings[0][1].startswith("A seam of")
+    assert measured(rendered, recipe=Recipe(number=1, name="default", network=False)).findings == ()
+
+
 def test_what_lies_over_an_edge_shows_in_the_picture_beside_what_a_network_draws(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from benchmarks.segmentation.examples import Example
+from benchmarks.segmentation.examples import SEAM_PITCHES, Example
 from benchmarks.segmentation.patterns import lay, noise, pattern
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
 from contour.image.opencv import grey
@@ -18,8 +18,8 @@ SIZE = 192
 _SURE = 0.9
 # So many are made of two parts, as of two blocks; and so many of the others of a seam lie about it.
 _JOINED, _AT_SEAM = 0.18, 0.4
-# Of those of two parts, so many have one on the other, and so many a splice between them. What is seam.
-_STACKED, _GLUED, _BESIDE = 0.15, 0.35, 0.55
+# Of those of two parts, so many have one on the other, and so many a splice between them.
+_STACKED, _GLUED = 0.15, 0.35
 
 
 class Crop(NamedTuple):
@@ -50,10 +50,8 @@ def crop(one: Example, rng: np.random.Generator) -> Crop:
     if rng.random() < 0.25:
         light = _with_flanks(light, comb * (1.0 - thing), rng)
     if rng.random() < 0.1:
-        light = light * (
-            1.0
-            - np.float32(rng.uniform(-0.3, 0.5)) * np.clip(0.5 + _line(rng) / float(rng.uniform(1.0, 10.0)), 0.0, 1.0)
-        )
+        shade = np.float32(rng.uniform(-0.3, 0.5))
+        light = light * (1.0 - shade * np.clip(0.5 + _line(rng) / float(rng.uniform(1.0, 10.0)), 0.0, 1.0))
     if rng.random() < 0.2:
         light, thing = _covered(light, thing, rng)
     light = (_seen(light, rng) - np.float32(one.mean)) / np.float32(one.spread)
@@ -125,9 +123,7 @@ def _joined(one: Example, rng: np.random.Generator) -> tuple[Float32s, list[Floa
     off, how = _line(rng), rng.random()
     if how < _STACKED:
         through = np.minimum(first[0], second[0]) if one.dark else np.maximum(first[0], second[0])
-        stacked = first[0], [*first[1][:3], np.zeros_like(off)]
-        first = np.asarray(through, np.float32), second[1]
-        second = stacked
+        first, second = (np.asarray(through, np.float32), second[1]), (first[0], [*first[1][:3], np.zeros_like(off)])
     glued = how > 1.0 - _GLUED
     gap = (float(rng.uniform(0.2, 1.6 if glued else 1.0)) * (glued or rng.random() < 0.7)) * PITCH_PX
     both = np.minimum(*(cv2.blur(part[1][1], (9, 9)) for part in (first, second))) > 0.3
@@ -142,7 +138,7 @@ def _joined(one: Example, rng: np.random.Generator) -> tuple[Float32s, list[Floa
         comb = np.maximum(comb, between)
     else:
         fill = quantile(first[0], rng.uniform(0.0, 0.3) if rng.random() < 0.6 else rng.uniform(0.3, 1.0))
-        seam = np.maximum(seam, (np.abs(off) < max(_BESIDE * PITCH_PX, 0.5 * gap)) & both)
+        seam = np.maximum(seam, (np.abs(off) < max(SEAM_PITCHES * PITCH_PX, 0.5 * gap)) & both)
     light = sides[0] * first[0] + sides[1] * second[0] + between * fill
     return np.asarray(light, np.float32), [np.asarray(part, np.float32) for part in (wall, comb, thing, seam)]
 
@@ -169,16 +165,17 @@ def _crushed(light: Float32s, shares: list[Float32s], rng: np.random.Generator) 
     off, wide = _line(rng), float(rng.uniform(0.5, 1.5)) * PITCH_PX
     y, x = np.mgrid[:SIZE, :SIZE].astype(np.float32)
     rough = 1.0 + 0.5 * noise(rng, SIZE, float(rng.uniform(4.0, 16.0)))
-    push = np.asarray(rng.uniform(-0.5, 0.5) * off * np.exp(-((off / wide) ** 2)) * rough, np.float32)
+    row = np.exp(-((off / wide) ** 2))
+    push = np.asarray(rng.uniform(-0.5, 0.5) * off * row * rough, np.float32)
     across_y, across_x = np.gradient(off)
-    aside = np.float32(rng.uniform(0.0, 0.2) * PITCH_PX) * np.exp(-((off / wide) ** 2)).astype(np.float32)
+    aside = np.float32(rng.uniform(0.0, 0.2) * PITCH_PX) * row
     to_x = (x + push * across_x + aside * noise(rng, SIZE, 6.0)).astype(np.float32)
     to_y = (y + push * across_y + aside * noise(rng, SIZE, 6.0)).astype(np.float32)
     light, *shares = (
         np.asarray(cv2.remap(plane, to_x, to_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT), np.float32)
         for plane in (light, *shares)
     )
-    shade = 1.0 + np.float32(rng.uniform(-0.4, 0.3)) * np.exp(-((off / wide) ** 2)) * shares[1]
+    shade = 1.0 + np.float32(rng.uniform(-0.4, 0.3)) * row * shares[1]
     return np.asarray(light * shade, np.float32), shares
 
 
@@ -256,10 +253,11 @@ def _on_other_table(
 def _with_flanks(light: Float32s, comb: Float32s, rng: np.random.Generator) -> Float32s:
     """As seen from aside: beyond the block's edge the walls that end there, down to the table, as deep as a cell."""
     turn, shade = float(rng.uniform(0.0, 2.0 * math.pi)), np.float32(rng.uniform(0.4, 1.0))
-    flank, seen = light * comb, comb
+    within = light * comb
+    flank, seen = within, comb
     for deep in range(1, round(float(rng.uniform(0.15, 1.1)) * PITCH_PX)):
         down = np.array([[1.0, 0.0, deep * math.cos(turn)], [0.0, 1.0, deep * math.sin(turn)]])
-        lower, there = (cv2.warpAffine(plane, down, (SIZE, SIZE)) for plane in (light * comb, comb))
+        lower, there = (cv2.warpAffine(plane, down, (SIZE, SIZE)) for plane in (within, comb))
         more = np.maximum(there - seen, 0.0)
         flank, seen = flank + shade * lower * more / np.maximum(there, 1e-3), np.maximum(seen, there)
     return np.asarray(light * (1.0 - seen) + flank, np.float32)

@@ -30,7 +30,7 @@ _OTHERS = (
 )
 KINDS = (*_STRUCTURED * 3, *_OTHERS)
 # So many are two blocks, or a block and an offcut, that lie against each other. Within so many pitches of both is seam.
-_TOGETHER, _BESIDE = 0.2, 0.55
+_TOGETHER, SEAM_PITCHES = 0.2, 0.55
 _OWN_TOGETHER, _OTHERS_TOGETHER = ("pushed_together", "pushed_together", "offcut"), ("pair", "pair", "offcut")
 # So many are drawn by another hand; and so many of the things that lie over an edge do so on a table with structure.
 _BY_ANOTHER, _ON_STRUCTURED = 0.5, 0.5
@@ -42,8 +42,7 @@ _OTHER_THINGS = ("tape", "clamp", "hand", "cable")
 class Example:
     """A picture, (h, w) or (h, w, 3), uint8, with cells of about `PITCH_PX`, and how much of each pixel is the top of a
     wall, of a block, of a thing over it, and of a seam between two blocks, 255 all, (h, w), uint8. mean, spread: of its
-    light. dark: whether walls
-    are darker than what lies between them.
+    light. dark: whether walls are darker than what lies between them.
     """
 
     picture: Bytes
@@ -76,7 +75,7 @@ def example(seed: int) -> Example:
 
 def _seam_between(pieces: Sequence[Bytes]) -> Bytes:
     """255 where two pieces, 255 each in (h, w), with cells of `PITCH_PX` lie against each other."""
-    beside = [within((piece > 127).astype(np.uint8), _BESIDE * PITCH_PX) for piece in pieces]
+    beside = [within((piece > 127).astype(np.uint8), SEAM_PITCHES * PITCH_PX) for piece in pieces]
     return np.where(np.add.reduce(beside) > 1, np.uint8(255), np.uint8(0))
 
 

@@ -250,11 +250,12 @@ def _left_out(beyond: Doubt, pitch_px: float) -> Finding:
 
 def _lies_over(over: Doubt, pitch_px: float) -> Finding:
     (x, y), long = over.place_px, over.pitches
-    return Finding(
+    return _finding_at(
         Refusal.EDGE_COVERED,
+        (x, y),
+        SHOWN_PITCHES * pitch_px,
         f"Something seems to lie over {long:.1f} cells of the block's edge near ({x:.0f}, {y:.0f}) px, or glare to "
         "hide it. Look at the overlay; clear the edge, and check the light.",
-        (around(x, y, SHOWN_PITCHES * pitch_px),),
     )
 
 
@@ -271,18 +272,24 @@ def _no_cells(long: float, place_px: tuple[float, float], shown_px: float) -> Fi
 
 def _seam(seam: Doubt, pitch_px: float) -> Finding:
     (x, y), long = seam.place_px, seam.pitches
-    return Finding(
+    return _finding_at(
         Refusal.SEVERAL_BLOCKS,
+        (x, y),
+        SHOWN_PITCHES * pitch_px,
         f"A seam of {long:.0f} cells seems to run through the block near ({x:.0f}, {y:.0f}) px, as between two that "
         "lie against each other. Look at the overlay; leave one on the table, or more than a cell between them, or set "
         "max_disagreement_pitches: 0 for blocks with such a seam.",
-        (around(x, y, SHOWN_PITCHES * pitch_px),),
     )
 
 
 def _disagreement_at(place_px: tuple[float, float], shown_px: float, text: str) -> Finding:
+    """Another account of the block at a place, pixels, that is shown so far around."""
+    return _finding_at(Refusal.METHODS_DISAGREE, place_px, shown_px, text)
+
+
+def _finding_at(refusal: Refusal, place_px: tuple[float, float], shown_px: float, text: str) -> Finding:
     """What speaks against a contour at a place, pixels, that is shown so far around."""
-    return Finding(Refusal.METHODS_DISAGREE, text, (around(*place_px, shown_px),))
+    return Finding(refusal, text, (around(*place_px, shown_px),))
 
 
 def vague(traced: Trace | None) -> Finding | None:

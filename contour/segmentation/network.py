@@ -39,33 +39,40 @@ class Segments:
 
 def segments(light: Bytes, pitch_px: float) -> Segments:
     """What the picture, (H, W), shows of cells of that pitch, at `PITCH_PX` a pitch, its sides multiples of 8."""
-    sized, told = _tell("comb.onnx", 3, light, PITCH_PX / pitch_px)
-    return Segments(sized, *told)
+    sized, even = _evened(light, PITCH_PX / pitch_px)
+    return Segments(sized, *_told("comb.onnx", 3, even))
 
 
 def comb_and_things(light: Bytes, pitch_px: float) -> Float32s:
     """How surely each pixel of the picture, (H, W), at `LIGHT_PITCH_PX` a pitch, its sides multiples of 8, is comb, and
     a thing over it, by the light network: 0…1, (2, h, w), float32.
     """
-    return _tell("comb_beyond.onnx", 2, light, LIGHT_PITCH_PX / pitch_px)[1]
+    return _told("comb_beyond.onnx", 2, _evened(light, LIGHT_PITCH_PX / pitch_px)[1])
 
 
-def seams(light: Bytes, pitch_px: float) -> tuple[Bytes, Float32s]:
-    """The picture at the light network's size, (h, w), uint8, and how surely each pixel of it is comb, a thing over it,
-    and a seam between two blocks, by one that was taught on from it: 0…1, (3, h, w), float32.
+def comb_things_and_seams(light: Bytes, pitch_px: float) -> tuple[Bytes, Float32s, Float32s]:
+    """The picture at the light network's size, (h, w), uint8, what that tells of it, and how surely each pixel is comb,
+    a thing over it, and a seam between two blocks, by one that was taught on from it: 0…1, (3, h, w), float32.
     """
-    return _tell("seams.onnx", 3, light, LIGHT_PITCH_PX / pitch_px)
+    sized, even = _evened(light, LIGHT_PITCH_PX / pitch_px)
+    return sized, _told("comb_beyond.onnx", 2, even), _told("seams.onnx", 3, even)
 
 
-def _tell(name: str, channels: int, light: Bytes, size: float) -> tuple[Bytes, Float32s]:
-    """The picture, (H, W), at so many times its size, its sides multiples of 8, (h, w), and what the network in that
-    file tells of each pixel of it, (channels, h, w), float32.
+def _evened(light: Bytes, size: float) -> tuple[Bytes, Float32s]:
+    """The picture, (H, W), at so many times its size, its sides multiples of 8, (h, w), as it is and of mean 0 and unit
+    spread.
     """
     shape = tuple(_HALVED * max(_HALVED, round(side * size / _HALVED)) for side in light.shape)
     sized = (shrunk_to if size < 1.0 else grown)(light, shape)
     even = sized.astype(np.float32)
     even -= even.mean()
     even /= max(float(even.std()), LEAST_SPREAD)
+    return sized, even
+
+
+def _told(name: str, channels: int, even: Float32s) -> Float32s:
+    """What the network in that file tells of each pixel of an evened picture, (h, w): (channels, h, w), float32."""
+    shape = even.shape
     # A net of OpenCV's holds what it computes, all layers of it: each thread has one of its own, for a tile at a time.
     network = cv2.dnn.readNetFromONNX(_network(name))
     told = np.empty((channels, *shape), np.float32)
@@ -77,7 +84,7 @@ def _tell(name: str, channels: int, light: Bytes, size: float) -> tuple[Bytes, F
             rows, columns = slice(top - above, top - above + _TILE_PX), slice(left - before, left - before + _TILE_PX)
             part = np.asarray(network.forward(), np.float32)[0, :, rows, columns]
             told[:, top : top + _TILE_PX, left : left + _TILE_PX] = part
-    return sized, told
+    return told
 
 
 @cache

@@ -13,7 +13,7 @@ from contour.geometry.rings import Contour
 from contour.image.opencv import box_mean, pieces_and_areas, pieces_of, within
 from contour.image.pixel_grid import fill_finely
 from contour.segmentation.glare import glare
-from contour.segmentation.network import LIGHT_PITCH_PX, comb_and_things, seams
+from contour.segmentation.network import LIGHT_PITCH_PX, comb_things_and_seams
 from contour.walls.lightness import wall_light
 
 _SURE = 0.5
@@ -84,21 +84,16 @@ def second_opinion(
     left, top = np.maximum(contour.exterior.min(axis=0) - around, 0.0).astype(int).tolist()
     right, bottom = np.ceil(contour.exterior.max(axis=0) + around).astype(int).tolist()
     part = np.ascontiguousarray(picture[top:bottom, left:right])
-    light = wall_light(part)
-    comb, thing = comb_and_things(light, pitch_px)
-    sized, (sure_comb, _, seam) = seams(light, pitch_px)
+    light, (comb, thing), (sure_comb, _, seam) = comb_things_and_seams(wall_light(part), pitch_px)
     grid = _Grid(np.array([left, top]), np.array(comb.shape[::-1]) / part.shape[1::-1])
     block = np.zeros(comb.shape, np.uint8)
     fill_finely(block, [grid.there(ring) for ring in contour.rings], 1)
+    deep, away = (np.asarray(cv2.distanceTransform(side, cv2.DIST_L2, 5), np.float32) for side in (block, 1 - block))
     known = _known(block.shape, [grid.there(path) for path in told])
     over = _over(block, thing, glare(part, block > 0, LIGHT_PITCH_PX), known, grid)
-    bare = _bare(block, sure_comb, sized, known, grid) if over is None else None
-    return SecondOpinion(
-        _beyond(block, comb, thing, loose, grid),
-        over,
-        bare,
-        _seam(block, sure_comb, seam, 255 - sized if dark else sized, grid),
-    )
+    bare = _bare(deep, away, sure_comb, light, known, grid) if over is None else None
+    parted = _seam(deep, sure_comb, seam, 255 - light if dark else light, grid)
+    return SecondOpinion(_beyond(block, away, comb, thing, loose, grid), over, bare, parted)
 
 
 class _Grid(NamedTuple):
@@ -117,12 +112,11 @@ class _Grid(NamedTuple):
 
 
 def _beyond(
-    block: Bytes, comb: Float32s, thing: Float32s, loose: Callable[[Float64s], Bools], grid: _Grid
+    block: Bytes, away: Float32s, comb: Float32s, thing: Float32s, loose: Callable[[Float64s], Bools], grid: _Grid
 ) -> Doubt | None:
     """How far comb reaches beyond the block, and where it reaches farthest in the first piece that reaches too far."""
     beyond = ((comb > _SURE) & (block == 0)).astype(np.uint8)
     beyond = np.asarray(cv2.morphologyEx(beyond, cv2.MORPH_OPEN, np.ones((_LEAST_PX, _LEAST_PX), np.uint8)), np.uint8)
-    away = np.asarray(cv2.distanceTransform(1 - block, cv2.DIST_L2, 5), np.float32)
     count, pieces = pieces_of(beyond, 8)
     rows, columns = np.nonzero(beyond)
     places = grid.back(np.column_stack((columns, rows)).astype(np.float64))
@@ -156,20 +150,19 @@ def _over(block: Bytes, thing: Float32s, blinds: Bools, known: Bools, grid: _Gri
     return _longest(lies & ~known, _DEEP, _LONG, grid)
 
 
-def _bare(block: Bytes, comb: Float32s, light: Bytes, known: Bools, grid: _Grid) -> Doubt | None:
+def _bare(deep: Float32s, away: Float32s, comb: Float32s, light: Bytes, known: Bools, grid: _Grid) -> Doubt | None:
     """The longest part of the edge within which there are no cells, and that is as light within as beyond: compound
     that was cut with the block ends there.
     """
-    none = ((block > 0) & (comb < _NO_COMB)).astype(np.uint8)
+    none = ((deep > 0.0) & (comb < _NO_COMB)).astype(np.uint8)
     wide = np.ones((_LEAST_WIDE_PX, _LEAST_WIDE_PX), np.uint8)
     none = np.asarray(cv2.morphologyEx(none, cv2.MORPH_OPEN, wide), np.uint8)
-    deep, away = (np.asarray(cv2.distanceTransform(part, cv2.DIST_L2, 5), np.float32) for part in (block, 1 - block))
     near, far = (share * LIGHT_PITCH_PX for share in _WITHIN)
     bare = (none > 0) & (deep > near) & (deep < far) & ~known
     if not bare.any():
         return None
     step = np.abs(_light_of(light, bare) - _light_of(light, (away > near) & (away < far)))
-    bare &= step < _ALIKE * float(np.ptp(np.quantile(light[block > 0], _CONTRAST)))
+    bare &= step < _ALIKE * float(np.ptp(np.quantile(light[deep > 0.0], _CONTRAST)))
     return _longest(bare, _WITHIN[1] - _WITHIN[0], _LONG_BARE, grid)
 
 
@@ -191,14 +184,14 @@ def _longest(part: Bools, wide: float, least: float, grid: _Grid) -> Doubt | Non
     return Doubt(long, (x, y))
 
 
-def _seam(block: Bytes, comb: Float32s, seam: Float32s, light: Bytes, grid: _Grid) -> Doubt | None:
+def _seam(deep: Float32s, comb: Float32s, seam: Float32s, light: Bytes, grid: _Grid) -> Doubt | None:
     """The longest part of a seam that parts the block, well within its outline, into pieces of many cells, and is no
     lighter than these: adhesive in a splice is, and a row of cells that were pressed together.
     """
-    inner = np.asarray(cv2.distanceTransform(block, cv2.DIST_L2, 5), np.float32) > _INNER * LIGHT_PITCH_PX
-    line = (block > 0) & (seam > _SURE)
-    if not line.any() or _fills(block, comb, line, light):
+    line = (deep > 0.0) & (seam > _SURE)
+    if not line.any() or _fills(deep > 0.0, comb, line, light):
         return None
+    inner = deep > _INNER * LIGHT_PITCH_PX
     rest = inner & (within(line, _LINK * LIGHT_PITCH_PX) == 0)
     count, whole = pieces_of(inner.astype(np.uint8), 8)
     pieces, areas = pieces_and_areas(rest.astype(np.uint8), 8)
@@ -214,11 +207,11 @@ def _seam(block: Bytes, comb: Float32s, seam: Float32s, light: Bytes, grid: _Gri
     return Doubt(float(np.hypot(np.ptp(rows), np.ptp(columns))) / LIGHT_PITCH_PX, (x, y))
 
 
-def _fills(block: Bytes, comb: Float32s, line: Bools, light: Bytes) -> bool:
+def _fills(block: Bools, comb: Float32s, line: Bools, light: Bytes) -> bool:
     """Whether more of a seam is as light as walls than of the comb beside it."""
     middle = cv2.erode(line.astype(np.uint8), np.ones((_RIMS_PX, _RIMS_PX), np.uint8)) > 0
     near, far = (within(line, pitches * LIGHT_PITCH_PX) > 0 for pitches in _BESIDE_SEAM)
-    beside = far & ~near & (block > 0) & (comb > _SURE)
+    beside = far & ~near & block & (comb > _SURE)
     if not (middle.any() and beside.any()):
         return False
     wall = float(np.mean(np.quantile(light[beside], (0.1, 0.9))))

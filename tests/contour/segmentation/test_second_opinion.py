@@ -33,6 +33,13 @@ def test_nothing_speaks_against_the_true_outline(kind: str) -> None:
     assert second_opinion(rendered.picture, rendered.truth_px, rendered.pitch_px, nowhere) == (None, None, None, None)
 
 
+def test_compound_at_the_edge_is_no_comb_and_nothing_else_speaks_against_it() -> None:
+    rendered = scene_of("compound", 95_100_001)
+    picture, truth, pitch = rendered.picture, rendered.truth_px, rendered.pitch_px
+    assert second_opinion(picture, truth, pitch, nowhere)._replace(bare=None) == (None, None, None, None)
+    assert second_opinion(picture, truth, pitch, nowhere, truth.rings) == (None, None, None, None)
+
+
 @pytest.mark.parametrize(("kind", "seed"), [("tape", 95_100_005), ("hand_or_cable", 95_100_006)])
 def test_a_thing_over_the_edge_is_seen_with_its_place_unless_it_is_known(kind: str, seed: int) -> None:
     rendered = scene_of(kind, seed)

@@ -31,7 +31,7 @@ from contour.synthetic import Rendered, render, render_empty_table
 from service.config.recipes import Recipe
 from service.measuring.measure import Measurer
 from service.measuring.table_file import TableRecord
-from tests.support.scenes.shop_floor_scenes import GUARDS, KINDS, LATER, ShopFloorScene, shop_floor_scene
+from tests.support.scenes.shop_floor_scenes import GUARDS, KINDS, LATER, STRUCTURED, ShopFloorScene, shop_floor_scene
 from tests.support.scenes.trials import calibration_for
 
 FIRST = 500_000
@@ -40,7 +40,6 @@ SPACING_PX = 1.0
 TAUGHT_FROM = 4
 RECIPE = Recipe(number=1, name="default", min_area_mm2=0.0)
 """It says nothing: with it nothing hidden is bridged."""
-STRUCTURED = ("light_table", "wood", "brushed", "slots", "old_cuts")
 TRUE, HIDDEN, FOUND = (80, 220, 60), (0, 200, 255), (60, 60, 255)
 
 _SAID = """\

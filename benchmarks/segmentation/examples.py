@@ -19,16 +19,15 @@ from contour.synthetic import Strip, area_coverage, render, truth_px
 from contour.synthetic.rendering import tops
 from contour.synthetic.shop_floor.covers import cover_areas
 from tests.support.scenes.shop_floor_scenes import KINDS as SHOP_FLOOR
-from tests.support.scenes.shop_floor_scenes import shop_floor_scene
+from tests.support.scenes.shop_floor_scenes import STRUCTURED, shop_floor_scene
 
 # By how much cells are larger or smaller than those that the network is asked about.
 _APART = 0.2
-_STRUCTURED = ("light_table", "wood", "brushed", "slots", "old_cuts")
 _OTHERS = (
     *("undisturbed", "tape", "hand_or_cable", "clamp", "compound", "writing", "splice", "swarf", "dust", "jpeg"),
     *("row_noise", "motion", "defocus", "glare", "shadow", "crushed", "fading", "dim", "mirror", "gamma", "coloured"),
 )
-KINDS = (*_STRUCTURED * 3, *_OTHERS)
+KINDS = (*STRUCTURED * 3, *_OTHERS)
 # So many are two blocks, or a block and an offcut, that lie against each other. Within so many pitches of both is seam.
 _TOGETHER, SEAM_PITCHES = 0.2, 0.55
 _OWN_TOGETHER, _OTHERS_TOGETHER = ("pushed_together", "pushed_together", "offcut"), ("pair", "pair", "offcut")
@@ -91,7 +90,7 @@ class _Drawn(NamedTuple):
 
 def _own(rng: np.random.Generator, seed: int) -> _Drawn:
     kind = str(rng.choice(_OWN_TOGETHER if rng.random() < _TOGETHER else KINDS))
-    over = kind in _STRUCTURED and rng.random() < _ON_STRUCTURED
+    over = kind in STRUCTURED and rng.random() < _ON_STRUCTURED
     scene = shop_floor_scene(kind, seed, alone=over).scene
     if over:
         scene = SHOP_FLOOR[str(rng.choice(_THINGS))](rng, scene)
@@ -110,7 +109,7 @@ def _own(rng: np.random.Generator, seed: int) -> _Drawn:
 
 def _by_another(rng: np.random.Generator, seed: int) -> _Drawn:
     kind = str(rng.choice(_OTHERS_TOGETHER if rng.random() < _TOGETHER else OTHER_KINDS))
-    on = str(rng.choice(_STRUCTURED)) if kind in _OTHER_THINGS and rng.random() < _ON_STRUCTURED else None
+    on = str(rng.choice(STRUCTURED)) if kind in _OTHER_THINGS and rng.random() < _ON_STRUCTURED else None
     one = other_scene(kind, seed, on)
     wall, thing, *pieces = (np.asarray(part, np.float32) for part in (one.walls, one.hidden, *one.pieces))
     return _Drawn(one.picture, one.pitch_px, wall, pieces, thing)

@@ -60,7 +60,10 @@ LATER: dict[str, light.Drawn] = {
 }
 """Kinds that were thought of later: never a second kind, so that all other scenes stay what they were."""
 
-_LIGHT = {"gamma", "blown_out", "dim", "coloured", "light_table", "wood", "brushed", "slots", "old_cuts", *GUARDS}
+STRUCTURED = ("light_table", "wood", "brushed", "slots", "old_cuts")
+"""Kinds in which the table is no plain dark one."""
+
+_LIGHT = {"gamma", "blown_out", "dim", "coloured", *STRUCTURED, *GUARDS}
 """Kinds that change in what light and on what table other things are seen: they come first, for levels to be drawn."""
 
 
@@ -94,6 +97,6 @@ def _alike(kind: str) -> set[str]:
     groups = (
         {"dim", "blown_out", "gamma"},
         {"motion", "motion_far", "defocus"},
-        {"light_table", "wood", "brushed", "slots", "old_cuts", "mirror", *GUARDS},
+        {*STRUCTURED, "mirror", *GUARDS},
     )
     return {"undisturbed", kind}.union(*(group for group in groups if kind in group))

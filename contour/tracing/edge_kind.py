@@ -45,6 +45,9 @@ _ALONG_PITCHES = 0.12
 # than to floors'. On tables as light as they a right border has 0.92, and cells that were cut open, whose floors alone
 # differ from the table, 0.75 at most.
 _LINED, _STEPS_INTO_WALL, _NORMAL_PITCHES = 0.85, 6, 0.2
+# Between corners that turn by more than this an outline around closed triangles follows whole walls, straight within so
+# much of one; blunt tips of teeth are shorter. Of 120 closed borders none has so many parts between these lengths.
+_TURN_DEG, _STRAIGHT, _CUT_WALL, _FEWEST_CUT = 40.0, 0.12, (0.32, 0.6), 3
 # Of a triangle over the pitch of a hexagon as large.
 _TRIANGLE_SIDE = math.sqrt(2.0)
 
@@ -99,6 +102,22 @@ def side_px(seen: BlockEvidence) -> float:
 def tooth_px(seen: BlockEvidence) -> float:
     """How deep the teeth of closed cells are: of triangles as deep as these are high, pixels; 0 of other cells."""
     return math.sqrt(0.75) * side_px(seen) if _triangular(seen) else 0.0
+
+
+def teeth_cut(exterior: Ring, seen: BlockEvidence) -> bool:
+    """Whether an outline around closed triangles, pixels, has parts between corners that are no whole walls: it was cut
+    there.
+    """
+    if not _triangular(seen):
+        return False
+    side = side_px(seen)
+    corners = cv2.approxPolyDP(exterior.astype(np.float32), _STRAIGHT * side, True)[:, 0].astype(np.float64)
+    parts = np.roll(corners, -1, axis=0) - corners
+    ways = parts[:, 0] + 1j * parts[:, 1]
+    turns = np.abs(np.angle(ways / np.roll(ways, 1), deg=True)) > _TURN_DEG
+    least, most = _CUT_WALL
+    cut = turns & np.roll(turns, -1) & (np.abs(ways) > least * side) & (np.abs(ways) < most * side)
+    return bool(np.count_nonzero(cut) >= _FEWEST_CUT)
 
 
 def _triangular(seen: BlockEvidence) -> bool:

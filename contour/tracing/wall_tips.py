@@ -36,6 +36,7 @@ from contour.tracing.edge_kind import (
     edge_kind,
     lined_by_walls,
     may_be_closed,
+    teeth_cut,
     tooth_px,
 )
 from contour.tracing.evidence_check import (
@@ -451,6 +452,8 @@ def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
     else:
         touched = [] if kind == "cut" else _touched(solid, material, seen)
         closed = kind == "cells" and not touched
+        if closed and teeth_cut(material.contour.exterior, seen):
+            return None, "mixed"
         if touched:
             # It may be cut on all sides, and what few ends are sure lie on others than are touched.
             kind = edge_kind(material, seen, touched)

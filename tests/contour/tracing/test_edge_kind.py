@@ -199,6 +199,11 @@ def test_a_cut_that_ends_in_a_sliver_of_a_wall_is_refused() -> None:
         traced(lattice(1204005, "triangular", "mixed"))
 
 
+def test_triangles_that_a_cut_opened_are_not_traced_as_closed_ones() -> None:
+    with pytest.raises(EdgeContradicted, match="walls end along a part"):
+        traced(lattice(4460009, "triangular", "mixed"))
+
+
 def test_such_a_cut_runs_to_the_last_thing_that_touches_its_line() -> None:
     one = lattice(1051322, "over-expanded", "mixed")
     found = wall_tips(smaller(one, 12.0), TraceSettings())

@@ -52,8 +52,8 @@ def crop(one: Example, rng: np.random.Generator) -> Crop:
     if rng.random() < 0.1:
         shade = np.float32(rng.uniform(-0.3, 0.5))
         light = light * (1.0 - shade * np.clip(0.5 + _line(rng) / float(rng.uniform(1.0, 10.0)), 0.0, 1.0))
-    if rng.random() < 0.2:
-        light, thing = _covered(light, thing, rng)
+    if rng.random() < 0.35:
+        light, thing = _covered(light, comb, thing, rng)
     light = (_seen(light, rng) - np.float32(one.mean)) / np.float32(one.spread)
     light = light * np.float32(math.exp(rng.uniform(-0.4, 0.4))) + np.float32(rng.uniform(-0.5, 0.5))
     if rng.random() < 0.08:
@@ -188,7 +188,7 @@ def _line(rng: np.random.Generator) -> Float32s:
     return np.asarray(off + wave - rng.uniform(-0.3, 0.3) * SIZE, np.float32)
 
 
-def _places(comb: Bytes, which: float) -> Bools:
+def _places(comb: Bytes | Float32s, which: float) -> Bools:
     """Seven of ten times the outline, else comb, or all else."""
     if which < 0.7:
         return cv2.morphologyEx(comb, cv2.MORPH_GRADIENT, np.ones((3, 3), np.uint8)) > 100
@@ -263,23 +263,78 @@ def _with_flanks(light: Float32s, comb: Float32s, rng: np.random.Generator) -> F
     return np.asarray(light * (1.0 - seen) + flank, np.float32)
 
 
-def _covered(light: Float32s, thing: Float32s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
-    """Beneath a strip or something with corners, half of them with a shadow."""
-    middle, mask = rng.uniform(0.0, SIZE, 2), np.zeros((SIZE, SIZE), np.uint8)
-    if rng.random() < 0.6:
-        size = float(rng.uniform(20.0, 200.0)), float(rng.uniform(8.0, 50.0))
-        corners = cv2.boxPoints((middle.tolist(), size, float(rng.uniform(0.0, 180.0))))
-    else:
-        corners = middle + rng.uniform(-50.0, 50.0, (6, 2))
-    lay(mask, corners, 255)
-    over = mask.astype(np.float32) / np.float32(255.0)
+def _covered(light: Float32s, comb: Float32s, thing: Float32s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
+    """Beneath something, mostly about the outline, half of them with a shadow; a few are clear, as some tapes are."""
+    edge = _places(comb[::4, ::4] * np.float32(255.0), 0.0)
+    about = edge.any() and rng.random() < 0.6
+    middle = _place(edge, rng) if about else rng.uniform(0.0, SIZE, 2)
+    over, across = _THINGS[int(rng.integers(len(_THINGS)))](middle, rng)
     if rng.random() < 0.5:
         away = tuple(rng.integers(-5, 6, 2).tolist())
         cast = np.roll(cv2.GaussianBlur(over, (0, 0), float(rng.uniform(1.0, 5.0))), away, (0, 1))
         light = light * (1.0 - np.float32(rng.uniform(0.1, 0.6)) * cast)
     printed = rng.uniform(0.0, 0.25 if rng.random() < 0.7 else 0.8) * (rng.random() < 0.8)
     body = np.float32(rng.uniform(15.0, 240.0)) * (1.0 + np.float32(printed) * pattern(rng, SIZE))
-    return np.asarray(light * (1.0 - over) + body * over, np.float32), np.maximum(thing, over)
+    body = body * (1.0 + np.float32(rng.uniform(-0.6, 0.6)) * across)
+    if rng.random() < 0.3:
+        body = body + np.float32(rng.uniform(20.0, 160.0)) * np.exp(
+            -((across / np.float32(rng.uniform(0.1, 0.6))) ** 2)
+        )
+    dense = over * np.float32(1.0 if rng.random() < 0.85 else rng.uniform(0.4, 0.8))
+    return np.asarray(light * (1.0 - dense) + body * dense, np.float32), np.maximum(thing, over)
+
+
+def _strip(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
+    """A strip, and how far to one of its sides a place lies, −1…1."""
+    size = float(rng.uniform(20.0, 200.0)), float(rng.uniform(8.0, 50.0))
+    mask = np.zeros((SIZE, SIZE), np.uint8)
+    lay(mask, cv2.boxPoints((middle.tolist(), size, float(rng.uniform(0.0, 180.0)))), 255)
+    return _share(mask), _slope(rng)
+
+
+def _cornered(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
+    mask = np.zeros((SIZE, SIZE), np.uint8)
+    lay(mask, middle + rng.uniform(-50.0, 50.0, (6, 2)), 255)
+    return _share(mask), _slope(rng)
+
+
+def _disc(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
+    """A disc, mostly not round, as weights are, and how far from its middle a place lies."""
+    axes = rng.uniform(8.0, 60.0, 2)
+    axes[1] = axes[0] if rng.random() < 0.5 else axes[1]
+    mask = np.zeros((SIZE, SIZE), np.uint8)
+    turn = float(rng.uniform(0.0, 180.0))
+    cv2.ellipse(mask, (middle * 8).astype(int).tolist(), (axes * 8).astype(int).tolist(), turn, 0, 360, 255, -1, 16, 3)
+    y, x = np.mgrid[:SIZE, :SIZE]
+    away = np.hypot(x - middle[0], y - middle[1]) / axes.max()
+    return _share(mask), np.clip(away - rng.uniform(0.0, 0.5), -1.0, 1.0).astype(np.float32)
+
+
+def _rod(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
+    """A cable, a finger or a tool: as wide all along, bent or straight, and how far from its middle a place lies."""
+    wide = math.exp(rng.uniform(math.log(2.0), math.log(50.0)))
+    turn, bend = rng.uniform(0.0, 2.0 * math.pi), rng.normal(0.0, 0.012) * (rng.random() < 0.7)
+    steps = np.arange(0.0, float(rng.uniform(30.0, 300.0)), 2.0)
+    turns = turn + bend * steps + rng.uniform(0.0, 0.6) * np.sin(steps / rng.uniform(15.0, 60.0))
+    path = 2.0 * np.cumsum(np.column_stack((np.cos(turns), np.sin(turns))), axis=0)
+    path += middle - path[int(rng.integers(len(path)))]
+    line = np.full((SIZE, SIZE), 255, np.uint8)
+    cv2.polylines(line, [np.rint(path * 8).astype(np.int32)], False, 0, 1, cv2.LINE_8, 3)
+    off = np.minimum(cv2.distanceTransform(line, cv2.DIST_L2, 5), np.float32(SIZE))
+    over = np.clip(0.5 * wide - off + 0.5, 0.0, 1.0).astype(np.float32)
+    return over, np.clip(2.0 * off / np.float32(wide), 0.0, 1.0).astype(np.float32)
+
+
+def _share(mask: Bytes) -> Float32s:
+    return mask.astype(np.float32) / np.float32(255.0)
+
+
+def _slope(rng: np.random.Generator) -> Float32s:
+    """What falls evenly over the part, −1…1."""
+    return np.clip(_line(rng) / np.float32(0.5 * SIZE), -1.0, 1.0)
+
+
+_THINGS = (_strip, _cornered, _disc, _rod, _rod)
 
 
 def _seen(light: Float32s, rng: np.random.Generator) -> Float32s:

@@ -15,8 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from contour.edge.ring_places import runs_of
 from contour.edge.table_light import table_light
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
+from contour.geometry.ring_lengths import RingLengths
 from contour.image import channels
 from contour.image.opencv import deep, pieces_and_boxes, pieces_of, within
 from contour.image.pixel_grid import drawn, fill, samples_of, whole_averaged
@@ -57,6 +59,8 @@ _HOLE_RIM, _HOLE_MIDDLE, _RIM_LIGHT, _SHADED_RIM, _BLOWN_OUT = (0.2, 0.5), (1.0,
 _BAND, _LONG_PITCHES = 0.55, 2.0
 # Where walls meet they are wider by half as much again than they are.
 _STROKE = 2.0
+# How far beyond an edge what lies against it is looked for, pitches.
+_JUST_BEYOND = (0.6, 1.0, 1.5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +143,16 @@ class TableLook:
     def hiding(self) -> Bytes:
         """The map of what is foreign and no shadow, with its own borders, uint8, 1 where it hides what lies beneath."""
         return np.asarray(cv2.dilate(self.lit.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
+
+    def lit_along(self, ring: RingEvidence) -> float:
+        """Along how much of a ring something foreign that is no shadow lies just beyond its witnesses, pixels."""
+        beyond = [ring.points + out * self.pitch_px * ring.normal for out in _JUST_BEYOND]
+        lies = np.any([self._at(self.lit, points) for points in beyond], axis=0)
+        length = RingLengths.of(ring.coarse).length
+        if lies.all():
+            return length
+        ends = (ring.position[run[[0, -1]]] for run in runs_of(lies))
+        return max((float((last - first) % length) for first, last in ends), default=0.0)
 
     def fills(self, hole: RingEvidence) -> bool:
         """Whether a hole is none: most of it is foreign, lighter than the table ever is in a block's shade, and nearly

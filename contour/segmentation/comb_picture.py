@@ -8,12 +8,15 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes, median, quantile
+from contour.geometry.arrays import Bytes, Float32s, Float64s, median, quantile
 from contour.image.opencv import box_mean, grown, pieces_and_areas, shrunk_to, within
+from contour.image.pixel_sampling import sample_at
 from contour.segmentation.glare import glare
 from contour.segmentation.network import LIGHT_PITCH_PX, PITCH_PX, Segments, comb_and_things, segments
 from contour.walls.cell_scale import probe
+from contour.walls.dark_material import dark_beyond
 from contour.walls.lightness import wall_light
+from contour.walls.see_block import Source
 
 # Pitches that are tried: cells may be half or twice as large as it has learnt. The light network is asked first, of
 # large ones first, which cost least: a comb is a piece of so many cells, specks left out. One that takes so much of the
@@ -36,11 +39,16 @@ _BESIDE, _LIGHTER, _LIGHT, _NO_WALL = (0.5, 2.5), 0.75, 0.4, 0.15
 _CELL = math.sqrt(0.75)
 # Levels of black and, above it, of walls.
 _DARK, _WALL = 12.0, 230.0
+# What is surer than this is a wall, no place in a cell is so many pitches from one; and the sum of waves along walls.
+_SEEN_WALL, _ROOM, _ALONG_WALLS = 0.3, 0.65, -0.8
+# The border of comb is told every so many samples, across its slope over so many; shorter ones are specks.
+_BORDER_PX, _EVEN_PX, _SHORTEST_PX = 4, 2.0, 40
 
 
-def comb_picture(picture: Bytes, *, on_dark: bool = False) -> Bytes | None:
-    """The comb in a picture, grey (H, W) or BGR (H, W, 3), uint8: walls light, all else dark, (H, W), uint8. None where
-    no comb is seen, where something may lie over its edge and, unless `on_dark`, on a dark table.
+def comb_picture(picture: Bytes, *, on_dark: bool = False) -> tuple[Bytes, Source] | None:
+    """The comb in a picture, grey (H, W) or BGR (H, W, 3), uint8: walls light, all else dark, (H, W), uint8; and what
+    that was drawn from. None where no comb is seen, where something may lie over its edge and, unless `on_dark`, on a
+    dark table.
     """
     light = wall_light(picture)
     score, pitch_px, found = 0.0, 0.0, None
@@ -64,7 +72,8 @@ def comb_picture(picture: Bytes, *, on_dark: bool = False) -> Bytes | None:
     if _something_over(found, picture) or not (on_dark or _on_light_table(found)):
         return None
     drawn = _drawn(found)
-    return (grown if drawn.size < light.size else shrunk_to)(drawn, light.shape)
+    border = (_border(found.comb) + 0.5) * (np.array(light.shape[::-1]) / drawn.shape[::-1]) - 0.5
+    return (grown if drawn.size < light.size else shrunk_to)(drawn, light.shape), Source(picture, border)
 
 
 def _pitches(light: Bytes) -> list[float]:
@@ -116,6 +125,35 @@ def _something_over(seen: Segments, picture: Bytes) -> bool:
     return bool((edge & lies).any())
 
 
+def _border(comb: Float32s) -> Float64s:
+    """Where a map of how surely there is comb, (h, w), falls below half, (N, 2), samples."""
+    sure = np.rint(255.0 * comb).astype(np.uint8)
+    rings = cv2.findContours((comb > _SURE).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)[0]
+    every = [ring[::_BORDER_PX, 0] for ring in rings if len(ring) > _SHORTEST_PX]
+    points = np.concatenate([np.empty((0, 2)), *every])
+    even = cv2.GaussianBlur(sure.astype(np.float32), (0, 0), _EVEN_PX)
+    slopes = [np.asarray(cv2.Sobel(even, cv2.CV_32F, *axis), np.float32) for axis in ((1, 0), (0, 1))]
+    falls = -np.column_stack([sample_at(slope, points[:, 0], points[:, 1]) for slope in slopes])
+    outward = falls / np.maximum(np.hypot(falls[:, :1], falls[:, 1:]), 1e-6)
+    within = points - _EVEN_PX * outward
+    far = dark_beyond(np.asarray(255 - sure, np.uint8), within, outward, midway=127.5, reach=2.0 * _EVEN_PX)
+    found = np.isfinite(far) & (far > 0.0)
+    return np.asarray(within[found] + far[found, None] * outward[found], np.float64)
+
+
 def _drawn(seen: Segments) -> Bytes:
-    """What the network tells as a picture, (h, w), uint8."""
-    return (np.where(seen.comb > _SURE, _WALL * seen.wall, np.float32(0.0)) + _DARK).astype(np.uint8)
+    """What the network tells as a picture, (h, w), uint8; where walls don't show in comb, as in what fills cells, with
+    walls of its own.
+    """
+    comb = seen.comb > _SURE
+    bare = comb & (within(seen.wall > _SEEN_WALL, _ROOM * PITCH_PX) == 0)
+    filled = cv2.morphologyEx(bare.astype(np.uint8), cv2.MORPH_OPEN, np.ones((_SPECK_PX, _SPECK_PX), np.uint8)) > 0
+    wall = np.where(filled, _lattice(comb.shape), seen.wall) if filled.any() else seen.wall
+    return (np.where(comb, _WALL * wall, np.float32(0.0)) + _DARK).astype(np.uint8)
+
+
+def _lattice(shape: tuple[int, ...]) -> Float32s:
+    """Walls of a regular comb, 0 or 1, (h, w): three waves, whose sum is least along them."""
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float32) * np.float32(4.0 * math.pi / math.sqrt(3.0) / PITCH_PX)
+    waves = sum(np.cos(x * math.cos(turn) + y * math.sin(turn)) for turn in (0.0, math.pi / 3.0, 2.0 * math.pi / 3.0))
+    return np.asarray(waves < _ALONG_WALLS, np.float32)

@@ -22,6 +22,7 @@ from contour.tracing.paper_cells import FEWEST_CELLS, EnclosedCells
 from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
 from contour.walls.pieces import pieces_beside
+from contour.walls.see_block import Source
 
 
 def trace(
@@ -30,23 +31,22 @@ def trace(
     *,
     rectifier: Rectifier | None = None,
     relief: Relief | None = None,
-    taken: Bytes | None = None,
+    source: Source | None = None,
     on_stage: OnStage = lambda _name: None,
 ) -> Trace:
     """The block's contour in `picture` (shape (H, W) grey or (H, W, 3) BGR, uint8), in pixels.
 
     `on_stage` is called with "mask" and "trace" when each of these stages has ended. `rectifier`, where the lens is
     known, lets a method fit straight edges in undistorted coordinates; `relief` says that the picture is the difference
-    from a known table; `taken` is the picture as it was taken, where `picture` is drawn from it: what lies on the table
-    and over the edge shows there. Methods on pixel centres ignore all three. Raises PictureError, ParameterError,
-    NoBlockFound.
+    from a known table, `source` what it was drawn from. Methods on pixel centres ignore all three. Raises PictureError,
+    ParameterError, NoBlockFound.
     """
     check_picture(picture)
     picture = without_line_noise(picture)
     method = _METHODS.get(settings.method)
     if method is None:
         raise ParameterError(f"method is {settings.method!r}: expected one of {', '.join(_METHODS)}.")
-    found = method(picture, settings, rectifier=rectifier, relief=relief, taken=taken, on_stage=on_stage)
+    found = method(picture, settings, rectifier=rectifier, relief=relief, source=source, on_stage=on_stage)
     sure_px = bound_with_bridges(found.uncertainty_px, found.evidence or ())
     # As seen is y up: counter-clockwise then is clockwise by the formula, whose y runs down in pixels.
     contour = oriented_contour(found.contour, counter_clockwise=False)
@@ -61,7 +61,7 @@ class _MethodCall(Protocol):
         *,
         rectifier: Rectifier | None,
         relief: Relief | None,
-        taken: Bytes | None,
+        source: Source | None,
         on_stage: OnStage,
     ) -> Trace: ...
 
@@ -78,7 +78,7 @@ def _on_mask(contour_of: _FromMask) -> _MethodCall:
         *,
         rectifier: Rectifier | None,
         relief: Relief | None,
-        taken: Bytes | None,
+        source: Source | None,
         on_stage: OnStage,
     ) -> Trace:
         light = grey(picture)

@@ -21,6 +21,7 @@ from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.image.opencv import grey
 from contour.material.closed_cells import MaterialEdge, material_edge
+from contour.material.floor_edge import floor_edge
 from contour.material.foam import foam_edge
 from contour.outline.uncertainty import uncertainty
 from contour.relief.reach import reach
@@ -56,7 +57,7 @@ from contour.tracing.wide_lines import wide_line
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import Piece, pieces_beside, with_earlier
-from contour.walls.see_block import SeenWalls, see_block, see_walls, strong_walls
+from contour.walls.see_block import SeenWalls, Source, see_block, see_walls, strong_walls
 from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import wall_mask
 
@@ -70,6 +71,9 @@ _GROSS_PITCHES = 0.8
 _ON_EVEN_TABLE = 1.4
 # On a known table: of 490 right outlines none is reached by no wall over more than 2.1 pitches, which one is.
 _GAP_PITCHES = 2.5
+# Beside comb that a network tells, shadows and grain of a table look like things along fewer cells than that: of 38
+# right outlines three do along more. A sheet of paper, a weight in the block and a tape that it took for table did.
+_LIES_BESIDE = 4.0
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
 # What of a thing lay inside the block as it was first seen shows once the rest of it is known.
@@ -82,15 +86,16 @@ def wall_tips(
     *,
     rectifier: Rectifier | None = None,
     relief: Relief | None = None,
-    taken: Bytes | None = None,
+    source: Source | None = None,
     on_stage: OnStage = lambda _name: None,
 ) -> Trace:
     """The outline of the largest block in `picture`, grey (H, W) or BGR (H, W, 3), uint8, exterior and holes, in
     pixels.
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `relief`: of a
-    picture that is the difference from a known table. `taken`: the picture as it was taken, where `picture` is drawn
-    from it. `on_stage` hears "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound, EdgeContradicted.
+    picture that is the difference from a known table. `source`: what `picture` was drawn from; ends of its walls tell
+    nothing then. `on_stage` hears "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound,
+    EdgeContradicted.
     """
     if settings.binarize != "flat":
         raise ParameterError(
@@ -102,18 +107,21 @@ def wall_tips(
     solid = _Solid(picture, light, polarity, on_stage)
     if settings.edge == "cells":
         return solid.closed()
-    walls = replace(see_walls(picture, light, polarity, solid.cells), relief=relief)
+    walls = replace(see_walls(picture, light, polarity, solid.cells), relief=relief, source=source)
     if settings.least_rise is not None:
         walls = strong_walls(walls, settings.least_rise)
     foam = None if walls.cells.comb.cellular else solid.foam()
-    return foam or _of_comb(solid, walls, settings.edge, rectifier, taken)
+    found = foam or _of_comb(solid, walls, settings.edge, rectifier)
+    return found if source is None or found.untold_px else _told_of(found, source.picture)
 
 
-def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None, taken: Bytes | None) -> Trace:
+def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None) -> Trace:
     """The outline of a block of cells, or of a sheet with holes, whose border is `auto`, or promised to be `cut`."""
     light, on_stage = solid.light, solid.on_stage
     lit = solid.picture if walls.relief is None else walls.relief.lit
-    seen, look = looked_at(lit if taken is None else taken, walls, on_stage)
+    seen, look = looked_at(lit, walls, on_stage)
+    if walls.source is not None:
+        _check_beyond(walls.source.picture, seen)
     plate = _plate(solid, seen) if promise == "auto" else None
     if isinstance(plate, Trace):
         return plate
@@ -150,6 +158,22 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
             error.edge = "cut"
             raise
         return closed
+
+
+def _check_beyond(picture: Bytes, seen: BlockEvidence) -> None:
+    """Raise NoBlockFound where the picture that comb was drawn from shows something beside it that is no table."""
+    look = table_look(picture, seen)
+    long = max(look.lit_along(ring) for ring in seen.rings) / seen.pitch_px
+    if long > _LIES_BESIDE:
+        raise NoBlockFound(f"no block found: along {long:.0f} cells of what looks like comb something lies beside it")
+
+
+def _told_of(found: Trace, picture: Bytes) -> Trace:
+    """The trace with a place where the picture that comb was drawn from shows floors beyond a rounding, if it does."""
+    light, pitch_px = wall_light(picture), found.pitch_px or 0.0
+    sides = [(ring[::-1], bright) for ring in found.contour.rings for bright in (True, False)]
+    floors = (floor_edge(light, ring, pitch_px, bright=bright) for ring, bright in sides)
+    return replace(found, untold_px=_first(one.places[one.beyond] for one in floors))
 
 
 def _wide(found: Trace, walls: SeenWalls) -> EdgePart | None:

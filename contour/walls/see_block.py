@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Bytes
+from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.image.pixel_grid import averaged, coarse_step, pixels_of
 from contour.relief.relief import Relief
 from contour.walls.cell_scale import CellScale, probe
@@ -21,7 +22,7 @@ from contour.walls.lightness import light_from_table
 from contour.walls.pieces import pieces_beside, without_loose_pieces
 from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import FINE_PITCH, WallMask, light_beside_walls, wall_mask, without_specks
-from contour.walls.wall_witnesses import block_evidence
+from contour.walls.wall_witnesses import block_evidence, border_evidence
 
 # Noise alone reaches a score of 0.18.
 _ORDERLY = 0.35
@@ -38,11 +39,20 @@ _GLARE = 1.5
 _STRANDS_PITCHES = 5.0
 
 
+class Source(NamedTuple):
+    """The picture that another one was drawn from, grey (H, W) or BGR (H, W, 3), uint8, and where its comb ends, some
+    four places a pitch, (N, 2), pixels.
+    """
+
+    picture: Bytes
+    border: Float64s
+
+
 @dataclass(frozen=True, eq=False)
 class SeenWalls:
     """Walls of a picture, whatever hides them: the light they were seen in, (H, W), and the same `scale` times smaller,
     their cells, and their mask in the smaller one. `relief`: how they stand out of a table that is known; `strong`:
-    without fainter ones.
+    without fainter ones; `source`: what the light was drawn from.
     """
 
     light: Bytes
@@ -52,6 +62,7 @@ class SeenWalls:
     mask: WallMask
     relief: Relief | None = None
     strong: bool = False
+    source: Source | None = None
 
 
 def see_walls(picture: Bytes, light: Bytes, polarity: str, cells: CellScale | None = None) -> SeenWalls:
@@ -130,7 +141,10 @@ def see_block(
     others = pieces_beside(every, coarse.rings[0].vertices, pitch_px, scale, few)
     if joining is not None:
         seen = replace(seen, mask=np.where(between, np.uint8(0), seen.mask))
-    evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway, walls.relief)
+    if walls.source is not None:
+        evidence = border_evidence(walls.source.border, seen, coarse, cells, scale)
+    else:
+        evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway, walls.relief)
     evidence = _with_beside(evidence, small, coarse, scale, midway)
     at_frame = any(walls_at_frame(seen.mask, coarse.walls, coarse.step))
     evidence = replace(evidence, others=others, reaches_frame=at_frame, comb=cells.comb, loose=loose, mask=seen.mask)

@@ -54,6 +54,8 @@ _MASK_BLUR_PX = 0.8
 _WALL_POINTS_PER_PITCH = 8
 # Walls farther inside than this are no part of the boundary towards the table, the dents of open cells included.
 _WALLS_INSIDE = 1.1
+# Where comb ends, if that is known: so far from its coarse edge at most, and so unsure.
+_BORDER_PITCHES, _BORDER_SIGMA_PITCHES = 1.2, 0.05
 # How near to an end light tells whether its wall is at full scale.
 _BESIDE_PX = np.array([-3.0, -1.5, 0.0, 1.5, 3.0])
 
@@ -145,6 +147,22 @@ def block_evidence(
         _clipped(light, np.concatenate([tips.points, sides.points])) if relief is None else 1.0,
         coarse.leaves,
     )
+
+
+def border_evidence(
+    border: Float64s, seen: WallMask, coarse: CoarseBlock, cells: CellScale, scale: int
+) -> BlockEvidence:
+    """What is said of a block's outline by places where its comb ends, (N, 2), picture pixels, in the way of
+    `block_evidence`; ends of walls say nothing.
+    """
+    pitch_px = cells.pitch_px / scale
+    points = border[np.abs(coarse.depth_at(samples_of(border, scale))) < _BORDER_PITCHES * pitch_px]
+    kind = np.full(len(points), WitnessKind.BLUNT, np.int8)
+    ends = _Witnesses(points, kind, np.full(len(points), _BORDER_SIGMA_PITCHES * cells.pitch_px))
+    walls = _walls(edge_chains(seen.mask, coarse, pitch_px), coarse, pitch_px)
+    rings = _rings(coarse, ends, ends.take(kind < 0), walls, Parallax(0.0, np.zeros(2), None), scale)
+    told = seen.noise, seen.contrast, 0.0, coarse.leaves
+    return BlockEvidence(rings, cells.pitch_px, cells.wall_px, "bright", _USUAL_BLUR_PX, *told)
 
 
 def _clipped(light: Bytes, points: Float64s) -> float:

@@ -40,6 +40,7 @@ from contour.segmentation.second_opinion import second_opinion
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.tracing import trace
+from contour.walls.see_block import Source
 from service.measuring.measurement import Measurement
 from service.measuring.part_trial import PartTrial
 from service.reasons import Reason, Rejection
@@ -203,6 +204,7 @@ class Measurer:
                 again = outlined(look._replace(on_dark=not reasons & _LIES_THERE))
                 if not again.findings:
                     return again
+                reasons |= {Reason.SEVERAL_BLOCKS} & {*again.reasons}
         watch.lap("table")
         if refused is not None:
             raise refused
@@ -249,14 +251,13 @@ class Measurer:
         watch: _Stopwatch,
     ) -> Measurement:
         """The measurement of what is looked at in the whole picture."""
-        picture = _drawn(look.picture, watch, on_dark=look.on_dark) if look.network else look.picture
+        picture, source = _drawn(look.picture, watch, on_dark=look.on_dark) if look.network else (look.picture, None)
         height, width = picture.shape[:2]
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
         settings = replace(trace_settings(recipe), least_rise=look.least_rise)
-        taken = look.picture if look.network else None
-        checked = _checked_trace(picture, settings, region, rectifier, watch, look.relief, taken)
+        checked = _checked_trace(picture, settings, region, rectifier, watch, look.relief, source)
         if look.network:
             checked = replace(checked, trace=checked.trace.less_sure(_NETWORK_PITCHES))
         traced = checked.trace
@@ -420,7 +421,7 @@ def _over(
     return None
 
 
-def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch, *, on_dark: bool) -> NDArray[np.uint8]:
+def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch, *, on_dark: bool) -> tuple[NDArray[np.uint8], Source]:
     """What a network tells of the picture; raise NoBlockFound where it is not asked, or in doubt."""
     drawn = comb_picture(picture, on_dark=on_dark)
     watch.lap("network")
@@ -462,19 +463,19 @@ def _checked_trace(
     rectifier: Rectifier | None,
     watch: _Stopwatch,
     relief: Relief | None = None,
-    taken: NDArray[np.uint8] | None = None,
+    source: Source | None = None,
 ) -> CheckedTrace:
     """The block traced in the region alone, and checked there, in pixels of the whole picture."""
     if region is None:
-        traced = trace(picture, settings, rectifier=rectifier, relief=relief, taken=taken, on_stage=watch.lap)
+        traced = trace(picture, settings, rectifier=rectifier, relief=relief, source=source, on_stage=watch.lap)
         checked = check_trace(picture, traced, rectifier, relief)
         watch.lap("quality")
         return checked
     part, first = region.cut(picture)
     within = None if rectifier is None else CroppedRectifier(rectifier, first)
     there = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
-    taken = None if taken is None else region.cut(taken)[0]
-    return _checked_trace(part, settings, None, within, watch, there, taken).moved(first)
+    drawn = None if source is None else Source(region.cut(source.picture)[0], source.border - first)
+    return _checked_trace(part, settings, None, within, watch, there, drawn).moved(first)
 
 
 def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:

@@ -75,3 +75,14 @@ def test_a_table_as_light_as_floors_tells_nothing() -> None:
     ring = told(rounded(2.0), BLOCK, table=FLOOR + 3, inverted=False)
     assert not ring.tells(BLOCK, PITCH).any()
     assert not len(ring.passed(NOWHERE, PITCH))
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_floors_beyond_a_rounding_are_told_where_the_block_has_a_corner(inverted: bool) -> None:
+    drawn_round = told(BLOCK, rounded(1.7), inverted=inverted)
+    beyond = drawn_round.places[drawn_round.beyond]
+    away = np.hypot(*(beyond[:, None] - BLOCK).transpose(2, 0, 1))
+    assert np.count_nonzero(away.min(axis=0) < 1.5 * PITCH) >= 3, "corners"
+    assert away.min(axis=1).max() < 1.5 * PITCH, "nowhere else"
+    for block in (BLOCK, rounded(1.7), rounded(2.5)):
+        assert not told(block, block, inverted=inverted).beyond.any()

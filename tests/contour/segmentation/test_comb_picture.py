@@ -8,10 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
+from contour.geometry.agreement import distances_to, places_along
+from contour.geometry.signed_distance import nearest
 from contour.segmentation import comb_picture as drawing
 from contour.segmentation.comb_picture import comb_picture
 from contour.segmentation.network import Segments
-from contour.synthetic import Rendered, pitch_px, render, render_empty_table
+from contour.synthetic import Rendered, area_coverage, pitch_px, render, render_empty_table
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 
@@ -30,12 +32,24 @@ def test_cells_of_any_size_are_found(pitch: tuple[float, float]) -> None:
     rendered = scene_of(pitch)
     drawn = comb_picture(rendered.picture)
     assert drawn is not None
-    assert drawn.shape == rendered.picture.shape[:2]
-    rows, columns = np.nonzero(drawn > 100)
+    assert drawn[0].shape == rendered.picture.shape[:2]
+    rows, columns = np.nonzero(drawn[0] > 100)
     truth = rendered.truth_px.exterior
     for seen, ring in ((columns, truth[:, 0]), (rows, truth[:, 1])):
         assert seen.min() == pytest.approx(ring.min(), abs=0.6 * rendered.pitch_px)
         assert seen.max() == pytest.approx(ring.max(), abs=0.6 * rendered.pitch_px)
+
+
+@pytest.mark.parametrize("pitch", [(12.0, 15.0), (19.0, 23.0), (30.0, 40.0), (50.0, 60.0)])
+def test_where_comb_ends_is_told_all_around(pitch: tuple[float, float]) -> None:
+    rendered = scene_of(pitch)
+    drawn = comb_picture(rendered.picture)
+    assert drawn is not None
+    truth = rendered.truth_px
+    off = distances_to(drawn[1].border, truth) / rendered.pitch_px
+    assert np.median(off) < 0.08
+    assert np.quantile(off, 0.95) < 0.3
+    assert nearest(places_along(truth, 1.0), drawn[1].border).max() < 1.5 * rendered.pitch_px
 
 
 @pytest.mark.parametrize("kind", ["undisturbed", "wood", "brushed", "slots", "old_cuts", "expanded", "cork", "ribbed"])
@@ -65,6 +79,24 @@ def test_of_a_large_picture_no_more_is_asked_than_could_be_drawn(
     monkeypatch.setattr(drawing, "comb_and_things", nothing)
     assert comb_picture(np.zeros(shape, np.uint8)) is None
     assert guesses == [40.0, 20.0, 11.0][:asked]
+
+
+def test_where_walls_dont_show_in_comb_others_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    rendered = scene_of((19.0, 23.0))
+    told = drawing.segments
+
+    def with_filled_cells(light: np.ndarray, pitch: float) -> Segments:
+        seen = told(light, pitch)
+        seen.wall[:, : seen.wall.shape[1] // 2] *= 0.1
+        return seen
+
+    monkeypatch.setattr(drawing, "segments", with_filled_cells)
+    drawn = comb_picture(rendered.picture)
+    assert drawn is not None
+    block = area_coverage(rendered.truth_px.rings, *rendered.picture.shape[1::-1]) > 0.5
+    within = cv2.distanceTransform(block.astype(np.uint8), cv2.DIST_L2, 5) > rendered.pitch_px
+    from_walls = cv2.distanceTransform((drawn[0] < 100).astype(np.uint8), cv2.DIST_L2, 5)
+    assert from_walls[within].max() < rendered.pitch_px
 
 
 def test_on_a_dark_table_comb_is_drawn_where_that_is_asked() -> None:

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from contour.errors import NoBlockFound, ParameterError, PictureError
+from contour.geometry.agreement import places_along
+from contour.geometry.signed_distance import nearest
 from contour.synthetic import (
     CellGeometry,
     Clutter,
@@ -26,6 +28,7 @@ from contour.synthetic import (
 )
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
+from contour.walls.see_block import Source
 
 SETTINGS = TraceSettings(method="wall-tips")
 CAMERA = camera_above(800, 600, 0.375, distance_mm=1500.0)
@@ -243,3 +246,42 @@ def test_of_closed_cells_there_is_a_bound_too() -> None:
     wider_px = wall_tips(blurred, TraceSettings(method="wall-tips", edge="cells")).uncertainty_px
     assert wider_px is not None
     assert 0.5 < bound_px < 0.8 * wider_px
+
+
+def test_where_comb_is_known_to_end_ends_of_walls_tell_nothing() -> None:
+    rendered = block()
+    ring = places_along(rendered.truth_px, 0.5 * rendered.pitch_px)
+    rng = np.random.default_rng(2)
+    for away in (0.0, 0.4):
+        middle = rendered.truth_px.exterior.mean(axis=0)
+        outwards = (ring - middle) / np.hypot(*(ring - middle).T)[:, None]
+        border = ring + rng.normal(0.0, 0.2, ring.shape) + away * rendered.pitch_px * outwards
+        found = wall_tips(rendered.picture, SETTINGS, source=Source(rendered.picture, border))
+        off = nearest(border, places_along(found.contour, 0.5))
+        assert np.quantile(off, 0.95) < 1.0, away
+
+
+@pytest.mark.parametrize(("level", "refused"), [(220, True), (None, False)])
+def test_where_what_lies_beside_drawn_comb_is_no_table_nothing_is_traced(level: int | None, refused: bool) -> None:
+    scene = Scene(rectangle((150.0, 112.0), 200.0, 160.0), CAMERA, CellGeometry(pitch_mm=8.0, wall_mm=0.6), seed=4)
+    rendered = render(scene)
+    truth, pitch = rendered.truth_px, rendered.pitch_px
+    half = int(truth.exterior[:, 0].mean())
+    table = int(np.median(rendered.picture[:40]))
+    left, taken = rendered.picture.copy(), rendered.picture.copy()
+    left[:, half:] = table
+    taken[:, half:] = table
+    if level is not None:
+        reach = np.ptp(truth.exterior[:, 1])
+        middle = truth.exterior[:, 1].mean()
+        taken[int(middle - 0.6 * reach) : int(middle + 0.6 * reach), half : half + int(6 * pitch)] = level
+    places = places_along(truth, 0.25 * pitch)
+    across = places[:, 1][np.abs(places[:, 0] - half) < pitch]
+    cut = np.arange(across.min(), across.max(), 0.25 * pitch)
+    border = np.concatenate([places[places[:, 0] < half], np.column_stack([np.full(len(cut), half - 0.5), cut])])
+    source = Source(taken, border)
+    if refused:
+        with pytest.raises(NoBlockFound, match="something lies beside it"):
+            wall_tips(left, SETTINGS, source=source)
+    else:
+        assert wall_tips(left, SETTINGS, source=source).contour.exterior[:, 0].max() < half + 0.5 * pitch

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bytes, Float32s, Float64s, median, quantile
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
 from contour.image.opencv import box_mean, grown, pieces_and_areas, shrunk_to, within
 from contour.image.pixel_sampling import sample_at
 from contour.segmentation.glare import glare
@@ -23,6 +23,8 @@ from contour.walls.see_block import Source
 # picture is not looked for at the smallest, which costs most; nor at one at which it could not be drawn though cells
 # were so many times as large.
 _GUESSES, _CELLS, _SPECK_PX, _MUCH, _TWICE = (40.0, 20.0, 11.0), 100, 9, 0.2, 2.0
+# The drawing network is asked about pieces of so much of the largest one, and so many guesses around them.
+_PIECE, _AROUND = 0.02, 5.0
 # A comb that is seen so well is not looked for at another size; one that is seen worse than this is none.
 _GOOD, _LEAST = 0.3, 0.14
 # Between these shares of the pitch that the network has learnt walls are drawn well enough.
@@ -31,7 +33,7 @@ _NEAR = (0.9, 1.4)
 _TRIED_PX, _MOST_PX = 1e6, 4e6
 # What is surer than this is there. A thing at the edge of comb, of which so many pixels are looked at, need not be so
 # sure in the mean of so many: of 140 things over an edge on tables with structure, by two hands, none was drawn away.
-_SURE, _LEAST_THING, _EDGE_PX, _MEAN_PX = 0.5, 0.25, 9, 7
+_SURE, _LEAST_THING, _EDGE_PX, _MEAN_PX = 0.5, 0.15, 9, 7
 # Pitches beside the comb, where of the table so much is darker than what counts as its light; and how light that is, of
 # walls over floors: of 50 tables as light as walls by 0.5 at least. What surely is no wall.
 _BESIDE, _LIGHTER, _LIGHT, _NO_WALL = (0.5, 2.5), 0.75, 0.4, 0.15
@@ -51,9 +53,9 @@ def comb_picture(picture: Bytes, *, on_dark: bool = False) -> tuple[Bytes, Sourc
     dark table.
     """
     light = wall_light(picture)
-    score, pitch_px, found = 0.0, 0.0, None
-    for guess in _pitches(light):
-        part = _middle(light, guess)
+    score, pitch_px, found, box = 0.0, 0.0, None, _whole(light)
+    for guess, there in _pitches(light):
+        part = _middle(light[there], guess)
         seen = segments(part, guess)
         drawn = _drawn(seen)
         try:
@@ -63,12 +65,15 @@ def comb_picture(picture: Bytes, *, on_dark: bool = False) -> tuple[Bytes, Sourc
         if cells.score > score:
             near = _NEAR[0] < cells.pitch_px / PITCH_PX < _NEAR[1]
             score, pitch_px = cells.score, cells.pitch_px * part.shape[1] / drawn.shape[1]
-            found = seen if near and part is light else None
+            box, found = there, seen if near and part.shape == light.shape else None
         if score > _GOOD:
             break
-    if score < _LEAST or light.size * (PITCH_PX / pitch_px) ** 2 > _MOST_PX:
+    if score < _LEAST or light[box].size * (PITCH_PX / pitch_px) ** 2 > _MOST_PX:
         return None
-    found = segments(light, pitch_px) if found is None else found
+    if found is None:
+        found = segments(light, pitch_px, box)
+        if _leaves(found.comb, box, light.shape):
+            return None
     if _something_over(found, picture) or not (on_dark or _on_light_table(found)):
         return None
     drawn = _drawn(found)
@@ -76,20 +81,56 @@ def comb_picture(picture: Bytes, *, on_dark: bool = False) -> tuple[Bytes, Sourc
     return (grown if drawn.size < light.size else shrunk_to)(drawn, light.shape), Source(picture, border)
 
 
-def _pitches(light: Bytes) -> list[float]:
-    """At which pitches the light network sees comb, that first of which it sees most."""
+def _pitches(light: Bytes) -> list[tuple[float, tuple[slice, slice]]]:
+    """At which pitches the light network sees comb, and rows and columns of all that it sees, with what lies around;
+    that pitch first of which it sees most.
+    """
     speck, areas = np.ones((_SPECK_PX, _SPECK_PX), np.uint8), dict[float, float]()
+    boxes = dict[float, tuple[slice, slice]]()
     for guess in _GUESSES:
         if guess == _GUESSES[-1] and max(areas.values(), default=0.0) > _MUCH:
             break
         if light.size * (PITCH_PX / (_TWICE * guess)) ** 2 > _MOST_PX:
             continue
         comb = (comb_and_things(light, guess)[0] > _SURE).astype(np.uint8)
-        _, area = pieces_and_areas(np.asarray(cv2.morphologyEx(comb, cv2.MORPH_OPEN, speck), np.uint8), 8)
+        pieces, area = pieces_and_areas(np.asarray(cv2.morphologyEx(comb, cv2.MORPH_OPEN, speck), np.uint8), 8)
         most = int(area.max())
         if most > _CELLS * _CELL * LIGHT_PITCH_PX**2:
             areas[guess] = most / comb.size
-    return sorted(areas, key=areas.__getitem__, reverse=True)
+            boxes[guess] = _box((area > _PIECE * most)[pieces] & (pieces > 0), light.shape, _AROUND * guess)
+    return [(guess, boxes[guess]) for guess in sorted(areas, key=areas.__getitem__, reverse=True)]
+
+
+def _whole(light: Bytes) -> tuple[slice, slice]:
+    return slice(0, light.shape[0]), slice(0, light.shape[1])
+
+
+def _box(part: Bools, shape: tuple[int, ...], around: float) -> tuple[slice, slice]:
+    """Rows and columns of a picture of that shape, (H, W), in which part of a map of it lies, and so many more pixels
+    around.
+    """
+    x, y, width, height = cv2.boundingRect(part.astype(np.uint8))
+    ends = ((y, y + height), (x, x + width))
+    rows, columns = (
+        slice(max(0, int(first * side / small - around)), min(side, math.ceil(last * side / small + around)))
+        for (first, last), side, small in zip(ends, shape, part.shape, strict=True)
+    )
+    return rows, columns
+
+
+def _leaves(comb: Float32s, box: tuple[slice, slice], shape: tuple[int, ...]) -> bool:
+    """Whether much of comb, (h, w), reaches the border of a box of the picture, of that shape, (H, W), where that is
+    not the picture's.
+    """
+    inner = np.zeros(comb.shape, np.bool_)
+    edges = []
+    for one, small, side in zip(box, comb.shape, shape, strict=True):
+        first, last = one.start * small / side + PITCH_PX, one.stop * small / side - PITCH_PX
+        edges.append(slice(int(first) if one.start > 0 else 0, int(last) if one.stop < side else small))
+    inner[edges[0], edges[1]] = True
+    pieces, area = pieces_and_areas((comb > _SURE).astype(np.uint8), 8)
+    large = area > _PIECE * int(area.max())
+    return bool((large[pieces] & (pieces > 0) & ~inner).any())
 
 
 def _middle(light: Bytes, pitch_px: float) -> Bytes:

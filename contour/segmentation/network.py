@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pkgutil
 from dataclasses import dataclass
 from functools import cache
@@ -37,10 +38,20 @@ class Segments:
     thing: Float32s
 
 
-def segments(light: Bytes, pitch_px: float) -> Segments:
-    """What the picture, (H, W), shows of cells of that pitch, at `PITCH_PX` a pitch, its sides multiples of 8."""
+def segments(light: Bytes, pitch_px: float, box: tuple[slice, slice] | None = None) -> Segments:
+    """What the picture, (H, W), shows of cells of that pitch, at `PITCH_PX` a pitch, its sides multiples of 8; nothing
+    outside of a box of it, rows and columns, if one is given.
+    """
     sized, even = _evened(light, PITCH_PX / pitch_px)
-    return Segments(sized, *_told("comb.onnx", 3, even))
+    if box is None:
+        return Segments(sized, *_told("comb.onnx", 3, even))
+    told = np.zeros((3, *even.shape), np.float32)
+    rows, columns = (
+        slice(_HALVED * int(one.start * small / side / _HALVED), _HALVED * math.ceil(one.stop * small / side / _HALVED))
+        for one, small, side in zip(box, even.shape, light.shape, strict=True)
+    )
+    told[:, rows, columns] = _told("comb.onnx", 3, even[rows, columns])
+    return Segments(sized, *told)
 
 
 def comb_and_things(light: Bytes, pitch_px: float) -> Float32s:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -85,8 +86,8 @@ def test_where_walls_dont_show_in_comb_others_are_drawn(monkeypatch: pytest.Monk
     rendered = scene_of((19.0, 23.0))
     told = drawing.segments
 
-    def with_filled_cells(light: np.ndarray, pitch: float) -> Segments:
-        seen = told(light, pitch)
+    def with_filled_cells(light: np.ndarray, *where: Any) -> Segments:
+        seen = told(light, *where)
         seen.wall[:, : seen.wall.shape[1] // 2] *= 0.1
         return seen
 
@@ -105,13 +106,23 @@ def test_on_a_dark_table_comb_is_drawn_where_that_is_asked() -> None:
     assert comb_picture(rendered.picture, on_dark=True) is not None
 
 
+def test_comb_of_fine_cells_in_a_large_picture_is_drawn() -> None:
+    """At 16 pixels a pitch the picture has 6 million, what shows comb a fraction of them."""
+    rendered = scene_of((12.0, 15.0))
+    wide = cv2.copyMakeBorder(rendered.picture, 700, 100, 100, 700, cv2.BORDER_CONSTANT, value=(80, 80, 80))
+    drawn = comb_picture(wide)
+    assert drawn is not None
+    off = distances_to(drawn[1].border - [100.0, 700.0], rendered.truth_px) / rendered.pitch_px
+    assert np.quantile(off, 0.9) < 0.3
+
+
 def test_a_thing_within_the_comb_may_be_a_hole_and_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     rendered = scene_of((19.0, 23.0))
     assert comb_picture(rendered.picture) is not None
     told = drawing.segments
 
-    def with_thing(light: np.ndarray, pitch: float) -> Segments:
-        seen = told(light, pitch)
+    def with_thing(light: np.ndarray, *where: Any) -> Segments:
+        seen = told(light, *where)
         rows, columns = np.nonzero(cv2.erode((seen.comb > 0.5).astype(np.uint8), np.ones((61, 61), np.uint8)))
         if len(rows):
             patch = slice(rows[0] - 20, rows[0] + 20), slice(columns[0] - 20, columns[0] + 20)

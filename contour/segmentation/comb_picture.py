@@ -33,7 +33,7 @@ _NEAR = (0.9, 1.4)
 _TRIED_PX, _MOST_PX = 1e6, 4e6
 # What is surer than this is there. A thing at the edge of comb, of which so many pixels are looked at, need not be so
 # sure in the mean of so many: of 140 things over an edge on tables with structure, by two hands, none was drawn away.
-_SURE, _LEAST_THING, _EDGE_PX, _MEAN_PX = 0.5, 0.15, 9, 7
+_SURE, _LEAST_THING, _EDGE_PX, _MEAN_PX = 0.5, 0.25, 9, 7
 # Pitches beside the comb, where of the table so much is darker than what counts as its light; and how light that is, of
 # walls over floors: of 50 tables as light as walls by 0.5 at least. What surely is no wall.
 _BESIDE, _LIGHTER, _LIGHT, _NO_WALL = (0.5, 2.5), 0.75, 0.4, 0.15

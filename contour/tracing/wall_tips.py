@@ -112,16 +112,19 @@ def wall_tips(
         walls = strong_walls(walls, settings.least_rise)
     foam = None if walls.cells.comb.cellular else solid.foam()
     found = foam or _of_comb(solid, walls, settings.edge, rectifier)
-    return found if source is None or found.untold_px else _told_of(found, source.picture)
+    by_border = source is not None and source.border is not None
+    return _told_of(found, source.picture) if source is not None and by_border and not found.untold_px else found
 
 
 def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None) -> Trace:
     """The outline of a block of cells, or of a sheet with holes, whose border is `auto`, or promised to be `cut`."""
     light, on_stage = solid.light, solid.on_stage
     lit = solid.picture if walls.relief is None else walls.relief.lit
-    seen, look = looked_at(lit, walls, on_stage)
-    if walls.source is not None:
-        _check_beyond(walls.source.picture, seen)
+    source = walls.source
+    by_walls = source is not None and source.border is None
+    seen, look = looked_at(source.picture if source is not None and by_walls else lit, walls, on_stage)
+    if source is not None and not by_walls:
+        _check_beyond(source.picture, seen)
     plate = _plate(solid, seen) if promise == "auto" else None
     if isinstance(plate, Trace):
         return plate

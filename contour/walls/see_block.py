@@ -41,11 +41,11 @@ _STRANDS_PITCHES = 5.0
 
 class Source(NamedTuple):
     """The picture that another one was drawn from, grey (H, W) or BGR (H, W, 3), uint8, and where its comb ends, some
-    four places a pitch, (N, 2), pixels.
+    four places a pitch, (N, 2), pixels; None where ends of walls are to tell.
     """
 
     picture: Bytes
-    border: Float64s
+    border: Float64s | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ def see_block(
     others = pieces_beside(every, coarse.rings[0].vertices, pitch_px, scale, few)
     if joining is not None:
         seen = replace(seen, mask=np.where(between, np.uint8(0), seen.mask))
-    if walls.source is not None:
+    if walls.source is not None and walls.source.border is not None:
         evidence = border_evidence(walls.source.border, seen, coarse, cells, scale)
     else:
         evidence = block_evidence(walls.light, seen, coarse, cells, scale, midway, walls.relief)

@@ -237,7 +237,9 @@ class Measurer:
                 yield _Look(picture)
         if recipe.method == "wall-tips":
             if recipe.network:
-                yield _Look(picture, network=True)
+                drawing = _Drawing(picture)
+                yield _Look(picture, drawing=drawing)
+                yield _Look(picture, drawing=drawing, by_border=True)
             yield _Look(picture, least_rise=_STRONG_WALLS)
 
     def _outlined(
@@ -251,7 +253,10 @@ class Measurer:
         watch: _Stopwatch,
     ) -> Measurement:
         """The measurement of what is looked at in the whole picture."""
-        picture, source = _drawn(look.picture, watch, on_dark=look.on_dark) if look.network else (look.picture, None)
+        picture, source = look.picture, None
+        if look.drawing is not None:
+            picture, source = look.drawing.drawn(watch, on_dark=look.on_dark)
+            source = source if look.by_border else source._replace(border=None)
         height, width = picture.shape[:2]
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
@@ -391,14 +396,21 @@ class Measurer:
 
 class _Look(NamedTuple):
     """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
-    settings of a trace; `network`: whether to look at what a network tells of it, `on_dark` on a dark table, too.
+    settings of a trace; `drawing`: to look at what a network tells of it, `on_dark` on a dark table, too, `by_border`
+    not at ends of its walls, but at where its comb ends.
     """
 
     picture: NDArray[np.uint8]
     relief: Relief | None = None
     least_rise: float | None = None
-    network: bool = False
+    drawing: _Drawing | None = None
     on_dark: bool = False
+    by_border: bool = False
+
+    @property
+    def network(self) -> bool:
+        """Whether what is looked at was drawn by a network."""
+        return self.drawing is not None
 
     def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
         """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""
@@ -421,13 +433,22 @@ def _over(
     return None
 
 
-def _drawn(picture: NDArray[np.uint8], watch: _Stopwatch, *, on_dark: bool) -> tuple[NDArray[np.uint8], Source]:
-    """What a network tells of the picture; raise NoBlockFound where it is not asked, or in doubt."""
-    drawn = comb_picture(picture, on_dark=on_dark)
-    watch.lap("network")
-    if drawn is None:
-        raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")
-    return drawn
+class _Drawing:
+    """What a network draws of a picture, asked once."""
+
+    def __init__(self, picture: NDArray[np.uint8]) -> None:
+        self._picture = picture
+        self._asked = False
+        self._drawn: tuple[NDArray[np.uint8], Source] | None = None
+
+    def drawn(self, watch: _Stopwatch, *, on_dark: bool) -> tuple[NDArray[np.uint8], Source]:
+        """The drawing; raise NoBlockFound where there is none."""
+        if not self._asked:
+            self._drawn, self._asked = comb_picture(self._picture, on_dark=on_dark), True
+            watch.lap("network")
+        if self._drawn is None:
+            raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")
+        return self._drawn
 
 
 def _second_opinion(
@@ -474,7 +495,9 @@ def _checked_trace(
     part, first = region.cut(picture)
     within = None if rectifier is None else CroppedRectifier(rectifier, first)
     there = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
-    drawn = None if source is None else Source(region.cut(source.picture)[0], source.border - first)
+    drawn = None
+    if source is not None:
+        drawn = Source(region.cut(source.picture)[0], None if source.border is None else source.border - first)
     return _checked_trace(part, settings, None, within, watch, there, drawn).moved(first)
 
 

@@ -41,7 +41,7 @@ WIDTH_MM, MIDDLE = 600.0, (300.0, 225.0)
 REST = "all else"
 STEPS = {
     "line noise": ("contour.tracing.tracing:without_line_noise", "service.measuring.measure:without_line_noise"),
-    "cell scale": ("contour.tracing.wall_tips:probe",),
+    "cell scale": ("contour.tracing.solid:probe",),
     "wall mask": ("contour.walls.see_block:wall_mask", "contour.walls.see_block:without_specks"),
     "faint links, loose pieces": (
         "contour.walls.see_block:with_faint_links",

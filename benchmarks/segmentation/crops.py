@@ -221,7 +221,7 @@ def _cut_out(rng: np.random.Generator) -> Float32s:
         sides = [float(rng.uniform(16.0 if rng.random() < 0.5 else 35.0, 120.0)), float(rng.uniform(35.0, 120.0))]
         corners = cv2.boxPoints((middle.tolist(), sides, float(rng.uniform(0.0, 180.0))))
         lay(mask, corners, 255)
-    return mask.astype(np.float32) / np.float32(255.0)
+    return _share(mask)
 
 
 def _on_other_table(
@@ -304,7 +304,9 @@ def _disc(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float32
     axes[1] = axes[0] if rng.random() < 0.5 else axes[1]
     mask = np.zeros((SIZE, SIZE), np.uint8)
     turn = float(rng.uniform(0.0, 180.0))
-    cv2.ellipse(mask, (middle * 8).astype(int).tolist(), (axes * 8).astype(int).tolist(), turn, 0, 360, 255, -1, 16, 3)
+    cv2.ellipse(
+        mask, (middle * 8).astype(int).tolist(), (axes * 8).astype(int).tolist(), turn, 0, 360, 255, -1, cv2.LINE_AA, 3
+    )
     y, x = np.mgrid[:SIZE, :SIZE]
     away = np.hypot(x - middle[0], y - middle[1]) / axes.max()
     return _share(mask), np.clip(away - rng.uniform(0.0, 0.5), -1.0, 1.0).astype(np.float32)

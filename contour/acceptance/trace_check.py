@@ -17,15 +17,18 @@ from contour.edge.reflection import reflection
 from contour.edge.table_look import TableLook
 from contour.geometry.agreement import rectified_edges
 from contour.geometry.arrays import Bytes, Float64s
-from contour.geometry.rectifier import Rectifier
+from contour.geometry.rectifier import CroppedRectifier, Rectifier
 from contour.geometry.rings import Contour
 from contour.image.opencv import grey
 from contour.image.pixel_grid import drawn
+from contour.image.region import Region
 from contour.image.side_by_side import side_by_side
 from contour.narrow_features.feature import NarrowFeature
 from contour.narrow_features.narrow_feature import narrow_feature
 from contour.relief.relief import Relief
-from contour.tracing.trace import Trace
+from contour.tracing.trace import OnStage, Trace, TraceSettings
+from contour.tracing.tracing import trace
+from contour.walls.see_block import Source
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
 _BENT_PITCHES = 5.0
@@ -59,6 +62,32 @@ class CheckedTrace:
         said = {name: getattr(self, name) for name in ("disagreement", "narrow", "alike", "bare", "beyond", "runs_on")}
         moved = {name: one.moved(x, y) for name, one in said.items() if one is not None}
         return replace(self, trace=self.trace.moved(first), **moved)
+
+
+def checked_trace(
+    picture: Bytes,
+    settings: TraceSettings,
+    region: Region | None = None,
+    rectifier: Rectifier | None = None,
+    relief: Relief | None = None,
+    source: Source | None = None,
+    *,
+    on_stage: OnStage = lambda _name: None,
+) -> CheckedTrace:
+    """The block traced in the region alone, and checked there, in pixels of the whole picture; otherwise as `trace`.
+
+    `on_stage` hears "quality" as well. Raises what `trace` does, and what `Region.cut` does.
+    """
+    if region is None:
+        traced = trace(picture, settings, rectifier=rectifier, relief=relief, source=source, on_stage=on_stage)
+        checked = check_trace(picture, traced, rectifier, relief)
+        on_stage("quality")
+        return checked
+    part, first = region.cut(picture)
+    within = None if rectifier is None else CroppedRectifier(rectifier, first)
+    there = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
+    drawn_from = None if source is None else source.cut(region)
+    return checked_trace(part, settings, None, within, there, drawn_from, on_stage=on_stage).moved(first)
 
 
 def check_trace(

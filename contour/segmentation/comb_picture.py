@@ -53,7 +53,7 @@ def comb_picture(picture: Bytes, *, on_dark: bool = False) -> tuple[Bytes, Sourc
     dark table.
     """
     light = wall_light(picture)
-    score, pitch_px, found, box = 0.0, 0.0, None, _whole(light)
+    score, pitch_px, found, box = 0.0, 0.0, None, (slice(None), slice(None))
     for guess, there in _pitches(light):
         part = _middle(light[there], guess)
         seen = segments(part, guess)
@@ -99,10 +99,6 @@ def _pitches(light: Bytes) -> list[tuple[float, tuple[slice, slice]]]:
             areas[guess] = most / comb.size
             boxes[guess] = _box((area > _PIECE * most)[pieces] & (pieces > 0), light.shape, _AROUND * guess)
     return [(guess, boxes[guess]) for guess in sorted(areas, key=areas.__getitem__, reverse=True)]
-
-
-def _whole(light: Bytes) -> tuple[slice, slice]:
-    return slice(0, light.shape[0]), slice(0, light.shape[1])
 
 
 def _box(part: Bools, shape: tuple[int, ...], around: float) -> tuple[slice, slice]:

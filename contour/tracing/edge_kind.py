@@ -9,11 +9,12 @@ import cv2
 import numpy as np
 
 from contour.errors import EdgeContradicted
-from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.arrays import Bools, Bytes, Float64s, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, densified
 from contour.geometry.segments import BoxTree, distances_to_ring, distances_to_tree
 from contour.geometry.signed_distance import nearest
+from contour.image.opencv import fewer_vertices
 from contour.image.pixel_sampling import light_beside
 from contour.material.closed_cells import MaterialEdge
 from contour.tracing.trace import Edge
@@ -111,12 +112,12 @@ def teeth_cut(exterior: Ring, seen: BlockEvidence) -> bool:
     if not _triangular(seen):
         return False
     side = side_px(seen)
-    corners = cv2.approxPolyDP(exterior.astype(np.float32), _STRAIGHT * side, True)[:, 0].astype(np.float64)
-    parts = np.roll(corners, -1, axis=0) - corners
+    corners = fewer_vertices(exterior, _STRAIGHT * side)
+    parts = rolled(corners, -1) - corners
     ways = parts[:, 0] + 1j * parts[:, 1]
-    turns = np.abs(np.angle(ways / np.roll(ways, 1), deg=True)) > _TURN_DEG
+    turns = np.abs(np.angle(ways / rolled(ways, 1), deg=True)) > _TURN_DEG
     least, most = _CUT_WALL
-    cut = turns & np.roll(turns, -1) & (np.abs(ways) > least * side) & (np.abs(ways) < most * side)
+    cut = turns & rolled(turns, -1) & (np.abs(ways) > least * side) & (np.abs(ways) < most * side)
     return bool(np.count_nonzero(cut) >= _FEWEST_CUT)
 
 

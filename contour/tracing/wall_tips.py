@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,25 +18,15 @@ from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.rings import Contour
 from contour.image.opencv import grey
-from contour.material.closed_cells import MaterialEdge, material_edge
 from contour.material.floor_edge import floor_edge
-from contour.material.foam import foam_edge
 from contour.outline.uncertainty import uncertainty
 from contour.relief.reach import reach
 from contour.relief.relief import Relief
 from contour.seams.seam import parted_by_seam
 from contour.seams.splice import spliced
-from contour.tracing.cut_lines import stub_cuts, with_cuts
 from contour.tracing.edge_kind import (
-    FINE_PITCH_PX,
-    check_closed,
-    check_fine,
     check_promise,
-    edge_kind,
-    lined_by_walls,
     may_be_closed,
-    teeth_cut,
-    tooth_px,
 )
 from contour.tracing.evidence_check import (
     check_against_evidence,
@@ -50,16 +38,14 @@ from contour.tracing.evidence_check import (
     ends_outside_corners,
     untold_corners,
 )
-from contour.tracing.plates import check_sheet, like_plate, onto_webs, plate_edge
-from contour.tracing.touched_edges import touched_cuts
-from contour.tracing.trace import Edge, OnStage, Trace, TraceSettings
+from contour.tracing.plates import check_sheet, onto_webs
+from contour.tracing.solid import Solid
+from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.tracing.wide_lines import wide_line
-from contour.walls.cell_scale import CellScale, probe
 from contour.walls.lightness import wall_light
-from contour.walls.pieces import Piece, pieces_beside, with_earlier
+from contour.walls.pieces import Piece, with_earlier
 from contour.walls.see_block import SeenWalls, Source, see_block, see_walls, strong_walls
 from contour.walls.wall_evidence import BlockEvidence
-from contour.walls.wall_mask import wall_mask
 
 # Bounds that are wider than that share of a pitch are refused.
 _SURE_PITCHES = 0.25
@@ -93,9 +79,8 @@ def wall_tips(
     pixels.
 
     `rectifier`, where the lens is known, lets straight edges be fitted in undistorted coordinates. `relief`: of a
-    picture that is the difference from a known table. `source`: what `picture` was drawn from; ends of its walls tell
-    nothing then. `on_stage` hears "mask" and "trace". Raises PictureError, ParameterError, NoBlockFound,
-    EdgeContradicted.
+    picture that is the difference from a known table. `source`: what `picture` was drawn from. `on_stage` hears "mask"
+    and "trace". Raises PictureError, ParameterError, NoBlockFound, EdgeContradicted.
     """
     if settings.binarize != "flat":
         raise ParameterError(
@@ -104,7 +89,7 @@ def wall_tips(
     light = wall_light(picture)
     # Whatever differs from a known table is light; what lies over the block's edge shows in how that is lit.
     polarity = settings.polarity if relief is None else "bright"
-    solid = _Solid(picture, light, polarity, on_stage)
+    solid = Solid(picture, light, polarity, on_stage)
     if settings.edge == "cells":
         return solid.closed()
     walls = replace(see_walls(picture, light, polarity, solid.cells), relief=relief, source=source)
@@ -112,20 +97,17 @@ def wall_tips(
         walls = strong_walls(walls, settings.least_rise)
     foam = None if walls.cells.comb.cellular else solid.foam()
     found = foam or _of_comb(solid, walls, settings.edge, rectifier)
-    by_border = source is not None and source.border is not None
-    return _told_of(found, source.picture) if source is not None and by_border and not found.untold_px else found
+    if source is None or source.border is None or found.untold_px:
+        return found
+    return _told_of(found, source.picture)
 
 
-def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None) -> Trace:
+def _of_comb(solid: Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None) -> Trace:
     """The outline of a block of cells, or of a sheet with holes, whose border is `auto`, or promised to be `cut`."""
     light, on_stage = solid.light, solid.on_stage
     lit = solid.picture if walls.relief is None else walls.relief.lit
-    source = walls.source
-    by_walls = source is not None and source.border is None
-    seen, look = looked_at(source.picture if source is not None and by_walls else lit, walls, on_stage)
-    if source is not None and not by_walls:
-        _check_beyond(source.picture, seen)
-    plate = _plate(solid, seen) if promise == "auto" else None
+    seen, look = _looked_at_source(lit, walls, on_stage)
+    plate = solid.plate(seen) if promise == "auto" else None
     if isinstance(plate, Trace):
         return plate
     if plate is not None:
@@ -133,7 +115,7 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
     # Webs end all around a sheet that was cut along more than one line, or show no ends. Nor do fainter walls where
     # these are left out: a cut border was drawn along its closed cells so.
     ends_tell = plate is None and not walls.strong
-    closed, kind = _if_closed(solid, seen) if ends_tell and may_be_closed(seen) else (None, None)
+    closed, kind = solid.if_closed(seen) if ends_tell and may_be_closed(seen) else (None, None)
     # Where something hides the border no walls end either.
     if kind is not None and (kind != "mixed" or not doubtful(seen.rings[0], look).any()):
         check_promise(promise, kind, traced=closed is not None)
@@ -156,11 +138,23 @@ def _of_comb(solid: _Solid, walls: SeenWalls, promise: str, rectifier: Rectifier
     except NoBlockFound as error:
         # A rim with screws has ends of walls around it, too, and lines through them lead nowhere.
         if kind is None and promise != "cut" and ends_tell:
-            closed, _ = _if_closed(solid, seen)
+            closed, _ = solid.if_closed(seen)
         if promise == "cut" or closed is None:
             error.edge = "cut"
             raise
         return closed
+
+
+def _looked_at_source(lit: Bytes, walls: SeenWalls, on_stage: OnStage) -> tuple[BlockEvidence, TableLook]:
+    """As `looked_at`; what lies over ends of walls that were drawn shows in the picture that they were drawn from.
+    Where comb is known to end, raise NoBlockFound if that shows much beside it.
+    """
+    source = walls.source
+    if source is None or source.border is None:
+        return looked_at(lit if source is None else source.picture, walls, on_stage)
+    seen, look = looked_at(lit, walls, on_stage)
+    _check_beyond(source.picture, seen)
+    return seen, look
 
 
 def _check_beyond(picture: Bytes, seen: BlockEvidence) -> None:
@@ -387,131 +381,3 @@ def _trace(seen: BlockEvidence, contour: Contour, light: Bytes, *, uncertainty_p
         comb=seen.comb,
         reaches_frame=seen.reaches_frame,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Solid:
-    """A picture's material with the cells that it closes; each part is looked for once, when it is first asked for."""
-
-    picture: Bytes
-    light: Bytes
-    polarity: str
-    on_stage: OnStage
-
-    @cached_property
-    def cells(self) -> CellScale:
-        """Raises NoBlockFound."""
-        return probe(self.light, self.polarity)
-
-    @cached_property
-    def walls(self) -> Bytes:
-        """The mask of the walls, (H, W); raises NoBlockFound."""
-        cells = self.cells
-        return wall_mask(self.light, cells.pitch_px, bright=cells.bright, contrast=cells.contrast).mask
-
-    @cached_property
-    def edge(self) -> MaterialEdge:
-        """Raises NoBlockFound."""
-        return material_edge(self.picture, self.cells.pitch_px, self.walls)
-
-    @cached_property
-    def lined(self) -> bool:
-        """Whether walls, or webs, line the edge of material; raises NoBlockFound."""
-        return lined_by_walls(self.edge.contour.exterior, self.light, self.cells)
-
-    def closed(self) -> Trace:
-        """The serrated boundary of a block whose border cells are closed; its cells must show that it is one."""
-        _ = self.walls
-        self.on_stage("mask")
-        foam = None if self.cells.comb.cellular else self.foam()
-        if foam is not None:
-            return replace(foam, edge="cells")
-        check_closed(self.edge.contour.exterior, self.cells.pitch_px, self.cells.wall_px)
-        return self.around(self.edge)
-
-    def check_fine(self, seen: BlockEvidence, outline: Contour) -> None:
-        """Raise EdgeContradicted where cells are too fine to tell a cut border from a closed one."""
-        if seen.pitch_px < FINE_PITCH_PX:
-            with suppress(NoBlockFound):
-                check_fine(self.edge, seen, outline)
-
-    def foam(self) -> Trace | None:
-        """The outline of a slab of foam, cut as it mostly is; None where it is none."""
-        _ = self.walls
-        try:
-            slab = foam_edge(self.light, self.edge, self.cells.pitch_px)
-        except NoBlockFound:
-            return None
-        return None if slab is None else replace(self.around(slab), edge="cut")
-
-    def around(self, outline: MaterialEdge) -> Trace:
-        """The trace of such an outline."""
-        others = pieces_beside(self.walls, outline.contour.exterior, self.cells.pitch_px)
-        self.on_stage("trace")
-        return Trace(
-            "wall-tips",
-            "bright" if self.cells.bright else "dark",
-            self.cells.pitch_px,
-            outline.contour,
-            self.light,
-            uncertainty_px=outline.bound_px,
-            others=others,
-            edge="cells",
-        )
-
-
-def _if_closed(solid: _Solid, seen: BlockEvidence) -> tuple[Trace | None, Edge]:
-    """The boundary of a block with closed border cells, some of them opened by straight cuts; None where it was cut
-    otherwise or nothing tells it from the table. And which kind of border it is.
-    """
-    cells, _ = solid.cells, solid.walls
-    try:
-        material = solid.edge
-    except NoBlockFound:
-        return None, "cut"
-    if not solid.lined:
-        return None, "cut"
-    kind, comb = edge_kind(material, seen), cells.comb
-    sheet = plate_edge(material, wide=False) if kind == "cells" else None
-    if sheet is not None:
-        # Webs of a sheet do not end as walls do.
-        (found, kind), comb = sheet, replace(comb, plate=True)
-    else:
-        touched = [] if kind == "cut" else _touched(solid, material, seen)
-        closed = kind == "cells" and not touched
-        if closed and teeth_cut(material.contour.exterior, seen):
-            return None, "mixed"
-        if touched:
-            # It may be cut on all sides, and what few ends are sure lie on others than are touched.
-            kind = edge_kind(material, seen, touched)
-        cut = None if closed or kind == "cut" else with_cuts(material, seen, touched)
-        found = material if closed else cut
-    return None if found is None else replace(solid.around(found), comb=comb, edge=kind), kind
-
-
-def _touched(solid: _Solid, material: MaterialEdge, seen: BlockEvidence) -> list[Float64s]:
-    """Straight cuts along edges that material touches, or through what is left of walls of a single cell."""
-    teeth = tooth_px(seen)
-    found = touched_cuts(material, seen.pitch_px, tooth_px=teeth, walls=solid.walls, wall_px=seen.wall_px)
-    return found or stub_cuts(material, seen)
-
-
-def _plate(solid: _Solid, seen: BlockEvidence) -> Trace | BlockEvidence | None:
-    """The outline of a perforated sheet; what is seen of it, as of a sheet, where it was cut along more than one line;
-    None where it is none.
-    """
-    asked, wide = like_plate(seen.comb)
-    if not asked:
-        return None
-    cells, _ = solid.cells, solid.walls
-    try:
-        found = plate_edge(solid.edge, wide=wide) if solid.lined else None
-    except NoBlockFound:
-        return None
-    if found is None:
-        return None
-    comb = replace(cells.comb, plate=True)
-    outline, edge = found
-    if outline is None:
-        return replace(seen, comb=comb)
-    return replace(solid.around(outline), comb=comb, edge=edge)

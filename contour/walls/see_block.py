@@ -12,6 +12,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s
 from contour.image.pixel_grid import averaged, coarse_step, pixels_of
+from contour.image.region import Region
 from contour.relief.relief import Relief
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.coarse_block import coarse_block, small_openings
@@ -46,6 +47,11 @@ class Source(NamedTuple):
 
     picture: Bytes
     border: Float64s | None
+
+    def cut(self, region: Region) -> Source:
+        """The same of the part of the picture that lies in a region's box."""
+        part, first = region.cut(self.picture)
+        return Source(part, None if self.border is None else self.border - first)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,13 +19,13 @@ from contour.acceptance.error_budget import ErrorBudget, error_budget
 from contour.acceptance.findings import Finding, Limits, Refusal, closed
 from contour.acceptance.picture_findings import judge_table
 from contour.acceptance.sent_evidence import ToMillimetres, sent_evidence
-from contour.acceptance.trace_check import CheckedTrace, check_trace
+from contour.acceptance.trace_check import checked_trace
 from contour.calibration.calibration import Calibration
 from contour.edge.known_table import OverTable, over_known_table
 from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, NoCellsFound, ParameterError
 from contour.geometry.agreement import rectified_edges
 from contour.geometry.arrays import Float64s
-from contour.geometry.rectifier import CroppedRectifier, Rectifier
+from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, densified
 from contour.image.line_noise import without_line_noise
@@ -39,7 +39,6 @@ from contour.segmentation.comb_picture import comb_picture
 from contour.segmentation.second_opinion import second_opinion
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import Trace, TraceSettings
-from contour.tracing.tracing import trace
 from contour.walls.see_block import Source
 from service.measuring.measurement import Measurement
 from service.measuring.part_trial import PartTrial
@@ -237,9 +236,9 @@ class Measurer:
                 yield _Look(picture)
         if recipe.method == "wall-tips":
             if recipe.network:
-                drawing = _Drawing(picture)
-                yield _Look(picture, drawing=drawing)
-                yield _Look(picture, drawing=drawing, by_border=True)
+                draw = cache(partial(comb_picture, picture))
+                yield _Look(picture, draw=draw)
+                yield _Look(picture, draw=draw, by_border=True)
             yield _Look(picture, least_rise=_STRONG_WALLS)
 
     def _outlined(
@@ -253,16 +252,13 @@ class Measurer:
         watch: _Stopwatch,
     ) -> Measurement:
         """The measurement of what is looked at in the whole picture."""
-        picture, source = look.picture, None
-        if look.drawing is not None:
-            picture, source = look.drawing.drawn(watch, on_dark=look.on_dark)
-            source = source if look.by_border else source._replace(border=None)
+        picture, source = look.drawn(watch)
         height, width = picture.shape[:2]
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
         settings = replace(trace_settings(recipe), least_rise=look.least_rise)
-        checked = _checked_trace(picture, settings, region, rectifier, watch, look.relief, source)
+        checked = checked_trace(picture, settings, region, rectifier, look.relief, source, on_stage=watch.lap)
         if look.network:
             checked = replace(checked, trace=checked.trace.less_sure(_NETWORK_PITCHES))
         traced = checked.trace
@@ -396,21 +392,32 @@ class Measurer:
 
 class _Look(NamedTuple):
     """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
-    settings of a trace; `drawing`: to look at what a network tells of it, `on_dark` on a dark table, too, `by_border`
+    settings of a trace; `draw`: has a network tell of it what to look at, `on_dark` on a dark table, too, `by_border`
     not at ends of its walls, but at where its comb ends.
     """
 
     picture: NDArray[np.uint8]
     relief: Relief | None = None
     least_rise: float | None = None
-    drawing: _Drawing | None = None
+    draw: Callable[..., tuple[NDArray[np.uint8], Source] | None] | None = None
     on_dark: bool = False
     by_border: bool = False
 
     @property
     def network(self) -> bool:
-        """Whether what is looked at was drawn by a network."""
-        return self.drawing is not None
+        """Whether what is looked at is drawn by a network."""
+        return self.draw is not None
+
+    def drawn(self, watch: _Stopwatch) -> tuple[NDArray[np.uint8], Source | None]:
+        """What to look at, and what it was drawn from; raise NoBlockFound where a network sees none, or is in doubt."""
+        if self.draw is None:
+            return self.picture, None
+        drawn = self.draw(on_dark=self.on_dark)
+        watch.lap("network")
+        if drawn is None:
+            raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")
+        picture, source = drawn
+        return picture, source if self.by_border else source._replace(border=None)
 
     def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
         """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""
@@ -431,24 +438,6 @@ def _over(
     with contextlib.suppress(NoBlockFound, CalibrationError):
         return None if displacement is None else over_known_table(picture, look, recipe.polarity, displacement)
     return None
-
-
-class _Drawing:
-    """What a network draws of a picture, asked once."""
-
-    def __init__(self, picture: NDArray[np.uint8]) -> None:
-        self._picture = picture
-        self._asked = False
-        self._drawn: tuple[NDArray[np.uint8], Source] | None = None
-
-    def drawn(self, watch: _Stopwatch, *, on_dark: bool) -> tuple[NDArray[np.uint8], Source]:
-        """The drawing; raise NoBlockFound where there is none."""
-        if not self._asked:
-            self._drawn, self._asked = comb_picture(self._picture, on_dark=on_dark), True
-            watch.lap("network")
-        if self._drawn is None:
-            raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")
-        return self._drawn
 
 
 def _second_opinion(
@@ -475,30 +464,6 @@ def _second_opinion(
     opinion = second_opinion(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at, told, dark=dark)
     watch.lap("network")
     return judge_opinion(opinion.moved(*first.tolist()), traced.pitch_px)
-
-
-def _checked_trace(
-    picture: NDArray[np.uint8],
-    settings: TraceSettings,
-    region: Region | None,
-    rectifier: Rectifier | None,
-    watch: _Stopwatch,
-    relief: Relief | None = None,
-    source: Source | None = None,
-) -> CheckedTrace:
-    """The block traced in the region alone, and checked there, in pixels of the whole picture."""
-    if region is None:
-        traced = trace(picture, settings, rectifier=rectifier, relief=relief, source=source, on_stage=watch.lap)
-        checked = check_trace(picture, traced, rectifier, relief)
-        watch.lap("quality")
-        return checked
-    part, first = region.cut(picture)
-    within = None if rectifier is None else CroppedRectifier(rectifier, first)
-    there = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
-    drawn = None
-    if source is not None:
-        drawn = Source(region.cut(source.picture)[0], None if source.border is None else source.border - first)
-    return _checked_trace(part, settings, None, within, watch, there, drawn).moved(first)
 
 
 def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:

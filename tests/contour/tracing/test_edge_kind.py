@@ -16,7 +16,7 @@ from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour
 from contour.material.closed_cells import material_edge
 from contour.synthetic import render
-from contour.tracing import wall_tips as tracing_wall_tips
+from contour.tracing import solid
 from contour.tracing.edge_kind import lined_by_walls
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
@@ -269,7 +269,7 @@ def test_the_scale_of_a_grey_picture_is_read_once(monkeypatch: pytest.MonkeyPatc
         read.append(polarity)
         return probe(light, polarity)
 
-    for module in (tracing_wall_tips, see_block):
+    for module in (solid, see_block):
         monkeypatch.setattr(module, "probe", counted)
     assert wall_tips(drawn("hexagonal", "closed").picture, TraceSettings()).edge == "cells"
     assert read == ["auto"]

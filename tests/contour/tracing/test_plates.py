@@ -10,7 +10,7 @@ from contour.errors import NoBlockFound
 from contour.geometry.agreement import agreement
 from contour.geometry.arrays import Bytes
 from contour.geometry.rings import Contour
-from contour.tracing import wall_tips
+from contour.tracing import solid
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
 from service.config.plain_recipe import PlainRecipe
@@ -158,7 +158,7 @@ def test_the_material_of_cells_large_enough_to_be_seen_is_not_looked_at(
     cells: Cells, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It takes as long as all else of a trace."""
-    monkeypatch.setattr(wall_tips, "material_edge", lambda *_: pytest.fail("looked at"))
+    monkeypatch.setattr(solid, "material_edge", lambda *_: pytest.fail("looked at"))
     assert not Measurer(None).measure(lattice(1411000, cells, "cut").picture, PlainRecipe(), 0.0).reasons
 
 

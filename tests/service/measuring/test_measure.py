@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from contour.acceptance import trace_check
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.edge.stretches import Stretch
 from contour.errors import ParameterError, PictureError
@@ -311,7 +312,7 @@ def test_what_lies_over_an_edge_is_not_looked_past_nor_what_few_walls_tell(
         asked.append(settings.least_rise)
         return tracing.trace(picture, settings, **known)
 
-    monkeypatch.setattr(measure, "trace", traced)
+    monkeypatch.setattr(trace_check, "trace", traced)
     seen = measured(render(shop_floor_scene(*scene, alone=True).scene), PlainRecipe(network=False))
     assert seen.reasons[0] == reason
     assert asked == looks
@@ -352,8 +353,16 @@ def test_a_seam_between_two_blocks_that_no_wall_tells_is_seen_by_a_second_opinio
     assert measured(rendered, recipe=Recipe(number=1, name="default", network=False)).findings == ()
 
 
-def test_a_tape_that_is_black_beside_glare_is_not_drawn_away() -> None:
-    assert measured(render(shop_floor_scene("glare", 8_300_007).scene)).reasons == (Reason.EDGE_COVERED,)
+def test_what_lies_over_an_edge_shows_in_the_picture_beside_what_a_network_draws(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A tape, black beside glare: no thing to the network, which draws what it leaves of the comb."""
+    rendered = render(shop_floor_scene("glare", 8_300_007).scene)
+    assert measured(rendered).findings
+    monkeypatch.setattr(
+        trace_check, "trace", lambda *shown, **known: tracing.trace(*shown, **{**known, "source": None})
+    )
+    assert measured(rendered).findings == ()
 
 
 def test_where_faint_walls_were_left_out_another_look_is_taken() -> None:
@@ -383,7 +392,7 @@ def test_compound_of_coarse_grain_that_was_cut_with_the_block_is_its_edge() -> N
 def test_a_table_without_any_cells_is_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[TraceSettings] = []
     monkeypatch.setattr(
-        measure,
+        trace_check,
         "trace",
         lambda picture, settings, **known: asked.append(settings) or tracing.trace(picture, settings, **known),
     )

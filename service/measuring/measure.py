@@ -203,6 +203,8 @@ class Measurer:
                 again = outlined(look._replace(on_dark=not reasons & _LIES_THERE))
                 if not again.findings:
                     return again
+                if look.network and Reason.EDGE_COVERED in again.reasons:
+                    break  # what lies over an edge that is drawn would be drawn away
                 reasons |= {Reason.SEVERAL_BLOCKS} & {*again.reasons}
         watch.lap("table")
         if refused is not None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from contour.acceptance import trace_check
+from contour.acceptance.trace_check import CheckedTrace
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.edge.stretches import Stretch
 from contour.errors import ParameterError, PictureError
@@ -16,6 +18,7 @@ from contour.geometry.rings import area, farthest, hausdorff, perimeter
 from contour.synthetic import render
 from contour.tracing import tracing
 from contour.tracing.trace import Trace, TraceSettings
+from contour.walls.see_block import Source
 from service.config.plain_recipe import PlainRecipe
 from service.config.recipes import Recipe
 from service.measuring import measure
@@ -287,6 +290,25 @@ def test_what_lies_over_an_edge_on_such_a_table_is_not_drawn_away(cover: Drawn, 
     rng = np.random.default_rng([seed, 5])
     scene = cover(rng, structured("brushed")(rng, shop_floor_block(seed)))
     assert measured(render(scene)).findings
+
+
+def test_where_something_lies_over_an_edge_that_is_drawn_the_border_of_comb_is_not_asked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    by_border: list[bool] = []
+
+    def checked(*looked: Any, **known: Any) -> CheckedTrace:
+        source = looked[-1]
+        by_border.append(source is not None and source.border is not None)
+        return trace_check.checked_trace(*looked, **known)
+
+    border = np.empty((0, 2))
+    monkeypatch.setattr(measure, "comb_picture", lambda picture, **_: (picture, Source(picture, border)))
+    monkeypatch.setattr(measure, "checked_trace", checked)
+    seen = measured(render(shop_floor_scene("tape", 1_880_001, alone=True).scene))
+    assert Reason.EDGE_COVERED in seen.reasons
+    assert len(by_border) > 1
+    assert not any(by_border)
 
 
 def test_on_a_tables_grain_a_block_is_found_by_its_strong_walls() -> None:

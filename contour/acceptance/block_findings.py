@@ -232,6 +232,10 @@ def judge_opinion(opinion: SecondOpinion, pitch_px: float) -> tuple[Finding, ...
         findings.append(_lies_over(opinion.over, pitch_px))
     if opinion.bare is not None:
         findings.append(_no_cells(opinion.bare.pitches, opinion.bare.place_px, SHOWN_PITCHES * pitch_px))
+    if opinion.hole is not None:
+        findings.append(_hole_left_out(opinion.hole, pitch_px))
+    if opinion.corner is not None:
+        findings.append(_corner_beyond(opinion.corner, pitch_px))
     if opinion.seam is not None:
         findings.append(_seam(opinion.seam, pitch_px))
     return tuple(findings)
@@ -267,6 +271,28 @@ def _no_cells(long: float, place_px: tuple[float, float], shown_px: float) -> Fi
         f"Along {long:.1f} cells of the contour, near ({x:.0f}, {y:.0f}) px, no cells lie just within it: it may run "
         "over the table, a label or along a cable there. Look at the overlay; clear the edge, check light and table, "
         "or set max_disagreement_pitches: 0 for blocks with filled cells.",
+    )
+
+
+def _hole_left_out(hole: Doubt, pitch_px: float) -> Finding:
+    (x, y), wide = hole.place_px, hole.pitches
+    return _disagreement_at(
+        (x, y),
+        0.5 * wide * pitch_px,
+        f"Within the contour, near ({x:.0f}, {y:.0f}) px, there are no cells over {wide:.1f} cells, and it is as light "
+        "as the table: a hole that was not traced, or something that lies on the block. Look at the overlay; take it "
+        "away, or set max_disagreement_pitches: 0 for blocks with filled cells.",
+    )
+
+
+def _corner_beyond(corner: Doubt, pitch_px: float) -> Finding:
+    (x, y), far = corner.place_px, corner.pitches
+    return _disagreement_at(
+        (x, y),
+        SHOWN_PITCHES * pitch_px,
+        f"A corner of the contour reaches {far:.1f} cells beyond comb, near ({x:.0f}, {y:.0f}) px: it may be rounded "
+        "there, or a wall lies beside it. Look at the overlay; take away what lies beside the block, and check light "
+        "and focus.",
     )
 
 

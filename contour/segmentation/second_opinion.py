@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s
+from contour.geometry.agreement import places_along
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median
 from contour.geometry.rings import Contour
 from contour.image.opencv import box_mean, pieces_and_areas, pieces_of, within
 from contour.image.pixel_grid import fill_finely
@@ -30,6 +32,11 @@ _DEEP, _LONG, _KNOWN = 0.375, 0.8, 1.0
 # changes by in the block.
 _WITHIN, _NO_COMB, _LONG_BARE, _LEAST_WIDE_PX = (0.3, 0.9), 0.25, 1.15, 4
 _ALIKE, _CONTRAST = 0.3, (0.05, 0.95)
+# So is a hole that was not traced, which holds a disc of that diameter, pitches; what lies on the block is seldom so.
+_HOLE, _AS_LIGHT = 2.2, 0.2
+# A corner, where the outline turns by so much from so many pitches before to as many after, in steps of so many; beyond
+# comb it is as light as the table up to so much.
+_TURN, _LEG, _STEP, _NEAR_TABLE = math.radians(35.0), 6, 0.1, 0.5
 # A seam parts what lies so far within the outline into pieces of so many square pitches; its parts may be twice so far
 # apart.
 _INNER, _CELLS, _LINK = 1.0, 6.0, 0.8
@@ -52,14 +59,17 @@ class Doubt(NamedTuple):
 
 class SecondOpinion(NamedTuple):
     """What speaks against an outline: how far comb reaches `beyond` it, along how much of it something seems to lie
-    `over` it or no cells within it (`bare`), and how long a `seam` is that parts the block. None where it reaches less
-    than about half a cell, and along less than that.
+    `over` it or no cells within it (`bare`), how wide a `hole` may be that was left out, how far a `corner` reaches
+    beyond comb, and how long a `seam` is that parts the block. None where it reaches less than about half a cell, and
+    along less than that.
     """
 
-    beyond: Doubt | None
-    over: Doubt | None
-    bare: Doubt | None
-    seam: Doubt | None
+    beyond: Doubt | None = None
+    over: Doubt | None = None
+    bare: Doubt | None = None
+    hole: Doubt | None = None
+    corner: Doubt | None = None
+    seam: Doubt | None = None
 
     def moved(self, x: float, y: float) -> SecondOpinion:
         """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
@@ -91,9 +101,15 @@ def second_opinion(
     deep, away = (np.asarray(cv2.distanceTransform(side, cv2.DIST_L2, 5), np.float32) for side in (block, 1 - block))
     known = _known(block.shape, [grid.there(path) for path in told])
     over = _over(block, thing, glare(part, block > 0, LIGHT_PITCH_PX), known, grid)
-    bare = _bare(deep, away, sure_comb, light, known, grid) if over is None else None
-    parted = _seam(deep, sure_comb, seam, 255 - light if dark else light, grid)
-    return SecondOpinion(_beyond(block, away, comb, thing, loose, grid), over, bare, parted)
+    sides = _Sides(deep, away, sure_comb, light, ((deep > 0.0) & (sure_comb < _NO_COMB)).astype(np.uint8))
+    return SecondOpinion(
+        _beyond(block, away, comb, thing, loose, grid),
+        over,
+        _bare(sides, known, grid) if over is None else None,
+        _hole(sides, grid),
+        _corner(sides, grid.there(contour.exterior), known, grid),
+        _seam(deep, sure_comb, seam, 255 - light if dark else light, grid),
+    )
 
 
 class _Grid(NamedTuple):
@@ -150,20 +166,97 @@ def _over(block: Bytes, thing: Float32s, blinds: Bools, known: Bools, grid: _Gri
     return _longest(lies & ~known, _DEEP, _LONG, grid)
 
 
-def _bare(deep: Float32s, away: Float32s, comb: Float32s, light: Bytes, known: Bools, grid: _Grid) -> Doubt | None:
+class _Sides(NamedTuple):
+    """How deep in the block, and how far away from it, a place lies, samples, how surely it is comb, its light, and
+    where within the block surely is no comb, (h, w) each.
+    """
+
+    deep: Float32s
+    away: Float32s
+    comb: Float32s
+    light: Bytes
+    none: Bytes
+
+    @property
+    def contrast(self) -> float:
+        """What light changes by in the block."""
+        return float(np.ptp(np.quantile(self.light[self.deep > 0.0], _CONTRAST)))
+
+    @property
+    def beside(self) -> Bools:
+        """What lies beyond the outline and near it."""
+        near, far = (share * LIGHT_PITCH_PX for share in _WITHIN)
+        return np.asarray((self.away > near) & (self.away < far))
+
+    def as_beside(self, part: Bools, least: float) -> Bools:
+        """Where a part is as light as what lies beside, within a cell, up to that share of the contrast, (h, w)."""
+        step = np.abs(_light_of(self.light, part) - _light_of(self.light, self.beside))
+        return np.asarray(step < least * self.contrast)
+
+
+def _bare(sides: _Sides, known: Bools, grid: _Grid) -> Doubt | None:
     """The longest part of the edge within which there are no cells, and that is as light within as beyond: compound
     that was cut with the block ends there.
     """
-    none = ((deep > 0.0) & (comb < _NO_COMB)).astype(np.uint8)
-    wide = np.ones((_LEAST_WIDE_PX, _LEAST_WIDE_PX), np.uint8)
-    none = np.asarray(cv2.morphologyEx(none, cv2.MORPH_OPEN, wide), np.uint8)
     near, far = (share * LIGHT_PITCH_PX for share in _WITHIN)
-    bare = (none > 0) & (deep > near) & (deep < far) & ~known
+    bare = (_wide(sides.none) > 0) & (sides.deep > near) & (sides.deep < far) & ~known
     if not bare.any():
         return None
-    step = np.abs(_light_of(light, bare) - _light_of(light, (away > near) & (away < far)))
-    bare &= step < _ALIKE * float(np.ptp(np.quantile(light[deep > 0.0], _CONTRAST)))
-    return _longest(bare, _WITHIN[1] - _WITHIN[0], _LONG_BARE, grid)
+    return _longest(bare & sides.as_beside(bare, _ALIKE), _WITHIN[1] - _WITHIN[0], _LONG_BARE, grid)
+
+
+def _wide(part: Bytes) -> Bytes:
+    """Without what lies between walls."""
+    return np.asarray(
+        cv2.morphologyEx(part, cv2.MORPH_OPEN, np.ones((_LEAST_WIDE_PX, _LEAST_WIDE_PX), np.uint8)), np.uint8
+    )
+
+
+def _hole(sides: _Sides, grid: _Grid) -> Doubt | None:
+    """The widest part within the block without cells, if a hole would be as wide and it is as light as the table."""
+    none = _wide(sides.none)
+    room = np.asarray(cv2.distanceTransform(none, cv2.DIST_L2, 5), np.float32)
+    as_wide = room > 0.5 * _HOLE * LIGHT_PITCH_PX
+    if not as_wide.any():
+        return None
+    pieces, table = pieces_of(none, 8)[1], median(sides.light[sides.beside])
+    there = np.zeros_like(room)
+    at_edge = np.unique(pieces[sides.deep < _WITHIN[0] * LIGHT_PITCH_PX])
+    for number in np.setdiff1d(pieces[as_wide], at_edge):
+        core = (pieces == number) & (room > _RIM * LIGHT_PITCH_PX)
+        if abs(median(sides.light[core]) - table) < _AS_LIGHT * sides.contrast:
+            there[core] = room[core]
+    if not there.any():
+        return None
+    y, x = np.unravel_index(int(there.argmax()), there.shape)
+    return Doubt(2.0 * float(there.max()) / LIGHT_PITCH_PX, _place(grid, float(x), float(y)))
+
+
+def _corner(sides: _Sides, ring: Float64s, known: Bools, grid: _Grid) -> Doubt | None:
+    """The corner of a ring, (N, 2) in the map, that reaches farthest beyond comb, if it reaches too far over what is as
+    light as the table: a rounding was taken for a corner, or a wall that is none of the block's for its end.
+    """
+    places = places_along(Contour(ring), _STEP * LIGHT_PITCH_PX)
+    before, after = places - np.roll(places, _LEG, axis=0), np.roll(places, -_LEG, axis=0) - places
+    cross, dot = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1)
+    turns = np.arctan2(cross, dot)
+    turns *= np.sign(turns.sum())
+    comb = cv2.morphologyEx(
+        (sides.comb > _SURE).astype(np.uint8), cv2.MORPH_OPEN, np.ones((_LEAST_PX, _LEAST_PX), np.uint8)
+    )
+    reach = np.asarray(cv2.distanceTransform(1 - comb, cv2.DIST_L2, 5), np.float32) / np.float32(LIGHT_PITCH_PX)
+    x, y = np.clip(np.rint(places).astype(int), 0, np.array(reach.shape[::-1]) - 1).T
+    far = np.where((turns > _TURN) & ~known[y, x], reach[y, x], np.float32(0.0))
+    number = int(far.argmax())
+    if far[number] < _FAR or not sides.as_beside(sides.none > 0, _NEAR_TABLE)[y[number], x[number]]:
+        return None
+    return Doubt(float(far[number]), _place(grid, *places[number].tolist()))
+
+
+def _place(grid: _Grid, x: float, y: float) -> tuple[float, float]:
+    """A place in the picture of one in the map."""
+    there_x, there_y = grid.back(np.array([x, y])).tolist()
+    return there_x, there_y
 
 
 def _light_of(light: Bytes, part: Bools) -> Float32s:

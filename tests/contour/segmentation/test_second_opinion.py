@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from contour.geometry.rings import Contour
-from contour.segmentation.second_opinion import second_opinion
-from contour.synthetic import Rendered, render
+from contour.segmentation.second_opinion import SecondOpinion, second_opinion
+from contour.synthetic import Rendered, area_coverage, render
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 
@@ -30,14 +30,14 @@ def scene_of(kind: str, seed: int) -> Rendered:
 @pytest.mark.parametrize("kind", ["undisturbed", "mirror", "light_table", "dim", "motion", "splice", "crushed"])
 def test_nothing_speaks_against_the_true_outline(kind: str) -> None:
     rendered = scene_of(kind, 95_100_001)
-    assert second_opinion(rendered.picture, rendered.truth_px, rendered.pitch_px, nowhere) == (None, None, None, None)
+    assert second_opinion(rendered.picture, rendered.truth_px, rendered.pitch_px, nowhere) == SecondOpinion()
 
 
 def test_compound_at_the_edge_is_no_comb_and_nothing_else_speaks_against_it() -> None:
     rendered = scene_of("compound", 95_100_001)
     picture, truth, pitch = rendered.picture, rendered.truth_px, rendered.pitch_px
-    assert second_opinion(picture, truth, pitch, nowhere)._replace(bare=None) == (None, None, None, None)
-    assert second_opinion(picture, truth, pitch, nowhere, truth.rings) == (None, None, None, None)
+    assert second_opinion(picture, truth, pitch, nowhere)._replace(bare=None) == SecondOpinion()
+    assert second_opinion(picture, truth, pitch, nowhere, truth.rings) == SecondOpinion()
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("tape", 95_100_005), ("hand_or_cable", 95_100_006)])
@@ -111,6 +111,41 @@ def test_an_outline_across_a_notch_has_no_cells_within_unless_it_is_known_what_l
     assert bare is not None
     assert np.hypot(*(np.array(bare.place_px) - place)) < 1.5 * pitch
     assert second_opinion(notched, rendered.truth_px, pitch, nowhere, [ring]).bare is None
+
+
+@pytest.mark.parametrize("kind", ["undisturbed", "light_table"])
+def test_a_hole_that_was_not_traced_is_seen_and_what_is_of_another_light_than_the_table_is_none(kind: str) -> None:
+    rendered = scene_of(kind, 95_100_001)
+    picture, truth, pitch = rendered.picture, rendered.truth_px, rendered.pitch_px
+    block = area_coverage(truth.rings, *picture.shape[1::-1]) > 0.5
+    x, y = divmod(int(cv2.distanceTransform(block.astype(np.uint8), cv2.DIST_L2, 5).T.argmax()), picture.shape[0])
+    light = np.median(picture[~block])
+    for filled, told in ((light, True), (light + 120.0 if light < 128.0 else light - 120.0, False)):
+        there = picture.copy()
+        rough = np.random.default_rng(1).normal(filled, 3.0, picture.shape).clip(0, 255).astype(np.uint8)
+        disc = cv2.circle(np.zeros(picture.shape, np.uint8), (x, y), round(2.0 * pitch), 1, -1) > 0
+        there[disc] = rough[disc]
+        hole = second_opinion(there, truth, pitch, nowhere).hole
+        assert (hole is not None) == told
+        if hole is not None:
+            assert hole.pitches == pytest.approx(4.0, abs=1.0)
+            assert np.hypot(*(np.array(hole.place_px) - (x, y))) < pitch
+
+
+@pytest.mark.parametrize("kind", ["undisturbed", "light_table"])
+def test_a_corner_beyond_comb_is_seen_unless_it_is_known_what_lies_there(kind: str) -> None:
+    rendered = scene_of(kind, 95_100_001)
+    ring, pitch = rendered.truth_px.exterior, rendered.pitch_px
+    number = int(ring[:, 0].argmax())
+    ring = np.roll(ring, -number, axis=0)
+    near = np.hypot(*(ring - ring[0]).T) < 1.2 * pitch
+    tip = ring[0] + (1.0 * pitch, 0.0)
+    pointed = Contour(np.vstack([tip, ring[~near]]))
+    corner = second_opinion(rendered.picture, pointed, pitch, nowhere).corner
+    assert corner is not None
+    assert corner.pitches == pytest.approx(1.0, abs=0.4)
+    assert np.hypot(*(np.array(corner.place_px) - tip)) < 0.7 * pitch
+    assert second_opinion(rendered.picture, pointed, pitch, nowhere, [pointed.exterior]).corner is None
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.3])

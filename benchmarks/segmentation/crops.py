@@ -49,6 +49,8 @@ def crop(one: Example, rng: np.random.Generator) -> Crop:
         light = _on_other_table(light, comb, thing, gone, rng, dark=one.dark)
     if rng.random() < 0.25:
         light = _with_flanks(light, comb * (1.0 - thing), rng)
+    if rng.random() < 0.2:
+        light = _with_cast_walls(light, wall, 1.0 - np.maximum(comb, thing), rng)
     if rng.random() < 0.1:
         shade = np.float32(rng.uniform(-0.3, 0.5))
         light = light * (1.0 - shade * np.clip(0.5 + _line(rng) / float(rng.uniform(1.0, 10.0)), 0.0, 1.0))
@@ -261,6 +263,18 @@ def _with_flanks(light: Float32s, comb: Float32s, rng: np.random.Generator) -> F
         more = np.maximum(there - seen, 0.0)
         flank, seen = flank + shade * lower * more / np.maximum(there, 1e-3), np.maximum(seen, there)
     return np.asarray(light * (1.0 - seen) + flank, np.float32)
+
+
+def _with_cast_walls(light: Float32s, wall: Float32s, table: Float32s, rng: np.random.Generator) -> Float32s:
+    """With what walls near the edge cast on the table, up to some cells away: shadows, or light, as foil does."""
+    turn, first = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(0.0, 1.5)) * (rng.random() < 0.5)
+    far = first + math.exp(rng.uniform(math.log(0.05), math.log(3.0)))
+    cast = np.zeros_like(wall)
+    for away in range(round(first * PITCH_PX), round(far * PITCH_PX) + 1):
+        aside = np.array([[1.0, 0.0, away * math.cos(turn)], [0.0, 1.0, away * math.sin(turn)]])
+        cast = np.maximum(cast, cv2.warpAffine(wall, aside, (SIZE, SIZE), borderMode=cv2.BORDER_REFLECT))
+    cast = cv2.GaussianBlur(cast, (0, 0), float(rng.uniform(0.3, 3.0)))
+    return np.asarray(light * (1.0 - np.float32(rng.uniform(-0.4, 0.7)) * cast * table), np.float32)
 
 
 def _covered(light: Float32s, comb: Float32s, thing: Float32s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:

@@ -28,6 +28,7 @@ from contour.narrow_features.narrow_feature import narrow_feature
 from contour.relief.relief import Relief
 from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.tracing.tracing import trace
+from contour.walls.lightness import wall_light
 from contour.walls.see_block import Source
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
@@ -80,7 +81,7 @@ def checked_trace(
     """
     if region is None:
         traced = trace(picture, settings, rectifier=rectifier, relief=relief, source=source, on_stage=on_stage)
-        checked = check_trace(picture, traced, rectifier, relief)
+        checked = check_trace(picture, traced, rectifier, relief, source)
         on_stage("quality")
         return checked
     part, first = region.cut(picture)
@@ -91,7 +92,11 @@ def checked_trace(
 
 
 def check_trace(
-    picture: Bytes, traced: Trace, rectifier: Rectifier | None, relief: Relief | None = None
+    picture: Bytes,
+    traced: Trace,
+    rectifier: Rectifier | None,
+    relief: Relief | None = None,
+    source: Source | None = None,
 ) -> CheckedTrace:
     """The trace with its quality and its disagreement with the picture, (H, W) grey or (H, W, 3) BGR, uint8.
 
@@ -108,7 +113,7 @@ def check_trace(
     loose = None if traced.look is None or traced.look.loose is None else traced.look.loose.astype(np.uint8)
     apart, edge = side_by_side(
         lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat, loose),
-        lambda: _checked_edge(picture, traced, pitch_px, relief),
+        lambda: _checked_edge(picture, traced, pitch_px, relief, source),
     )
     return _without_image(CheckedTrace(traced, quality, apart, *edge), pitch_px)
 
@@ -136,10 +141,12 @@ def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:
 
 
 def _checked_edge(
-    picture: Bytes, traced: Trace, pitch_px: float, relief: Relief | None
+    picture: Bytes, traced: Trace, pitch_px: float, relief: Relief | None, source: Source | None
 ) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None, EdgePart | None, EdgePart | None]:
     """What is narrow, alike, bare, overrun and runs on of an edge; the last alone where closed cells are serrated."""
-    runs_on = border_beyond(_planes(picture, traced.light), traced.contour, pitch_px)
+    # What was drawn has no borders on its table.
+    taken, light = (picture, traced.light) if source is None else (source.picture, wall_light(source.picture))
+    runs_on = border_beyond(_planes(taken, light), traced.contour, pitch_px)
     if runs_on is None and relief is not None and relief.even:
         runs_on = border_beyond(_planes(relief.lit, grey(relief.lit)), traced.contour, pitch_px, of_any_light=True)
     if traced.evidence is None:

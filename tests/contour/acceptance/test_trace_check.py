@@ -15,6 +15,7 @@ from contour.geometry.rings import Contour
 from contour.synthetic import render
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.tracing import trace
+from contour.walls.see_block import Source
 from tests.support.pictures.small_scenes import block
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 from tests.support.scenes.trials import calibration_for, measured
@@ -159,6 +160,17 @@ def test_a_sheet_whose_border_runs_on_is_told_beside_closed_cells_too_and_where_
     for edge, evidence in (("cells", None), ("cut", ())):
         traced = Trace("wall-tips", "bright", 16.0, outline, light, evidence=evidence, edge=edge)
         assert check_trace(picture, traced, None).runs_on is not None
+
+
+def test_of_comb_that_was_drawn_the_picture_that_was_taken_tells_whose_border_runs_on() -> None:
+    taken = np.full((300, 400), 60, np.uint8)
+    taken[:150] += 12
+    taken[151:251, 120:281] = 150
+    drawn = np.where(taken == 150, 150, 12).astype(np.uint8)
+    outline = Contour(np.array([[119.5, 150.5], [119.5, 250.5], [280.5, 250.5], [280.5, 150.5]]))
+    traced = Trace("wall-tips", "bright", 16.0, outline, drawn, evidence=(), edge="cut")
+    assert check_trace(drawn, traced, None).runs_on is None
+    assert check_trace(drawn, traced, None, source=Source(taken, None)).runs_on is not None
 
 
 def test_dark_grooves_of_a_table_that_lead_to_the_block_are_not_left_out_of_it() -> None:

@@ -382,7 +382,7 @@ def test_what_lies_over_an_edge_shows_in_the_picture_beside_what_a_network_draws
     rendered = render(shop_floor_scene("glare", 8_300_007).scene)
     assert measured(rendered).findings
     monkeypatch.setattr(
-        trace_check, "trace", lambda *shown, **known: tracing.trace(*shown, **{**known, "source": None})
+        measure, "checked_trace", lambda *looked, **known: trace_check.checked_trace(*looked[:-1], None, **known)
     )
     assert measured(rendered).findings == ()
 

@@ -28,7 +28,7 @@ _CHECKS: dict[str, tuple[tuple[ModuleType, str], ...]] = {
     "quality of the picture": ((trace_check, "block_quality"),),
     "second account of the block": ((trace_check, "_bent"), (trace_check, "disagreement")),
     "uncertainty": ((wall_tips, "uncertainty"),),
-    "other pieces, reach to the frame": ((see_block, "pieces_beside"), (see_block, "reaches_frame")),
+    "other pieces, reach to the frame": ((see_block, "pieces_beside"), (see_block, "walls_at_frame")),
     "limits, comb likeness, budget": ((measure, "judge"), (measure, "error_budget")),
 }
 

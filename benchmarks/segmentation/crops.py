@@ -258,7 +258,7 @@ def _with_flanks(light: Float32s, comb: Float32s, rng: np.random.Generator) -> F
     within = light * comb
     flank, seen = within, comb
     for deep in range(1, round(float(rng.uniform(0.15, 1.1)) * PITCH_PX)):
-        down = np.array([[1.0, 0.0, deep * math.cos(turn)], [0.0, 1.0, deep * math.sin(turn)]])
+        down = _aside(turn, deep)
         lower, there = (cv2.warpAffine(plane, down, (SIZE, SIZE)) for plane in (within, comb))
         more = np.maximum(there - seen, 0.0)
         flank, seen = flank + shade * lower * more / np.maximum(there, 1e-3), np.maximum(seen, there)
@@ -271,10 +271,14 @@ def _with_cast_walls(light: Float32s, wall: Float32s, table: Float32s, rng: np.r
     far = first + math.exp(rng.uniform(math.log(0.05), math.log(3.0)))
     cast = np.zeros_like(wall)
     for away in range(round(first * PITCH_PX), round(far * PITCH_PX) + 1):
-        aside = np.array([[1.0, 0.0, away * math.cos(turn)], [0.0, 1.0, away * math.sin(turn)]])
-        cast = np.maximum(cast, cv2.warpAffine(wall, aside, (SIZE, SIZE), borderMode=cv2.BORDER_REFLECT))
+        cast = np.maximum(cast, cv2.warpAffine(wall, _aside(turn, away), (SIZE, SIZE), borderMode=cv2.BORDER_REFLECT))
     cast = cv2.GaussianBlur(cast, (0, 0), float(rng.uniform(0.3, 3.0)))
     return np.asarray(light * (1.0 - np.float32(rng.uniform(-0.4, 0.7)) * cast * table), np.float32)
+
+
+def _aside(turn: float, far: float) -> Float64s:
+    """What moves a plane so far in that direction, for cv2.warpAffine."""
+    return np.array([[1.0, 0.0, far * math.cos(turn)], [0.0, 1.0, far * math.sin(turn)]])
 
 
 def _covered(light: Float32s, comb: Float32s, thing: Float32s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:

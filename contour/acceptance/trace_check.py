@@ -28,7 +28,6 @@ from contour.narrow_features.narrow_feature import narrow_feature
 from contour.relief.relief import Relief
 from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.tracing.tracing import trace
-from contour.walls.lightness import wall_light
 from contour.walls.see_block import Source
 
 # A chord as long as this leaves the curve of the widest lens in use by less than a tenth of a cell.
@@ -145,7 +144,7 @@ def _checked_edge(
 ) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None, EdgePart | None, EdgePart | None]:
     """What is narrow, alike, bare, overrun and runs on of an edge; the last alone where closed cells are serrated."""
     # What was drawn has no borders on its table.
-    taken, light = (picture, traced.light) if source is None else (source.picture, wall_light(source.picture))
+    taken, light = (picture, traced.light) if source is None else (source.picture, source.light)
     runs_on = border_beyond(_planes(taken, light), traced.contour, pitch_px)
     if runs_on is None and relief is not None and relief.even:
         runs_on = border_beyond(_planes(relief.lit, grey(relief.lit)), traced.contour, pitch_px, of_any_light=True)

@@ -92,9 +92,10 @@ def _axis(picture: Bytes, walls: SeenWalls, first: Contour | None, rectifier: Re
             if best.whole:
                 break
             axis = axis_beside(walls.light, best.contour, walls.cells.pitch_px)
-            before, best = best, _better(best, _found(picture, walls, _within(walls, strong, axis), rectifier)) or best
-            if best is before:  # and so it would be again
+            turned = _better(best, _found(picture, walls, _within(walls, strong, axis), rectifier))
+            if turned is None or turned is best:  # and so it would be again
                 break
+            best = turned
         if best.shown.share < _HALF:
             return None
     return best if best is not None and best.whole else None

@@ -20,7 +20,7 @@ from contour.edge.table_light import table_light
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
 from contour.geometry.ring_lengths import RingLengths
 from contour.image import channels
-from contour.image.opencv import deep, pieces_and_boxes, pieces_of, within
+from contour.image.opencv import deep, opened, pieces_and_boxes, pieces_of, within
 from contour.image.pixel_grid import drawn, fill, samples_of, whole_averaged
 from contour.image.pixel_sampling import sample_at
 from contour.walls.wall_evidence import BlockEvidence, RingEvidence
@@ -185,7 +185,7 @@ class TableLook:
         if np.count_nonzero(filled) <= _MOST * np.count_nonzero(inside):
             return None
         body = (inside & (self.light > 0.5 * median(self.light[filled]))).astype(np.uint8)
-        away = cv2.distanceTransform(cv2.morphologyEx(body, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)), cv2.DIST_L2, 3)
+        away = cv2.distanceTransform(opened(body, 3), cv2.DIST_L2, 3)
         deep = np.asarray(away, np.float64) * (self.step / self.pitch_px)
         rim = (deep > _HOLE_RIM[0]) & (deep < _HOLE_RIM[1])
         middle = deep > max(_HOLE_MIDDLE[0], _HOLE_MIDDLE[1] * float(deep.max()))

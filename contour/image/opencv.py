@@ -288,6 +288,11 @@ def _disc(radius: float, neighbours: int) -> Bytes:
     return (cv2.distanceTransform(point, cv2.DIST_L2, neighbours) <= radius).astype(np.uint8)
 
 
+def opened(mask: Bytes, side: int) -> Bytes:
+    """The picture, (H, W), without what is light and no square of so many pixels fits into."""
+    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8)), np.uint8)
+
+
 def closed_by_disc(mask: Bytes, radius: float) -> Bytes:
     """A mask of 0 and 1, (H, W), closed with a disc; nothing lies beyond its border."""
     pad = int(radius) + 2

@@ -16,7 +16,7 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, median
 from contour.geometry.rings import Contour, Ring, signed_area
-from contour.image.opencv import fewer_vertices, pieces_and_areas, pieces_and_boxes, pieces_of
+from contour.image.opencv import fewer_vertices, opened, pieces_and_areas, pieces_and_boxes, pieces_of
 from contour.image.pixel_sampling import sample_at
 from contour.image.side_by_side import side_by_side
 from contour.material.leaking_cells import leaking_cells
@@ -162,7 +162,7 @@ def _outlined(apart: Apart, cuts: Float64s = _NO_CUTS) -> MaterialEdge:
     region, difference, level = apart.region, apart.difference, apart.level
     border, _ = cv2.findContours(region, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
     # Threads a pixel wide would cross themselves once they are moved.
-    body = cv2.morphologyEx(region, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    body = opened(region, 3)
     chains, hierarchy = cv2.findContours(body, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     found = [
         (*_sub_pixel(difference, level, chain[:, 0, :].astype(np.float64), cuts), bool(node[3] >= 0))

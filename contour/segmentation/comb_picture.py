@@ -9,7 +9,7 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
-from contour.image.opencv import box_mean, grown, pieces_and_areas, shrunk_to, within
+from contour.image.opencv import box_mean, grown, opened, pieces_and_areas, shrunk_to, within
 from contour.image.pixel_sampling import sample_at
 from contour.segmentation.glare import glare
 from contour.segmentation.network import LIGHT_PITCH_PX, PITCH_PX, Segments, comb_and_things, segments
@@ -85,7 +85,7 @@ def _pitches(light: Bytes) -> list[tuple[float, tuple[slice, slice]]]:
     """At which pitches the light network sees comb, and rows and columns of all that it sees, with what lies around;
     that pitch first of which it sees most.
     """
-    speck, areas = np.ones((_SPECK_PX, _SPECK_PX), np.uint8), dict[float, float]()
+    areas = dict[float, float]()
     boxes = dict[float, tuple[slice, slice]]()
     for guess in _GUESSES:
         if guess == _GUESSES[-1] and max(areas.values(), default=0.0) > _MUCH:
@@ -93,7 +93,7 @@ def _pitches(light: Bytes) -> list[tuple[float, tuple[slice, slice]]]:
         if light.size * (PITCH_PX / (_TWICE * guess)) ** 2 > _MOST_PX:
             continue
         comb = (comb_and_things(light, guess)[0] > _SURE).astype(np.uint8)
-        pieces, area = pieces_and_areas(np.asarray(cv2.morphologyEx(comb, cv2.MORPH_OPEN, speck), np.uint8), 8)
+        pieces, area = pieces_and_areas(opened(comb, _SPECK_PX), 8)
         most = int(area.max())
         if most > _CELLS * _CELL * LIGHT_PITCH_PX**2:
             areas[guess] = most / comb.size
@@ -184,7 +184,7 @@ def _drawn(seen: Segments) -> Bytes:
     """
     comb = seen.comb > _SURE
     bare = comb & (within(seen.wall > _SEEN_WALL, _ROOM * PITCH_PX) == 0)
-    filled = cv2.morphologyEx(bare.astype(np.uint8), cv2.MORPH_OPEN, np.ones((_SPECK_PX, _SPECK_PX), np.uint8)) > 0
+    filled = opened(bare.astype(np.uint8), _SPECK_PX) > 0
     wall = np.where(filled, _lattice(comb.shape), seen.wall) if filled.any() else seen.wall
     return (np.where(comb, _WALL * wall, np.float32(0.0)) + _DARK).astype(np.uint8)
 

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from contour.geometry.agreement import places_along
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median
-from contour.geometry.rings import Contour
-from contour.image.opencv import box_mean, pieces_and_areas, pieces_of, within
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, rolled
+from contour.geometry.rings import Contour, signed_area
+from contour.image.opencv import box_mean, opened, pieces_and_areas, pieces_of, within
 from contour.image.pixel_grid import fill_finely
 from contour.segmentation.glare import glare
 from contour.segmentation.network import LIGHT_PITCH_PX, comb_things_and_seams
@@ -101,12 +101,13 @@ def second_opinion(
     deep, away = (np.asarray(cv2.distanceTransform(side, cv2.DIST_L2, 5), np.float32) for side in (block, 1 - block))
     known = _known(block.shape, [grid.there(path) for path in told])
     over = _over(block, thing, glare(part, block > 0, LIGHT_PITCH_PX), known, grid)
-    sides = _Sides(deep, away, sure_comb, light, ((deep > 0.0) & (sure_comb < _NO_COMB)).astype(np.uint8))
+    sides = _Sides(deep, away, sure_comb, light)
+    none = opened(sides.none, _LEAST_WIDE_PX)
     return SecondOpinion(
         _beyond(block, away, comb, thing, loose, grid),
         over,
-        _bare(sides, known, grid) if over is None else None,
-        _hole(sides, grid),
+        _bare(sides, none, known, grid) if over is None else None,
+        _hole(sides, none, grid),
         _corner(sides, grid.there(contour.exterior), known, grid),
         _seam(deep, sure_comb, seam, 255 - light if dark else light, grid),
     )
@@ -126,13 +127,17 @@ class _Grid(NamedTuple):
         """Places in the picture of places in the map, (N, 2)."""
         return (samples + 0.5) / self.size - 0.5 + self.first
 
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        """A place in the picture of one in the map."""
+        there_x, there_y = self.back(np.array([x, y])).tolist()
+        return there_x, there_y
+
 
 def _beyond(
     block: Bytes, away: Float32s, comb: Float32s, thing: Float32s, loose: Callable[[Float64s], Bools], grid: _Grid
 ) -> Doubt | None:
     """How far comb reaches beyond the block, and where it reaches farthest in the first piece that reaches too far."""
-    beyond = ((comb > _SURE) & (block == 0)).astype(np.uint8)
-    beyond = np.asarray(cv2.morphologyEx(beyond, cv2.MORPH_OPEN, np.ones((_LEAST_PX, _LEAST_PX), np.uint8)), np.uint8)
+    beyond = opened(((comb > _SURE) & (block == 0)).astype(np.uint8), _LEAST_PX)
     count, pieces = pieces_of(beyond, 8)
     rows, columns = np.nonzero(beyond)
     places = grid.back(np.column_stack((columns, rows)).astype(np.float64))
@@ -167,15 +172,19 @@ def _over(block: Bytes, thing: Float32s, blinds: Bools, known: Bools, grid: _Gri
 
 
 class _Sides(NamedTuple):
-    """How deep in the block, and how far away from it, a place lies, samples, how surely it is comb, its light, and
-    where within the block surely is no comb, (h, w) each.
+    """How deep in the block, and how far away from it, a place lies, samples, how surely it is comb, and its light,
+    (h, w) each.
     """
 
     deep: Float32s
     away: Float32s
     comb: Float32s
     light: Bytes
-    none: Bytes
+
+    @property
+    def none(self) -> Bytes:
+        """1 where within the block surely is no comb."""
+        return ((self.deep > 0.0) & (self.comb < _NO_COMB)).astype(np.uint8)
 
     @property
     def contrast(self) -> float:
@@ -188,33 +197,25 @@ class _Sides(NamedTuple):
         near, far = (share * LIGHT_PITCH_PX for share in _WITHIN)
         return np.asarray((self.away > near) & (self.away < far))
 
-    def as_beside(self, part: Bools, least: float) -> Bools:
+    def as_beside(self, part: Bools, most: float) -> Bools:
         """Where a part is as light as what lies beside, within a cell, up to that share of the contrast, (h, w)."""
         step = np.abs(_light_of(self.light, part) - _light_of(self.light, self.beside))
-        return np.asarray(step < least * self.contrast)
+        return np.asarray(step < most * self.contrast)
 
 
-def _bare(sides: _Sides, known: Bools, grid: _Grid) -> Doubt | None:
+def _bare(sides: _Sides, none: Bytes, known: Bools, grid: _Grid) -> Doubt | None:
     """The longest part of the edge within which there are no cells, and that is as light within as beyond: compound
     that was cut with the block ends there.
     """
     near, far = (share * LIGHT_PITCH_PX for share in _WITHIN)
-    bare = (_wide(sides.none) > 0) & (sides.deep > near) & (sides.deep < far) & ~known
+    bare = (none > 0) & (sides.deep > near) & (sides.deep < far) & ~known
     if not bare.any():
         return None
     return _longest(bare & sides.as_beside(bare, _ALIKE), _WITHIN[1] - _WITHIN[0], _LONG_BARE, grid)
 
 
-def _wide(part: Bytes) -> Bytes:
-    """Without what lies between walls."""
-    return np.asarray(
-        cv2.morphologyEx(part, cv2.MORPH_OPEN, np.ones((_LEAST_WIDE_PX, _LEAST_WIDE_PX), np.uint8)), np.uint8
-    )
-
-
-def _hole(sides: _Sides, grid: _Grid) -> Doubt | None:
+def _hole(sides: _Sides, none: Bytes, grid: _Grid) -> Doubt | None:
     """The widest part within the block without cells, if a hole would be as wide and it is as light as the table."""
-    none = _wide(sides.none)
     room = np.asarray(cv2.distanceTransform(none, cv2.DIST_L2, 5), np.float32)
     as_wide = room > 0.5 * _HOLE * LIGHT_PITCH_PX
     if not as_wide.any():
@@ -229,7 +230,7 @@ def _hole(sides: _Sides, grid: _Grid) -> Doubt | None:
     if not there.any():
         return None
     y, x = np.unravel_index(int(there.argmax()), there.shape)
-    return Doubt(2.0 * float(there.max()) / LIGHT_PITCH_PX, _place(grid, float(x), float(y)))
+    return Doubt(2.0 * float(there.max()) / LIGHT_PITCH_PX, grid.place(float(x), float(y)))
 
 
 def _corner(sides: _Sides, ring: Float64s, known: Bools, grid: _Grid) -> Doubt | None:
@@ -237,26 +238,17 @@ def _corner(sides: _Sides, ring: Float64s, known: Bools, grid: _Grid) -> Doubt |
     light as the table: a rounding was taken for a corner, or a wall that is none of the block's for its end.
     """
     places = places_along(Contour(ring), _STEP * LIGHT_PITCH_PX)
-    before, after = places - np.roll(places, _LEG, axis=0), np.roll(places, -_LEG, axis=0) - places
-    cross, dot = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1)
-    turns = np.arctan2(cross, dot)
-    turns *= np.sign(turns.sum())
-    comb = cv2.morphologyEx(
-        (sides.comb > _SURE).astype(np.uint8), cv2.MORPH_OPEN, np.ones((_LEAST_PX, _LEAST_PX), np.uint8)
-    )
+    path = places[:, 0] + 1j * places[:, 1]
+    before, after = path - rolled(path, _LEG), rolled(path, -_LEG) - path
+    turns = np.angle(after * before.conj()) * np.sign(signed_area(ring))
+    comb = opened((sides.comb > _SURE).astype(np.uint8), _LEAST_PX)
     reach = np.asarray(cv2.distanceTransform(1 - comb, cv2.DIST_L2, 5), np.float32) / np.float32(LIGHT_PITCH_PX)
     x, y = np.clip(np.rint(places).astype(int), 0, np.array(reach.shape[::-1]) - 1).T
     far = np.where((turns > _TURN) & ~known[y, x], reach[y, x], np.float32(0.0))
     number = int(far.argmax())
     if far[number] < _FAR or not sides.as_beside(sides.none > 0, _NEAR_TABLE)[y[number], x[number]]:
         return None
-    return Doubt(float(far[number]), _place(grid, *places[number].tolist()))
-
-
-def _place(grid: _Grid, x: float, y: float) -> tuple[float, float]:
-    """A place in the picture of one in the map."""
-    there_x, there_y = grid.back(np.array([x, y])).tolist()
-    return there_x, there_y
+    return Doubt(float(far[number]), grid.place(*places[number].tolist()))
 
 
 def _light_of(light: Bytes, part: Bools) -> Float32s:
@@ -273,8 +265,7 @@ def _longest(part: Bools, wide: float, least: float, grid: _Grid) -> Doubt | Non
     if long < least:
         return None
     rows, columns = np.nonzero(pieces == area.argmax())
-    x, y = grid.back(np.array([columns.mean(), rows.mean()])).tolist()
-    return Doubt(long, (x, y))
+    return Doubt(long, grid.place(columns.mean(), rows.mean()))
 
 
 def _seam(deep: Float32s, comb: Float32s, seam: Float32s, light: Bytes, grid: _Grid) -> Doubt | None:
@@ -296,8 +287,8 @@ def _seam(deep: Float32s, comb: Float32s, seam: Float32s, light: Bytes, grid: _G
         return None
     lines, lengths = pieces_and_areas(line.astype(np.uint8), 8)
     rows, columns = np.nonzero(lines == lengths.argmax())
-    x, y = grid.back(np.array([np.median(columns), np.median(rows)])).tolist()
-    return Doubt(float(np.hypot(np.ptp(rows), np.ptp(columns))) / LIGHT_PITCH_PX, (x, y))
+    long = float(np.hypot(np.ptp(rows), np.ptp(columns))) / LIGHT_PITCH_PX
+    return Doubt(long, grid.place(float(np.median(columns)), float(np.median(rows))))
 
 
 def _fills(block: Bools, comb: Float32s, line: Bools, light: Bytes) -> bool:

@@ -99,7 +99,7 @@ def wall_tips(
     found = foam or _of_comb(solid, walls, settings.edge, rectifier)
     if source is None or source.border is None or found.untold_px:
         return found
-    return _told_of(found, source.picture)
+    return _told_of(found, source.light)
 
 
 def _of_comb(solid: Solid, walls: SeenWalls, promise: str, rectifier: Rectifier | None) -> Trace:
@@ -165,9 +165,9 @@ def _check_beyond(picture: Bytes, seen: BlockEvidence) -> None:
         raise NoBlockFound(f"no block found: along {long:.0f} cells of what looks like comb something lies beside it")
 
 
-def _told_of(found: Trace, picture: Bytes) -> Trace:
-    """The trace with a place where the picture that comb was drawn from shows floors beyond a rounding, if it does."""
-    light, pitch_px = wall_light(picture), found.pitch_px or 0.0
+def _told_of(found: Trace, light: Bytes) -> Trace:
+    """The trace with a place where the light that comb was drawn from shows floors beyond a rounding, if it does."""
+    pitch_px = found.pitch_px or 0.0
     sides = [(ring[::-1], bright) for ring in found.contour.rings for bright in (True, False)]
     floors = (floor_edge(light, ring, pitch_px, bright=bright) for ring, bright in sides)
     return replace(found, untold_px=_first(one.places[one.beyond] for one in floors))

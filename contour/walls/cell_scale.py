@@ -11,7 +11,7 @@ import numpy as np
 
 from contour.errors import NoCellsFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
-from contour.image.opencv import inverted, pieces_and_areas, pieces_and_middles
+from contour.image.opencv import inverted, opened, pieces_and_areas, pieces_and_middles
 from contour.image.side_by_side import side_by_side
 from contour.walls.comb_likeness import Comb, apart, filled_shares, lattice_order, surely_comb
 from contour.walls.wall_mask import FINE_PITCH, Smooth, wall_mask
@@ -258,7 +258,7 @@ def _without_sheets(mask: Bytes, side: int) -> Bytes:
 
     A table as bright as the walls is no wall: what is wider than most of a cell does not count for their width.
     """
-    sheet = cv2.morphologyEx(mask, cv2.MORPH_OPEN, np.ones((side, side), np.uint8))
+    sheet = opened(mask, side)
     walls = np.asarray(cv2.subtract(mask, cv2.dilate(sheet, np.ones((3, 3), np.uint8))), np.uint8)
     return walls if np.count_nonzero(walls) > 0.3 * np.count_nonzero(mask) else mask
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -19,7 +19,7 @@ from contour.walls.coarse_block import coarse_block, small_openings
 from contour.walls.coarse_rings import CoarseBlock, walls_at_frame
 from contour.walls.dark_material import dark_edge, midway_to_table
 from contour.walls.faint_links import with_faint_links
-from contour.walls.lightness import light_from_table
+from contour.walls.lightness import light_from_table, wall_light
 from contour.walls.pieces import pieces_beside, without_loose_pieces
 from contour.walls.wall_evidence import BlockEvidence
 from contour.walls.wall_mask import FINE_PITCH, WallMask, light_beside_walls, wall_mask, without_specks
@@ -40,13 +40,19 @@ _GLARE = 1.5
 _STRANDS_PITCHES = 5.0
 
 
-class Source(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Source:
     """The picture that another one was drawn from, grey (H, W) or BGR (H, W, 3), uint8, and where its comb ends, some
     four places a pitch, (N, 2), pixels; None where ends of walls are to tell.
     """
 
     picture: Bytes
     border: Float64s | None
+
+    @cached_property
+    def light(self) -> Bytes:
+        """The light that walls stand out by in the picture, (H, W)."""
+        return wall_light(self.picture)
 
     def cut(self, region: Region) -> Source:
         """The same of the part of the picture that lies in a region's box."""

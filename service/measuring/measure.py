@@ -419,7 +419,7 @@ class _Look(NamedTuple):
         if drawn is None:
             raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")
         picture, source = drawn
-        return picture, source if self.by_border else source._replace(border=None)
+        return picture, source if self.by_border else replace(source, border=None)
 
     def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
         """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""

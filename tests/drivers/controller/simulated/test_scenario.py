@@ -16,19 +16,27 @@ from tests.support.controller.raw_client import SESSION, Client, page
 
 @asynccontextmanager
 async def played(*events: Event, **machine: object) -> AsyncIterator[SimulatedController]:
-    """A controller on which the events are played."""
+    """A started controller on which the events are played."""
     values = {"scan_ms": 1, "sessions": (SESSION, SESSION + 1, SESSION + 2), **machine}
-    scenario = Scenario(events=events, machine=MachineSettings(**values))  # type: ignore[arg-type]
+    scenario = Scenario(machine=MachineSettings(**values))  # type: ignore[arg-type]
     async with SimulatedController(**machine_options(scenario)) as controller:
-        playing = asyncio.ensure_future(Play(controller, scenario).play_for_ever())
-        try:
+        await until(lambda: controller.registers(13, 1) == (SESSION,))
+        async with befallen(controller, *events):
             yield controller
-            if playing.done():
-                playing.result()
-        finally:
-            playing.cancel()
-            with suppress(asyncio.CancelledError):
-                await playing
+
+
+@asynccontextmanager
+async def befallen(controller: SimulatedController, *events: Event) -> AsyncIterator[None]:
+    """The events are played from now on."""
+    playing = asyncio.ensure_future(Play(controller, Scenario(events=events)).play_for_ever())
+    try:
+        yield
+        if playing.done():
+            playing.result()
+    finally:
+        playing.cancel()
+        with suppress(asyncio.CancelledError):
+            await playing
 
 
 async def until(condition: Callable[[], bool]) -> None:
@@ -45,7 +53,6 @@ async def ready(client: Client, **values: int) -> None:
 async def test_a_burst_of_triggers_comes_one_after_the_other_as_the_protocol_lets_it() -> None:
     event = Event("trigger", at_s=(0.0,), burst=3, recipe=4, thickness_mm=12.5)
     async with played(event) as controller, Client(controller.port) as client:
-        await client.until_started()
         for counter in (1, 2, 3):
             await ready(client, job_id=counter - 1, settled_job=counter - 1)
             await until(lambda counter=counter: controller.registers(2, 1) == (counter,))
@@ -94,7 +101,6 @@ async def test_scans_are_as_they_were_when_the_last_of_two_slow_spells_has_ended
 async def test_the_operator_refuses_as_often_as_told(answer: int) -> None:
     event = Event("refuse", at_s=(0.0,), answer=answer, count=2)  # type: ignore[arg-type]
     async with played(event) as controller, Client(controller.port) as client:
-        await client.until_started()
         for job, expected in ((1, answer), (2, answer), (3, 1)):
             await client.write_page(page(job_id=job), job)
             assert await client.read(7, 1) == (expected,)
@@ -107,57 +113,52 @@ async def test_a_slow_scan_is_slow_for_its_time() -> None:
 
 
 async def test_a_halted_program_starts_anew_with_its_registers() -> None:
-    async with played(Event("halt", at_s=(0.05,), for_s=0.05)) as controller, Client(controller.port) as client:
-        await client.until_started()
+    async with played() as controller, Client(controller.port) as client:
         await client.write(40, 77)
-        await until(lambda: controller.registers(13, 1) == (SESSION + 1,))
+        async with befallen(controller, Event("halt", at_s=(0.0,), for_s=0.05)):
+            await until(lambda: controller.registers(13, 1) == (SESSION + 1,))
         assert controller.registers(40, 1) == (77,)
 
 
 @pytest.mark.parametrize("keep", [True, False])
 async def test_a_restart_keeps_what_it_is_told_to_keep(keep: bool) -> None:
-    event = Event("restart", at_s=(0.15,), keep_registers=keep, keep_memory=keep)
-    async with played(event) as controller, Client(controller.port) as client:
-        await client.until_started()
+    async with played() as controller, Client(controller.port) as client:
         await client.write_page(page(), 1)
         assert controller.registers(10, 2) == (0, 1)
-        await until(lambda: controller.registers(13, 1) == (SESSION + 1,))
+        async with befallen(controller, Event("restart", at_s=(0.0,), keep_registers=keep, keep_memory=keep)):
+            await until(lambda: controller.registers(13, 1) == (SESSION + 1,))
         assert controller.registers(10, 2) == ((0, 1) if keep else (0, 0))
         assert controller.registers(35, 1) == ((1,) if keep else (0,))
 
 
 async def test_a_controller_that_is_switched_off_is_gone_and_comes_back_where_it_was() -> None:
-    async with played(Event("switch-off", at_s=(0.05,), for_s=0.1)) as controller:
+    async with played() as controller, Client(controller.port) as client:
         port = controller.port
-        client = Client(port)
-        await client.__aenter__()
-        assert await client.reader.read() == b""
-        client.writer.close()
-        with pytest.raises(OSError, match=str(port)):
-            await Client(port).__aenter__()
-        await until(lambda: controller.registers(13, 1) == (SESSION + 1,))
-        async with Client(port) as again:
-            await again.read(0, 16)
+        async with befallen(controller, Event("switch-off", at_s=(0.0,), for_s=1)):
+            assert await client.reader.read() == b""
+            with pytest.raises(OSError, match=str(port)):
+                await Client(port).__aenter__()
+            await until(lambda: controller.registers(13, 1) == (SESSION + 1,))
+            async with Client(port) as again:
+                await again.read(0, 16)
 
 
 async def test_an_unplugged_controller_cannot_be_reached_and_its_program_goes_on() -> None:
-    async with played(Event("unplug", at_s=(0.05,), for_s=0.2)) as controller:
-        client = Client(controller.port)
-        await client.__aenter__()
+    async with played() as controller, Client(controller.port) as client:
         port = controller.port
-        assert await client.reader.read() == b""
-        client.writer.close()
-        with pytest.raises(OSError, match=str(port)):
-            await Client(port).__aenter__()
-        before = controller.registers(1, 1)
-        await until(lambda: controller.registers(1, 1) != before)
-        async with asyncio.timeout(60):
-            while True:
-                with suppress(OSError):
-                    async with Client(port) as again:
-                        assert (await again.read(13, 1)) == (SESSION,)
-                        break
-                await asyncio.sleep(0.01)
+        async with befallen(controller, Event("unplug", at_s=(0.0,), for_s=1)):
+            assert await client.reader.read() == b""
+            with pytest.raises(OSError, match=str(port)):
+                await Client(port).__aenter__()
+            before = controller.registers(1, 1)
+            await until(lambda: controller.registers(1, 1) != before)
+            async with asyncio.timeout(60):
+                while True:
+                    with suppress(OSError):
+                        async with Client(port) as again:
+                            assert (await again.read(13, 1)) == (SESSION,)
+                            break
+                    await asyncio.sleep(0.01)
 
 
 async def test_another_service_shows_by_its_owner_and_a_moving_heartbeat() -> None:
@@ -181,7 +182,6 @@ async def test_what_comes_periodically_comes_again() -> None:
 async def test_a_slow_program_answers_later_and_right() -> None:
     slow = {"copy_scans": 5, "check_scans": 7, "stepwise": True}
     async with played(**slow) as controller, Client(controller.port) as client:
-        await client.until_started()
         await client.write_page(page(), 1)
         assert await client.read(6, 2) == (1, 1)
         assert await client.read(10, 3) == (0, 1, 1)
@@ -190,7 +190,6 @@ async def test_a_slow_program_answers_later_and_right() -> None:
 
 async def test_what_is_written_while_a_page_is_copied_makes_a_torn_copy_and_answer_2() -> None:
     async with played(copy_scans=10, scan_ms=20) as controller, Client(controller.port) as client:
-        await client.until_started()
         await client.write_one(32, 0)
         await client.write(33, *page().header, *page().payload)
         await client.write_one(32, 5)

@@ -6,7 +6,7 @@ so that the size of the picture does not matter. Where nothing was traced only t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 
 import cv2
@@ -60,6 +60,10 @@ class Quality:
     blur_px: float
     pitch_px: float
     clipped_share: float
+
+    def reduced(self, times: int) -> Quality:
+        """The same in the pixels of a picture that is shown so many times as large."""
+        return replace(self, blur_px=self.blur_px / times, pitch_px=self.pitch_px / times)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,10 +18,10 @@ from contour.edge.reflection import reflection
 from contour.edge.table_look import TableLook
 from contour.geometry.agreement import rectified_edges
 from contour.geometry.arrays import Bytes, Float64s
-from contour.geometry.rectifier import CroppedRectifier, Rectifier
+from contour.geometry.rectifier import CroppedRectifier, EnlargedRectifier, Rectifier
 from contour.geometry.rings import Contour
 from contour.image.opencv import grey
-from contour.image.pixel_grid import drawn
+from contour.image.pixel_grid import drawn, place_of
 from contour.image.region import Region
 from contour.image.side_by_side import side_by_side
 from contour.narrow_features.feature import NarrowFeature
@@ -59,9 +60,19 @@ class CheckedTrace:
     def moved(self, first: Float64s) -> CheckedTrace:
         """The same in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""
         x, y = first.astype(int).tolist()
-        said = {name: getattr(self, name) for name in ("disagreement", "narrow", "alike", "bare", "beyond", "runs_on")}
-        moved = {name: one.moved(x, y) for name, one in said.items() if one is not None}
+        moved = {name: one.moved(x, y) for name, one in self._said().items()}
         return replace(self, trace=self.trace.moved(first), **moved)
+
+    def reduced(self, times: int) -> CheckedTrace:
+        """The same in the picture that the traced one shows so many times as large."""
+        there = {name: replace(one, place_px=place_of(one.place_px, times)) for name, one in self._said().items()}
+        quality = self.quality and self.quality.reduced(times)
+        return replace(self, trace=self.trace.reduced(times), quality=quality, **there)
+
+    def _said(self) -> dict[str, Any]:
+        """All that has a place, by name."""
+        said = {name: getattr(self, name) for name in ("disagreement", "narrow", "alike", "bare", "beyond", "runs_on")}
+        return {name: one for name, one in said.items() if one is not None}
 
 
 def checked_trace(
@@ -72,12 +83,18 @@ def checked_trace(
     relief: Relief | None = None,
     source: Source | None = None,
     *,
+    times: int = 1,
     on_stage: OnStage = lambda _name: None,
 ) -> CheckedTrace:
     """The block traced in the region alone, and checked there, in pixels of the whole picture; otherwise as `trace`.
 
-    `on_stage` hears "quality" as well. Raises what `trace` does, and what `Region.cut` does.
+    times: how many times as large as that is the picture that is given. `on_stage` hears "quality" as well. Raises what
+    `trace` does, and what `Region.cut` does.
     """
+    if times > 1:
+        larger = None if rectifier is None else EnlargedRectifier(rectifier, times)
+        there = None if region is None else region.enlarged(times)
+        return checked_trace(picture, settings, there, larger, relief, source, on_stage=on_stage).reduced(times)
     if region is None:
         traced = trace(picture, settings, rectifier=rectifier, relief=relief, source=source, on_stage=on_stage)
         checked = check_trace(picture, traced, rectifier, relief, source)
@@ -85,9 +102,9 @@ def checked_trace(
         return checked
     part, first = region.cut(picture)
     within = None if rectifier is None else CroppedRectifier(rectifier, first)
-    there = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
+    apart = None if relief is None else relief.cut(first, (part.shape[1], part.shape[0]))
     drawn_from = None if source is None else source.cut(region)
-    return checked_trace(part, settings, None, within, there, drawn_from, on_stage=on_stage).moved(first)
+    return checked_trace(part, settings, None, within, apart, drawn_from, on_stage=on_stage).moved(first)
 
 
 def check_trace(

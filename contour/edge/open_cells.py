@@ -29,7 +29,7 @@ def without_open_cells(look: TableLook, relief: Relief) -> TableLook:
     if count < 2 or not look.table.any():
         return look
     height, width = pieces.shape
-    step = look.step
+    step = round(look.step)
     root = relief.apart[: height * step, : width * step].reshape(height, step, width, step).max(axis=(1, 3))
     most = np.sqrt(_DIFFERS) * median(root[look.table])
     room = cv2.distanceTransform(look.foreign.astype(np.uint8), cv2.DIST_L2, 3) * (step / look.pitch_px)

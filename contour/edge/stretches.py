@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -37,6 +37,11 @@ class Stretch:
     def hidden_or_filled(self) -> bool:
         """Whether it is known what lies there, or that something does."""
         return self.state != "seen" or self.by is not None
+
+    def reduced(self, times: int) -> Stretch:
+        """The same of a picture that this one's shows so many times as large."""
+        lengths = self.from_px / times, self.to_px / times
+        return replace(self, from_px=lengths[0], to_px=lengths[1], bound_px=self.bound_px / times)
 
     @property
     def length_px(self) -> float:

@@ -71,7 +71,7 @@ class TableLook:
     foreign: Bools
     things: Bools
     """What is foreign, mirror images of the block's walls all around it included."""
-    step: int
+    step: float
     pitch_px: float
     lighter: Bools
     """Where the picture is lighter than the table."""
@@ -90,6 +90,10 @@ class TableLook:
         """The same without some of what is foreign, (h, w)."""
         foreign = self.foreign & ~parts
         return replace(self, foreign=foreign, things=self.things & ~parts, away=_away(foreign, self.step))
+
+    def reduced(self, times: int) -> TableLook:
+        """The same of a picture that this one's shows so many times as large."""
+        return replace(self, step=self.step / times, pitch_px=self.pitch_px / times, away=self.away / np.float32(times))
 
     def foreign_at(self, points: Float64s) -> Float64s:
         """Distance of points (N, 2), pixels, from the nearest foreign thing, shape (N,), pixels."""
@@ -288,7 +292,7 @@ def _mostly(part: Bools, kind: Bools, share: float = _GOOD_SHARE) -> Bools:
     return kept.take(pieces)
 
 
-def _away(foreign: Bools, step: int) -> Float32s:
+def _away(foreign: Bools, step: float) -> Float32s:
     if not foreign.any():
         return np.full(foreign.shape, _NOWHERE_PX, np.float32)
     return np.asarray(cv2.distanceTransform((~foreign).astype(np.uint8), cv2.DIST_L2, 3) * step, np.float32)

@@ -36,3 +36,17 @@ class CroppedRectifier:
 
     def unrectify(self, points: Float64s) -> Float64s:
         return self.whole.unrectify(points) - self.first
+
+
+@dataclass(frozen=True, eq=False)
+class EnlargedRectifier:
+    """A rectifier for the pixels of a picture that is shown so many `times` as large."""
+
+    whole: Rectifier
+    times: int
+
+    def rectify(self, points_px: Float64s) -> Float64s:
+        return self.whole.rectify((points_px + 0.5) / self.times - 0.5) * self.times
+
+    def unrectify(self, points: Float64s) -> Float64s:
+        return (self.whole.unrectify(points / self.times) + 0.5) * self.times - 0.5

@@ -111,6 +111,11 @@ def grown(picture: Anything, shape: tuple[int, ...]) -> Anything:
     return cast(Anything, cv2.resize(picture, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR))
 
 
+def enlarged(picture: Anything, times: int) -> Anything:
+    """The picture so many times as large, (times · H, times · W), its edges as sharp as they were."""
+    return cast(Anything, cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_CUBIC))
+
+
 def slid(large: Float32s, small: Float32s) -> Float64s:
     """Sums of products of a small array with the large one, at all places at which it lies within it."""
     return np.asarray(cv2.matchTemplate(large, small, cv2.TM_CCORR), np.float64)

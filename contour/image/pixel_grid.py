@@ -27,17 +27,23 @@ def coarse_step(pitch_px: float) -> int:
     return max(1, round(pitch_px / _SAMPLES_PER_PITCH))
 
 
-def pixels_of(samples: Float64s | Int64s, step: int) -> Float64s:
+def pixels_of(samples: Float64s | Int64s, step: float) -> Float64s:
     """Places in pixels of places in samples, any shape."""
     return np.asarray((samples + 0.5) * step - 0.5, np.float64)
 
 
-def samples_of(pixels: Float64s, step: int) -> Float64s:
+def samples_of(pixels: Float64s, step: float) -> Float64s:
     """Places in samples of places in pixels, any shape."""
     return np.asarray((pixels + 0.5) / step - 0.5, np.float64)
 
 
-def fill(mask: Bytes, ring: Float64s, step: int, value: int = 1) -> None:
+def place_of(place_px: tuple[float, float], step: int) -> tuple[float, float]:
+    """A place (x, y) in samples of the same in pixels."""
+    x, y = samples_of(np.array(place_px), step).tolist()
+    return x, y
+
+
+def fill(mask: Bytes, ring: Float64s, step: float, value: int = 1) -> None:
     """Set a mask's samples, (h, w), within a ring, (N, 2), pixels, its border's own among them."""
     cv2.fillPoly(mask, [np.rint(samples_of(ring, step)).astype(np.int32)], value)
 
@@ -47,7 +53,7 @@ def fill_finely(mask: Bytes, rings: Sequence[Float64s], value: int) -> None:
     cv2.fillPoly(mask, [np.rint(ring * 16).astype(np.int32) for ring in rings], value, cv2.LINE_8, 4)
 
 
-def drawn(rings: Sequence[Float64s], shape: tuple[int, ...], step: int) -> Bytes:
+def drawn(rings: Sequence[Float64s], shape: tuple[int, ...], step: float) -> Bytes:
     """A mask of `shape` (h, w) of samples, 1 inside of rings, (N, 2) each, pixels, and outside of those within them."""
     mask = np.zeros(shape[:2], np.uint8)
     cv2.fillPoly(mask, [np.rint(samples_of(ring, step)).astype(np.int32) for ring in rings], 1)

@@ -11,7 +11,7 @@ from contour.errors import ParameterError
 from contour.geometry.arrays import Bytes, Float64s, medians
 from contour.geometry.rings import Contour, Ring
 from contour.geometry.segments import contains, distances_to_ring
-from contour.image.pixel_grid import fill_finely
+from contour.image.pixel_grid import fill_finely, pixels_of
 
 _LEAST_PX = 32
 
@@ -26,6 +26,10 @@ class Region:
     def of_box(cls, left: float, top: float, right: float, bottom: float) -> Region:
         """The region between two columns and two rows of pixels, both included."""
         return cls(np.array([[left, top], [right, top], [right, bottom], [left, bottom]], dtype=np.float64))
+
+    def enlarged(self, times: int) -> Region:
+        """The region in the picture shown so many times as large."""
+        return Region(pixels_of(self.ring, times))
 
     def cut(self, picture: Bytes) -> tuple[Bytes, Float64s]:
         """The part of the picture within the region's box, and that part's first pixel (x, y).

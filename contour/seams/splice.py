@@ -23,7 +23,7 @@ _LARGE = 0.25
 _UNLIKE = 6.0
 
 
-def spliced(flat: Bools, table: Bools, light: Bytes, seen: BlockEvidence, step: int) -> tuple[Bools, Bools] | None:
+def spliced(flat: Bools, table: Bools, light: Bytes, seen: BlockEvidence, step: float) -> tuple[Bools, Bools] | None:
     """Where something flat, (h, w), joins a block to another piece of comb, on that grid of `step` pixels a sample, and
     where this piece lies; None without any. Strips that were cut off are no such pieces. `table`, `light`: where the
     table lies, and the picture's light.

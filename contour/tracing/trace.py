@@ -11,6 +11,8 @@ from contour.edge.stretches import Stretch
 from contour.edge.table_look import TableLook
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rings import Contour
+from contour.image.opencv import shrunk
+from contour.image.pixel_grid import place_of, samples_of
 from contour.image.region import shifted
 from contour.walls.comb_likeness import Comb
 from contour.walls.pieces import Piece
@@ -82,6 +84,28 @@ class Trace:
         evidence = self.evidence and tuple(replace(part, bound_px=part.bound_px + more) for part in self.evidence)
         bound_px = None if self.uncertainty_px is None else self.uncertainty_px + more
         return replace(self, uncertainty_px=bound_px, evidence=evidence)
+
+    def reduced(self, times: int) -> Trace:
+        """The trace in the picture that the traced one shows so many times as large."""
+        exterior, *holes = (samples_of(ring, times) for ring in self.contour.rings)
+        opening = self.opening_px and (*place_of(self.opening_px[:2], times), self.opening_px[2] / times)
+        return replace(
+            self,
+            pitch_px=self.pitch_px and self.pitch_px / times,
+            contour=Contour(exterior, tuple(holes)),
+            light=shrunk(self.light, times),
+            uncertainty_px=self.uncertainty_px and self.uncertainty_px / times,
+            others=tuple(piece.reduced(times) for piece in self.others),
+            comb=self.comb
+            and replace(self.comb, pitch_px=self.comb.pitch_px / times, wall_px=self.comb.wall_px / times),
+            evidence=self.evidence and tuple(part.reduced(times) for part in self.evidence),
+            look=self.look and self.look.reduced(times),
+            untold_px=self.untold_px and place_of(self.untold_px, times),
+            outside_px=self.outside_px and place_of(self.outside_px, times),
+            opening_px=opening,
+            wide=self.wide and self.wide.reduced(times),
+            parted=self.parted and self.parted.reduced(times),
+        )
 
     def moved(self, first: Float64s) -> Trace:
         """The trace in a picture of which the traced one is a part, whose first pixel is `first` (x, y) of it."""

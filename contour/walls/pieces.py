@@ -68,6 +68,12 @@ class Piece:
         box = left + x, top + y, right + x, bottom + y
         return replace(self, box_px=box, outline_px=self.outline_px + np.array([x, y]))
 
+    def reduced(self, times: int) -> Piece:
+        """The piece in the picture that this one's shows so many times as large."""
+        left, top, right, bottom = (side // times for side in self.box_px)
+        outline = samples_of(self.outline_px, times)
+        return Piece(self.area_px2 / times**2, (left, top, right, bottom), outline, self.width_px / times)
+
 
 def pieces_beside(
     mask: Bytes, exterior: Ring, pitch_px: float, scale: int = 1, small: Bytes | None = None

@@ -23,12 +23,13 @@ from contour.acceptance.trace_check import checked_trace
 from contour.calibration.calibration import Calibration
 from contour.edge.known_table import OverTable, over_known_table
 from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, NoCellsFound, ParameterError
-from contour.geometry.agreement import rectified_edges
+from contour.geometry.agreement import agreement, rectified_edges
 from contour.geometry.arrays import Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, densified
 from contour.image.line_noise import without_line_noise
+from contour.image.opencv import enlarged
 from contour.image.picture_check import check_picture
 from contour.image.region import Region, shifted
 from contour.image.taught_table import TableLimits, TableLook, look_at
@@ -37,8 +38,11 @@ from contour.polygon.polygon import Finish, Polygon, cutting_polygon
 from contour.relief.relief import Displacement, Relief
 from contour.segmentation.comb_picture import comb_picture
 from contour.segmentation.second_opinion import second_opinion
+from contour.tracing.edge_kind import FINE_PITCH_PX
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import Trace, TraceSettings
+from contour.walls.cell_scale import probe
+from contour.walls.lightness import wall_light
 from contour.walls.see_block import Source
 from service.measuring.measurement import Measurement
 from service.measuring.part_trial import PartTrial
@@ -56,8 +60,14 @@ _ROI_STEPS = 12
 _STRONG_WALLS = 0.6
 # A network puts ends of walls so much farther in or out, all along: a share of a pitch that no scatter of them tells.
 _NETWORK_PITCHES = 0.1
+# Fine cells are looked at so many times as large, too, in pictures of so many pixels at most; and outlines seen so may
+# lie so many pitches apart.
+_TWICE, _MOST_PX, _APART = 2, 4_000_000, 0.35
 # What was seen to lie there is there, and where ends of walls are too few to tell an edge, those of fewer tell less.
 _LIES_THERE, _HARDLY_SEEN = {Reason.SEVERAL_BLOCKS, Reason.EDGE_COVERED}, {Reason.UNCERTAINTY_TOO_LARGE}
+
+
+_Outcome = Measurement | NoBlockFound | EdgeContradicted
 
 
 class _Stopwatch:
@@ -186,40 +196,32 @@ class Measurer:
             self._outlined, whole=picture, recipe=recipe, thickness_mm=thickness_mm, result=result, watch=watch
         )
         looks = self._looks(picture, known, recipe, thickness_mm)
-        refused: NoBlockFound | None = None
-        reasons: set[Reason] = set()
-        try:
-            found = outlined(next(looks))
-            if not found.findings:
-                return found
-            reasons = {*found.reasons}
-        except NoBlockFound as error:
-            refused = error
-        for look in looks:
-            watch.lap("table")
-            if not look.may_show_more(reasons, nowhere=isinstance(refused, NoCellsFound)):
-                continue
-            with contextlib.suppress(NoBlockFound, EdgeContradicted):
-                again = outlined(look._replace(on_dark=not reasons & _LIES_THERE))
-                if not again.findings:
-                    return again
-                if look.network and Reason.EDGE_COVERED in again.reasons:
-                    break  # what lies over an edge that is drawn would be drawn away
-                reasons |= {Reason.SEVERAL_BLOCKS} & {*again.reasons}
-        watch.lap("table")
-        if refused is not None:
-            raise refused
+        first = _tried(outlined, next(looks))
+        if known is None and recipe.method == "wall-tips" and _fine(picture, first, recipe):
+            looks = self._looks(enlarged(picture, _TWICE), None, recipe, thickness_mm, times=_TWICE)
+            found = _agreed(first, _best(_tried(outlined, next(looks)), looks, outlined, watch))
+        else:
+            found = _best(first, looks, outlined, watch)
+        if isinstance(found, Exception):
+            raise found
         return found
 
     def _looks(
-        self, picture: NDArray[np.uint8], known: TableLook | None, recipe: AnyRecipe, thickness_mm: float
+        self,
+        picture: NDArray[np.uint8],
+        known: TableLook | None,
+        recipe: AnyRecipe,
+        thickness_mm: float,
+        *,
+        times: int = 1,
     ) -> Iterator[_Look]:
         """What to look at, one after the other until nothing speaks against what is found: what differs from a table
         that is known, or need not be taught to be, the picture's walls, what a network tells, and walls that rise high.
+        `times`: how many times as large as it was taken the picture is.
         """
-        displacement = self._displacement(recipe, thickness_mm, picture.shape[:2])
+        displacement = None if times > 1 else self._displacement(recipe, thickness_mm, picture.shape[:2])
         if known is None:
-            yield _Look(picture)
+            yield _Look(picture, times=times)
             even = None if displacement is None else even_table(picture)
             over = None if even is None else _over(picture, even, recipe, displacement)
             if over is not None and over.alike:
@@ -239,9 +241,9 @@ class Measurer:
         if recipe.method == "wall-tips":
             if recipe.network:
                 draw = cache(partial(comb_picture, picture))
-                yield _Look(picture, draw=draw)
-                yield _Look(picture, draw=draw, by_border=True)
-            yield _Look(picture, least_rise=_STRONG_WALLS)
+                yield _Look(picture, draw=draw, times=times)
+                yield _Look(picture, draw=draw, times=times, by_border=True)
+            yield _Look(picture, least_rise=_STRONG_WALLS, times=times)
 
     def _outlined(
         self,
@@ -255,12 +257,14 @@ class Measurer:
     ) -> Measurement:
         """The measurement of what is looked at in the whole picture."""
         picture, source = look.drawn(watch)
-        height, width = picture.shape[:2]
+        height, width = whole.shape[:2]
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
         region = self._region(recipe, thickness_mm)
         settings = replace(trace_settings(recipe), least_rise=look.least_rise)
-        checked = checked_trace(picture, settings, region, rectifier, look.relief, source, on_stage=watch.lap)
+        checked = checked_trace(
+            picture, settings, region, rectifier, look.relief, source, times=look.times, on_stage=watch.lap
+        )
         if look.network:
             checked = replace(checked, trace=checked.trace.less_sure(_NETWORK_PITCHES))
         traced = checked.trace
@@ -395,7 +399,7 @@ class Measurer:
 class _Look(NamedTuple):
     """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
     settings of a trace; `draw`: has a network tell of it what to look at, `on_dark` on a dark table, too, `by_border`
-    not at ends of its walls, but at where its comb ends.
+    not at ends of its walls, but at where its comb ends; `times`: how many times as large as it was taken it is.
     """
 
     picture: NDArray[np.uint8]
@@ -404,6 +408,7 @@ class _Look(NamedTuple):
     draw: Callable[..., tuple[NDArray[np.uint8], Source] | None] | None = None
     on_dark: bool = False
     by_border: bool = False
+    times: int = 1
 
     @property
     def network(self) -> bool:
@@ -429,6 +434,74 @@ class _Look(NamedTuple):
             return True
         # What is nowhere in the picture is not in its high walls either.
         return not (nowhere or reasons & _LIES_THERE or (reasons == _HARDLY_SEEN and self.least_rise is not None))
+
+
+def _tried(outlined: Callable[[_Look], Measurement], look: _Look) -> _Outcome:
+    """What a look finds, or why it finds nothing."""
+    try:
+        return outlined(look)
+    except (NoBlockFound, EdgeContradicted) as error:
+        return error
+
+
+def _best(
+    first: _Outcome, looks: Iterator[_Look], outlined: Callable[[_Look], Measurement], watch: _Stopwatch
+) -> _Outcome:
+    """What a first look found, or the first of others that nothing speaks against, if something does against that."""
+    if isinstance(first, EdgeContradicted) or _accepted(first):
+        return first
+    reasons = {*first.reasons} if isinstance(first, Measurement) else set[Reason]()
+    for look in looks:
+        watch.lap("table")
+        if not look.may_show_more(reasons, nowhere=isinstance(first, NoCellsFound)):
+            continue
+        again = _tried(outlined, look._replace(on_dark=not reasons & _LIES_THERE))
+        if _accepted(again):
+            return again
+        if isinstance(again, Measurement):
+            if look.network and Reason.EDGE_COVERED in again.reasons:
+                break  # what lies over an edge that is drawn would be drawn away
+            reasons |= {Reason.SEVERAL_BLOCKS} & {*again.reasons}
+    watch.lap("table")
+    return first
+
+
+def _accepted(found: _Outcome) -> bool:
+    return isinstance(found, Measurement) and not found.findings
+
+
+def _fine(picture: NDArray[np.uint8], found: _Outcome, recipe: AnyRecipe) -> bool:
+    """Whether cells are fine, in a picture that is not too large to be looked at enlarged."""
+    if picture.shape[0] * picture.shape[1] > _MOST_PX:
+        return False
+    if isinstance(found, Measurement) and found.pitch_px is not None:
+        return found.pitch_px < FINE_PITCH_PX
+    with contextlib.suppress(NoBlockFound):
+        return probe(wall_light(picture), recipe.polarity).pitch_px < FINE_PITCH_PX
+    return False
+
+
+def _agreed(plain: _Outcome, finer: _Outcome) -> _Outcome:
+    """What was found in a picture, and in the same enlarged: the one that is accepted. Where both are, one must run
+    where the other does; where neither is, what was traced says more than what kind of border it seems to have.
+    """
+    if not _accepted(plain):
+        said = isinstance(plain, EdgeContradicted) and isinstance(finer, Measurement)
+        return finer if said or _accepted(finer) else plain
+    if not isinstance(plain, Measurement) or not isinstance(finer, Measurement) or finer.findings:
+        return plain
+    assert plain.pixels is not None
+    assert finer.pixels is not None
+    assert finer.pitch_px is not None
+    apart = agreement(finer.pixels, plain.pixels).hausdorff_px / finer.pitch_px
+    if apart > _APART:
+        return EdgeContradicted(
+            f"looked at twice as large, the border runs elsewhere, by {apart:.1f} cells: cells of "
+            f"{finer.pitch_px:.0f} px are too small to tell a cut border from a closed one here. Give edge: cut or "
+            "edge: cells, or more pixels a cell",
+            "cut",
+        )
+    return finer
 
 
 def _over(

@@ -472,7 +472,7 @@ def _accepted(found: _Outcome) -> bool:
 
 def _fine(picture: NDArray[np.uint8], found: _Outcome, recipe: AnyRecipe) -> bool:
     """Whether cells are fine, in a picture that is not too large to be looked at enlarged."""
-    if picture.shape[0] * picture.shape[1] > _MOST_PX:
+    if picture.shape[0] * picture.shape[1] > _MOST_PX or isinstance(found, NoCellsFound):
         return False
     if isinstance(found, Measurement) and found.pitch_px is not None:
         return found.pitch_px < FINE_PITCH_PX

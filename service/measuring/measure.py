@@ -471,11 +471,13 @@ def _accepted(found: _Outcome) -> bool:
 
 
 def _fine(picture: NDArray[np.uint8], found: _Outcome, recipe: AnyRecipe) -> bool:
-    """Whether cells are fine, in a picture that is not too large to be looked at enlarged."""
+    """Whether cells are fine, in a picture that is not too large to be looked at enlarged, and in which nothing was
+    seen to lie there that might not be at another size.
+    """
     if picture.shape[0] * picture.shape[1] > _MOST_PX or isinstance(found, NoCellsFound):
         return False
     if isinstance(found, Measurement) and found.pitch_px is not None:
-        return found.pitch_px < FINE_PITCH_PX
+        return found.pitch_px < FINE_PITCH_PX and not {*found.reasons} & _LIES_THERE
     with contextlib.suppress(NoBlockFound):
         return probe(wall_light(picture), recipe.polarity).pitch_px < FINE_PITCH_PX
     return False

@@ -10,7 +10,6 @@ import numpy as np
 from contour.edge.ring_places import runs_of
 from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.ring_lengths import RingLengths
-from contour.image.pixel_grid import place_of
 
 
 @dataclass(frozen=True)
@@ -23,10 +22,6 @@ class EdgePart:
     def moved(self, x: float, y: float) -> EdgePart:
         """The same in a picture whose first pixel lies at (-x, -y) of this one's."""
         return replace(self, place_px=(self.place_px[0] + x, self.place_px[1] + y))
-
-    def reduced(self, times: int) -> EdgePart:
-        """The same in a picture that this one's shows so many times as large."""
-        return replace(self, place_px=place_of(self.place_px, times))
 
 
 def longest_part(chosen: Bools, lengths: RingLengths, at: Float64s, spacing_pitches: float) -> EdgePart | None:

@@ -103,7 +103,7 @@ class Trace:
             untold_px=self.untold_px and place_of(self.untold_px, times),
             outside_px=self.outside_px and place_of(self.outside_px, times),
             opening_px=opening,
-            wide=self.wide and self.wide.reduced(times),
+            wide=self.wide and replace(self.wide, place_px=place_of(self.wide.place_px, times)),
             parted=self.parted and self.parted.reduced(times),
         )
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,8 @@ from contour.acceptance.sent_evidence import ToMillimetres, sent_evidence
 from contour.acceptance.trace_check import checked_trace
 from contour.calibration.calibration import Calibration
 from contour.edge.known_table import OverTable, over_known_table
-from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, NoCellsFound, ParameterError
-from contour.geometry.agreement import agreement, rectified_edges
+from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, ParameterError
+from contour.geometry.agreement import rectified_edges
 from contour.geometry.arrays import Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
@@ -35,15 +35,13 @@ from contour.image.region import Region, shifted
 from contour.image.taught_table import TableLimits, TableLook, look_at
 from contour.material.even_table import even_table
 from contour.polygon.polygon import Finish, Polygon, cutting_polygon
-from contour.relief.relief import Displacement, Relief
+from contour.relief.relief import Displacement
 from contour.segmentation.comb_picture import comb_picture
 from contour.segmentation.second_opinion import second_opinion
-from contour.tracing.edge_kind import FINE_PITCH_PX
 from contour.tracing.sliding_matrix import coarse_step, default_core_px
 from contour.tracing.trace import Trace, TraceSettings
-from contour.walls.cell_scale import probe
-from contour.walls.lightness import wall_light
-from contour.walls.see_block import Source
+from service.measuring.looks.look import Look
+from service.measuring.looks.outcome import agreed, best, fine, tried
 from service.measuring.measurement import Measurement
 from service.measuring.part_trial import PartTrial
 from service.reasons import Reason, Rejection
@@ -60,14 +58,8 @@ _ROI_STEPS = 12
 _STRONG_WALLS = 0.6
 # A network puts ends of walls so much farther in or out, all along: a share of a pitch that no scatter of them tells.
 _NETWORK_PITCHES = 0.1
-# Fine cells are looked at so many times as large, too, in pictures of so many pixels at most; and outlines seen so may
-# lie so many pitches apart.
-_TWICE, _MOST_PX, _APART = 2, 4_000_000, 0.35
-# What was seen to lie there is there, and where ends of walls are too few to tell an edge, those of fewer tell less.
-_LIES_THERE, _HARDLY_SEEN = {Reason.SEVERAL_BLOCKS, Reason.EDGE_COVERED}, {Reason.UNCERTAINTY_TOO_LARGE}
-
-
-_Outcome = Measurement | NoBlockFound | EdgeContradicted
+# Fine cells are looked at so many times as large, too.
+_TWICE = 2
 
 
 class _Stopwatch:
@@ -196,12 +188,12 @@ class Measurer:
             self._outlined, whole=picture, recipe=recipe, thickness_mm=thickness_mm, result=result, watch=watch
         )
         looks = self._looks(picture, known, recipe, thickness_mm)
-        first = _tried(outlined, next(looks))
-        if known is None and recipe.method == "wall-tips" and _fine(picture, first, recipe):
+        first = tried(outlined, next(looks))
+        if known is None and recipe.method == "wall-tips" and fine(picture, first, recipe):
             looks = self._looks(enlarged(picture, _TWICE), None, recipe, thickness_mm, times=_TWICE)
-            found = _agreed(first, _best(_tried(outlined, next(looks)), looks, outlined, watch))
+            found = agreed(first, best(tried(outlined, next(looks)), looks, outlined, watch.lap))
         else:
-            found = _best(first, looks, outlined, watch)
+            found = best(first, looks, outlined, watch.lap)
         if isinstance(found, Exception):
             raise found
         return found
@@ -214,40 +206,40 @@ class Measurer:
         thickness_mm: float,
         *,
         times: int = 1,
-    ) -> Iterator[_Look]:
+    ) -> Iterator[Look]:
         """What to look at, one after the other until nothing speaks against what is found: what differs from a table
         that is known, or need not be taught to be, the picture's walls, what a network tells, and walls that rise high.
         `times`: how many times as large as it was taken the picture is.
         """
         displacement = None if times > 1 else self._displacement(recipe, thickness_mm, picture.shape[:2])
         if known is None:
-            yield _Look(picture, times=times)
+            yield Look(picture, times=times)
             even = None if displacement is None else even_table(picture)
             over = None if even is None else _over(picture, even, recipe, displacement)
             if over is not None and over.alike:
                 relief = over.relief()
-                yield _Look(relief.apart, replace(relief, even=True))
+                yield Look(relief.apart, replace(relief, even=True))
         else:
             over = _over(picture, known, recipe, displacement)
             picture = known.picture
             plain_first = over is None or not over.alike
             if plain_first:
-                yield _Look(picture)
+                yield Look(picture)
             if over is not None:
                 relief = over.relief()
-                yield _Look(relief.apart, relief)
+                yield Look(relief.apart, relief)
             if not plain_first:
-                yield _Look(picture)
+                yield Look(picture)
         if recipe.method == "wall-tips":
             if recipe.network:
                 draw = cache(partial(comb_picture, picture))
-                yield _Look(picture, draw=draw, times=times)
-                yield _Look(picture, draw=draw, times=times, by_border=True)
-            yield _Look(picture, least_rise=_STRONG_WALLS, times=times)
+                yield Look(picture, draw=draw, times=times)
+                yield Look(picture, draw=draw, times=times, by_border=True)
+            yield Look(picture, least_rise=_STRONG_WALLS, times=times)
 
     def _outlined(
         self,
-        look: _Look,
+        look: Look,
         *,
         whole: NDArray[np.uint8],
         recipe: AnyRecipe,
@@ -256,7 +248,7 @@ class Measurer:
         watch: _Stopwatch,
     ) -> Measurement:
         """The measurement of what is looked at in the whole picture."""
-        picture, source = look.drawn(watch)
+        picture, source = look.drawn(watch.lap)
         height, width = whole.shape[:2]
         calibration = self._calibration
         rectifier = None if calibration is None else calibration.rectifier(thickness_mm)
@@ -394,116 +386,6 @@ class Measurer:
             max_uncertainty_mm=recipe.max_uncertainty_mm or None,
             max_disagreement_pitches=recipe.max_disagreement_pitches or None,
         )
-
-
-class _Look(NamedTuple):
-    """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
-    settings of a trace; `draw`: has a network tell of it what to look at, `on_dark` on a dark table, too, `by_border`
-    not at ends of its walls, but at where its comb ends; `times`: how many times as large as it was taken it is.
-    """
-
-    picture: NDArray[np.uint8]
-    relief: Relief | None = None
-    least_rise: float | None = None
-    draw: Callable[..., tuple[NDArray[np.uint8], Source] | None] | None = None
-    on_dark: bool = False
-    by_border: bool = False
-    times: int = 1
-
-    @property
-    def network(self) -> bool:
-        """Whether what is looked at is drawn by a network."""
-        return self.draw is not None
-
-    def drawn(self, watch: _Stopwatch) -> tuple[NDArray[np.uint8], Source | None]:
-        """What to look at, and what it was drawn from; raise NoBlockFound where a network sees none, or is in doubt."""
-        if self.draw is None:
-            return self.picture, None
-        drawn = self.draw(on_dark=self.on_dark)
-        watch.lap("network")
-        if drawn is None:
-            raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")
-        picture, source = drawn
-        return picture, source if self.by_border else replace(source, border=None)
-
-    def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
-        """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""
-        if self.network:
-            return Reason.SEVERAL_BLOCKS not in reasons
-        if self.relief is not None:
-            return True
-        # What is nowhere in the picture is not in its high walls either.
-        return not (nowhere or reasons & _LIES_THERE or (reasons == _HARDLY_SEEN and self.least_rise is not None))
-
-
-def _tried(outlined: Callable[[_Look], Measurement], look: _Look) -> _Outcome:
-    """What a look finds, or why it finds nothing."""
-    try:
-        return outlined(look)
-    except (NoBlockFound, EdgeContradicted) as error:
-        return error
-
-
-def _best(
-    first: _Outcome, looks: Iterator[_Look], outlined: Callable[[_Look], Measurement], watch: _Stopwatch
-) -> _Outcome:
-    """What a first look found, or the first of others that nothing speaks against, if something does against that."""
-    if isinstance(first, EdgeContradicted) or _accepted(first):
-        return first
-    reasons = {*first.reasons} if isinstance(first, Measurement) else set[Reason]()
-    for look in looks:
-        watch.lap("table")
-        if not look.may_show_more(reasons, nowhere=isinstance(first, NoCellsFound)):
-            continue
-        again = _tried(outlined, look._replace(on_dark=not reasons & _LIES_THERE))
-        if _accepted(again):
-            return again
-        if isinstance(again, Measurement):
-            if look.network and Reason.EDGE_COVERED in again.reasons:
-                break  # what lies over an edge that is drawn would be drawn away
-            reasons |= {Reason.SEVERAL_BLOCKS} & {*again.reasons}
-    watch.lap("table")
-    return first
-
-
-def _accepted(found: _Outcome) -> bool:
-    return isinstance(found, Measurement) and not found.findings
-
-
-def _fine(picture: NDArray[np.uint8], found: _Outcome, recipe: AnyRecipe) -> bool:
-    """Whether cells are fine, in a picture that is not too large to be looked at enlarged, and in which nothing was
-    seen to lie there that might not be at another size.
-    """
-    if picture.shape[0] * picture.shape[1] > _MOST_PX or isinstance(found, NoCellsFound):
-        return False
-    if isinstance(found, Measurement) and found.pitch_px is not None:
-        return found.pitch_px < FINE_PITCH_PX and not {*found.reasons} & _LIES_THERE
-    with contextlib.suppress(NoBlockFound):
-        return probe(wall_light(picture), recipe.polarity).pitch_px < FINE_PITCH_PX
-    return False
-
-
-def _agreed(plain: _Outcome, finer: _Outcome) -> _Outcome:
-    """What was found in a picture, and in the same enlarged: the one that is accepted. Where both are, one must run
-    where the other does; where neither is, what was traced says more than what kind of border it seems to have.
-    """
-    if not _accepted(plain):
-        said = isinstance(plain, EdgeContradicted) and isinstance(finer, Measurement)
-        return finer if said or _accepted(finer) else plain
-    if not isinstance(plain, Measurement) or not isinstance(finer, Measurement) or finer.findings:
-        return plain
-    assert plain.pixels is not None
-    assert finer.pixels is not None
-    assert finer.pitch_px is not None
-    apart = agreement(finer.pixels, plain.pixels).hausdorff_px / finer.pitch_px
-    if apart > _APART:
-        return EdgeContradicted(
-            f"looked at twice as large, the border runs elsewhere, by {apart:.1f} cells: cells of "
-            f"{finer.pitch_px:.0f} px are too small to tell a cut border from a closed one here. Give edge: cut or "
-            "edge: cells, or more pixels a cell",
-            "cut",
-        )
-    return finer
 
 
 def _over(

@@ -26,6 +26,7 @@ SAID_IN = (
     "service/calibrating/teaching",
     "service/certifying/sight",
     "service/measuring/calibration_guard",
+    "service/measuring/looks/outcome",
     "contour/ribbon/ribbon",
     *(f"service/web/commission/{name}_actions" for name in ("board", "cell", "machine")),
     *(f"service/web/commission/{name}" for name in ("bench", "board_shots", "score")),

@@ -1,0 +1,98 @@
+"""What looks at a picture find, and which of it counts."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from contour.errors import EdgeContradicted, NoBlockFound, NoCellsFound
+from contour.geometry.agreement import agreement
+from contour.tracing.edge_kind import FINE_PITCH_PX
+from contour.tracing.trace import OnStage
+from contour.walls.cell_scale import probe
+from contour.walls.lightness import wall_light
+from service.measuring.looks.look import LIES_THERE, Look
+from service.measuring.measurement import Measurement
+from service.reasons import Reason
+
+if TYPE_CHECKING:
+    from service.config.recipes import AnyRecipe
+
+Outcome = Measurement | NoBlockFound | EdgeContradicted
+
+# Fine cells are looked at enlarged in pictures of so many pixels at most, and outlines seen so may lie so many pitches
+# apart.
+_MOST_PX, _APART = 4_000_000, 0.35
+
+
+def tried(outlined: Callable[[Look], Measurement], look: Look) -> Outcome:
+    """What a look finds, or why it finds nothing."""
+    try:
+        return outlined(look)
+    except (NoBlockFound, EdgeContradicted) as error:
+        return error
+
+
+def best(first: Outcome, looks: Iterator[Look], outlined: Callable[[Look], Measurement], on_stage: OnStage) -> Outcome:
+    """What a first look found, or the first of others that nothing speaks against, if something does against that."""
+    if isinstance(first, EdgeContradicted) or accepted(first):
+        return first
+    reasons = {*first.reasons} if isinstance(first, Measurement) else set[Reason]()
+    for look in looks:
+        on_stage("table")
+        if not look.may_show_more(reasons, nowhere=isinstance(first, NoCellsFound)):
+            continue
+        again = tried(outlined, look._replace(on_dark=not reasons & LIES_THERE))
+        if accepted(again):
+            return again
+        if isinstance(again, Measurement):
+            if look.network and Reason.EDGE_COVERED in again.reasons:
+                break  # what lies over an edge that is drawn would be drawn away
+            reasons |= {Reason.SEVERAL_BLOCKS} & {*again.reasons}
+    on_stage("table")
+    return first
+
+
+def accepted(found: Outcome) -> TypeGuard[Measurement]:
+    """Whether a look found an outline that nothing speaks against."""
+    return isinstance(found, Measurement) and not found.findings
+
+
+def fine(picture: NDArray[np.uint8], found: Outcome, recipe: AnyRecipe) -> bool:
+    """Whether cells are fine, in a picture that is not too large to be looked at enlarged, and in which nothing was
+    seen to lie there that might not be at another size.
+    """
+    if picture.shape[0] * picture.shape[1] > _MOST_PX or isinstance(found, NoCellsFound):
+        return False
+    if isinstance(found, Measurement) and found.pitch_px is not None:
+        return found.pitch_px < FINE_PITCH_PX and not {*found.reasons} & LIES_THERE
+    with contextlib.suppress(NoBlockFound):
+        return probe(wall_light(picture), recipe.polarity).pitch_px < FINE_PITCH_PX
+    return False
+
+
+def agreed(plain: Outcome, finer: Outcome) -> Outcome:
+    """What was found in a picture, and in the same enlarged: the one that is accepted. Where both are, one must run
+    where the other does; where neither is, what was traced says more than what kind of border it seems to have.
+    """
+    if not accepted(plain):
+        said = isinstance(plain, EdgeContradicted) and isinstance(finer, Measurement)
+        return finer if said or accepted(finer) else plain
+    if not accepted(finer):
+        return plain
+    assert plain.pixels is not None
+    assert finer.pixels is not None
+    assert finer.pitch_px is not None
+    apart = agreement(finer.pixels, plain.pixels).hausdorff_px / finer.pitch_px
+    if apart > _APART:
+        return EdgeContradicted(
+            f"looked at twice as large, the border runs elsewhere, by {apart:.1f} cells: cells of "
+            f"{finer.pitch_px:.0f} px are too small to tell a cut border from a closed one here. Give edge: cut or "
+            "edge: cells, or more pixels a cell",
+            "cut",
+        )
+    return finer

@@ -97,7 +97,8 @@ def checked_trace(
         return checked_trace(picture, settings, there, larger, relief, source, on_stage=on_stage).reduced(times)
     if region is None:
         traced = trace(picture, settings, rectifier=rectifier, relief=relief, source=source, on_stage=on_stage)
-        checked = check_trace(picture, traced, rectifier, relief, source)
+        notches = source is None and settings.least_rise is None
+        checked = check_trace(picture, traced, rectifier, relief, source, notches=notches)
         on_stage("quality")
         return checked
     part, first = region.cut(picture)
@@ -113,10 +114,13 @@ def check_trace(
     rectifier: Rectifier | None,
     relief: Relief | None = None,
     source: Source | None = None,
+    *,
+    notches: bool = False,
 ) -> CheckedTrace:
     """The trace with its quality and its disagreement with the picture, (H, W) grey or (H, W, 3) BGR, uint8.
 
-    All are those it was traced with.
+    All are those it was traced with. `notches`: its walls are all that the picture shows, so that what they leave out
+    may have been cut.
     """
     quality = block_quality(picture, traced.light, traced.contour, traced.pitch_px)
     # What is at full scale beside dark walls is the table; their ends are seen all the better.
@@ -129,7 +133,7 @@ def check_trace(
     loose = None if traced.look is None or traced.look.loose is None else traced.look.loose.astype(np.uint8)
     apart, edge = side_by_side(
         lambda: disagreement(picture, _bent(traced, pitch_px, rectifier), pitch_px, flat, loose),
-        lambda: _checked_edge(picture, traced, pitch_px, relief, source),
+        lambda: _checked_edge(picture, traced, pitch_px, relief, source, notches=notches),
     )
     return _without_image(CheckedTrace(traced, quality, apart, *edge), pitch_px)
 
@@ -157,7 +161,7 @@ def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:
 
 
 def _checked_edge(
-    picture: Bytes, traced: Trace, pitch_px: float, relief: Relief | None, source: Source | None
+    picture: Bytes, traced: Trace, pitch_px: float, relief: Relief | None, source: Source | None, *, notches: bool
 ) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None, EdgePart | None, EdgePart | None]:
     """What is narrow, alike, bare, overrun and runs on of an edge; the last alone where closed cells are serrated."""
     # What was drawn has no borders on its table.
@@ -168,7 +172,7 @@ def _checked_edge(
     if traced.evidence is None:
         return None, None, None, None, runs_on
     return (
-        narrow_feature(traced.contour, pitch_px),
+        narrow_feature(traced.contour, pitch_px, notches=notches),
         alike_edge(picture, traced.contour, pitch_px, dark=traced.polarity == "dark"),
         *comb_at_edge(traced, pitch_px),
         runs_on,

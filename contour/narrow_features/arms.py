@@ -44,10 +44,13 @@ def arms(contour: Contour, pitch_px: float, large: float) -> list[NarrowFeature]
     ]
 
 
-def slits(contour: Contour, pitch_px: float) -> list[NarrowFeature]:
-    """What goes into a contour as narrow as an arm, however deep: an outline had followed a cable in, and back."""
+def slits(contour: Contour, pitch_px: float, narrow: float) -> list[NarrowFeature]:
+    """What goes into a contour narrower than so many pitches, however deep: an outline had followed a cable in, and
+    back.
+    """
     drawn, first = _drawn([contour.exterior], pitch_px, WIDTH)
-    return [replace(slit, outwards=False) for slit, _ in _narrow_parts(1 - drawn, first, pitch_px, _STRIP)]
+    kind = replace(_STRIP, narrow=narrow)
+    return [replace(slit, outwards=False) for slit, _ in _narrow_parts(1 - drawn, first, pitch_px, kind)]
 
 
 def _drawn(rings: Sequence[Ring], pitch_px: float, margin: float) -> tuple[Bytes, Float64s]:

@@ -12,7 +12,7 @@ from contour.geometry.arrays import Bools, Float64s, Indices, rolled
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring
 from contour.geometry.segments import turns
-from contour.narrow_features.feature import DEPTH, WIDTH, NarrowFeature
+from contour.narrow_features.feature import DEPTH, NOTCH, WIDTH, NarrowFeature
 
 # In cell pitches. A wider bump is a strip or a label where it fills so much of the rectangle over its foot: an arm's
 # end fills half, and what stands farther out is an arm.
@@ -74,8 +74,8 @@ class _Beside:
         return np.asarray(np.abs(mean[:, 0] * way[:, 1] - mean[:, 1] * way[:, 0]), np.float64)
 
 
-def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
-    """The deepest bump or dent of a ring in pixels, None without one."""
+def deepest_bump(ring: Ring, pitch_px: float, *, notches: bool) -> NarrowFeature | None:
+    """The deepest bump or dent of a ring in pixels, None without one; `notches`: of dents that cannot have been cut."""
     if _convex(ring):
         return None
     lengths = RingLengths.of(ring)
@@ -118,7 +118,8 @@ def deepest_bump(ring: Ring, pitch_px: float) -> NarrowFeature | None:
     for some in np.split(chosen, np.flatnonzero(np.diff(long[chosen])) + 1):
         if len(some):
             run = starts[some], int(steps[long[some[0]], 0])
-            best = _deeper(best, places, run, (along[some], width[some], least[some], side[some]), pitch_px)
+            foot = along[some], width[some], least[some], side[some]
+            best = _deeper(best, places, run, foot, pitch_px, notches=notches)
     return best
 
 
@@ -128,6 +129,8 @@ def _deeper(
     run: tuple[Indices, int],
     foot: tuple[Float64s, Float64s, Float64s, Float64s],
     pitch_px: float,
+    *,
+    notches: bool,
 ) -> NarrowFeature | None:
     """The deepest of those that begin at `run`'s places and are its steps long, or `best` where none is deeper."""
     starts, steps = run
@@ -141,7 +144,10 @@ def _deeper(
     middle = off.mean(axis=1)
     out = middle < 0
     upright = out & (depth < _HIGH * pitch_px) & (np.abs(_areas(path)) > _UPRIGHT * width * depth)
-    depth = np.where((depth > least) & (side * middle <= 0.0) & (upright | (width < WIDTH * pitch_px)), depth, 0.0)
+    narrow = width < WIDTH * pitch_px
+    if notches:
+        narrow &= out | (np.minimum(depth, width) < NOTCH * pitch_px)
+    depth = np.where((depth > least) & (side * middle <= 0.0) & (upright | narrow), depth, 0.0)
     one = int(depth.argmax())
     if depth[one] <= ((best.depth_pitches + _DEEPER) * pitch_px if best else 0.0):
         return best

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 # Narrower than this at its foot, farther out than that, cell pitches.
 WIDTH, DEPTH = 5.0, 0.75
+# A dent as wide and as deep as this may have been cut.
+NOTCH = 2.5
 
 
 @dataclass(frozen=True)

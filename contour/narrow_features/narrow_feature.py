@@ -5,7 +5,7 @@ from __future__ import annotations
 from contour.geometry.rings import Contour, Ring, area
 from contour.narrow_features.arms import arms, slits
 from contour.narrow_features.bumps import deepest_bump
-from contour.narrow_features.feature import WIDTH, NarrowFeature
+from contour.narrow_features.feature import NOTCH, WIDTH, NarrowFeature
 from contour.narrow_features.steps import horns, jogs, steps
 from contour.seams.inner_corners import hanging
 
@@ -15,19 +15,22 @@ _LARGE = 1.0 / 7.0
 _LONG = 2.5
 
 
-def narrow_feature(contour: Contour, pitch_px: float) -> NarrowFeature | None:
+def narrow_feature(contour: Contour, pitch_px: float, *, notches: bool = False) -> NarrowFeature | None:
     """The deepest bump or dent of a contour in pixels on an edge that goes on in its own direction, or that stands out
-    of a curve or a corner at both its feet; None without one.
+    of a curve or a corner at both its feet; None without one. `notches`: dents that may have been cut are none.
 
     A corner is none, nor is the end of an arm: there the edges beside it run another way, and no foot is beside them.
     """
-    found = [one for ring in contour.rings for one in [deepest_bump(ring, pitch_px)] if one is not None]
+    found = [
+        one for ring in contour.rings for one in [deepest_bump(ring, pitch_px, notches=notches)] if one is not None
+    ]
     large = _LARGE * area(contour) / pitch_px**2
-    found += arms(contour, pitch_px, large) + slits(contour, pitch_px) + _necks(contour.exterior, pitch_px)
+    found += arms(contour, pitch_px, large) + slits(contour, pitch_px, NOTCH if notches else WIDTH)
+    found += _necks(contour.exterior, pitch_px)
     found += [
         one
         for ring in contour.rings
-        for one in (*steps(ring, pitch_px, large), *jogs(ring, pitch_px), *horns(ring, pitch_px))
+        for one in (*steps(ring, pitch_px, large, notches=notches), *jogs(ring, pitch_px), *horns(ring, pitch_px))
     ]
     return max(found, key=lambda one: one.depth_pitches) if found else None
 

@@ -15,6 +15,8 @@ from contour.narrow_features.feature import DEPTH, NarrowFeature
 # A step: of outlines without what is smaller than this it turns in and out by so much, or the other way around, and
 # goes on as before but for that; so low, and a corner comes so soon behind it.
 _EVEN, _TURN_DEG, _TURNED_DEG, _STEP_HIGH, _STEP_LONG = 0.3, 45.0, 35.0, (0.75, 4.5), 10.0
+# Where it has turned in by more before it turns out, there is a notch before it.
+_NOTCH_RAD = float(np.radians(135.0))
 # A jog: an edge goes on as before, but for this angle, so far aside; it has so much of it on both sides, and what lies
 # between turns away and back by so much. Of 260 right outlines none has one, of wrong ones one along inked cells.
 _JOG_EVEN, _JOG_HIGH, _JOG_LONG, _JOG_ASIDE_DEG, _JOG_TURN_DEG = 0.12, (0.35, 0.95), 1.0, 20.0, 30.0
@@ -24,13 +26,16 @@ _JOG_EVEN, _JOG_HIGH, _JOG_LONG, _JOG_ASIDE_DEG, _JOG_TURN_DEG = 0.12, (0.35, 0.
 _HORN_DEG, _HORN_LONG, _HORN_FOOT_DEG, _HORN_EVEN = 75.0, 5.0, 40.0, 0.1
 
 
-def steps(ring: Ring, pitch_px: float, large: float) -> list[NarrowFeature]:
-    """Low steps out of an edge that end in a corner soon, less than `large`, squares of the pitch."""
+def steps(ring: Ring, pitch_px: float, large: float, *, notches: bool) -> list[NarrowFeature]:
+    """Low steps out of an edge that end in a corner soon, less than `large`, squares of the pitch; `notches`: what is
+    beside a notch is none.
+    """
     even = fewer_vertices(ring, _EVEN * pitch_px)
     # Either way around; a contour in pixels has the block on its left as seen with y down: it turns left at corners.
     mirrored = np.stack([-even[::-1, 0], even[::-1, 1]], axis=1)
-    found = _steps_along(even, pitch_px) + [
-        replace(step, place_px=(-step.place_px[0], step.place_px[1])) for step in _steps_along(mirrored, pitch_px)
+    found = _steps_along(even, pitch_px, notches=notches) + [
+        replace(step, place_px=(-step.place_px[0], step.place_px[1]))
+        for step in _steps_along(mirrored, pitch_px, notches=notches)
     ]
     return [step for step in found if step.depth_pitches * step.width_pitches < large]
 
@@ -44,7 +49,7 @@ def _edges(corners: Ring, pitch_px: float) -> tuple[Float64s, Float64s]:
     return np.hypot(*edges.T) / pitch_px, -np.angle(heading / rolled(heading, 1))
 
 
-def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
+def _steps_along(corners: Ring, pitch_px: float, *, notches: bool) -> list[NarrowFeature]:
     long, turn = _edges(corners, pitch_px)
     least, turned = np.radians([_TURN_DEG, _TURNED_DEG])
     after = rolled(turn, -1)
@@ -53,6 +58,8 @@ def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
     rises &= (high > _STEP_HIGH[0]) & (high < _STEP_HIGH[1])
     found = []
     for foot in np.flatnonzero(rises).tolist():
+        if notches and _turned_in(turn, foot) > _NOTCH_RAD:
+            continue
         top = rolled(np.arange(len(corners)), -foot - 1)
         turned_by = np.cumsum(turn[top[1:]])  # a corner may be a round one
         end = int(np.argmax(np.abs(turned_by) > least)) + 1
@@ -63,6 +70,12 @@ def _steps_along(corners: Ring, pitch_px: float) -> list[NarrowFeature]:
             x, y = corners[top[0]].tolist()
             found.append(NarrowFeature(float(high[foot]), float(wide), (x, y), True))
     return found
+
+
+def _turned_in(turn: Float64s, foot: int) -> float:
+    """By how much a ring turns in on end before a corner and at it, radians."""
+    before = rolled(turn, -foot - 1)[::-1]
+    return -float(before[: int(np.argmax(before > 0.0))].sum())
 
 
 def jogs(ring: Ring, pitch_px: float) -> list[NarrowFeature]:

@@ -27,6 +27,8 @@ Outcome = Measurement | NoBlockFound | EdgeContradicted
 # Fine cells are looked at enlarged in pictures of so many pixels at most, and outlines seen so may lie so many pitches
 # apart.
 _MOST_PX, _APART = 4_000_000, 0.35
+# What may speak against an outline that was seen well: no other look changes it.
+_OF_ITS_SIZE_AND_PLACE = {Reason.AREA_OUT_OF_LIMITS, Reason.OUTSIDE_WORK_AREA, Reason.TOO_MANY_POINTS}
 
 
 def tried(outlined: Callable[[Look], Measurement], look: Look) -> Outcome:
@@ -39,7 +41,7 @@ def tried(outlined: Callable[[Look], Measurement], look: Look) -> Outcome:
 
 def best(first: Outcome, looks: Iterator[Look], outlined: Callable[[Look], Measurement], on_stage: OnStage) -> Outcome:
     """What a first look found, or the first of others that nothing speaks against, if something does against that."""
-    if isinstance(first, EdgeContradicted) or accepted(first):
+    if isinstance(first, EdgeContradicted) or _seen_well(first):
         return first
     reasons = {*first.reasons} if isinstance(first, Measurement) else set[Reason]()
     for look in looks:
@@ -62,6 +64,11 @@ def accepted(found: Outcome) -> TypeGuard[Measurement]:
     return isinstance(found, Measurement) and not found.findings
 
 
+def _seen_well(found: Outcome) -> bool:
+    """Whether a look found an outline against which nothing speaks but its size and place."""
+    return isinstance(found, Measurement) and {*found.reasons} <= _OF_ITS_SIZE_AND_PLACE
+
+
 def fine(picture: NDArray[np.uint8], found: Outcome, recipe: AnyRecipe) -> bool:
     """Whether cells are fine, in a picture that is not too large to be looked at enlarged, and in which nothing was
     seen to lie there that might not be at another size.
@@ -69,7 +76,8 @@ def fine(picture: NDArray[np.uint8], found: Outcome, recipe: AnyRecipe) -> bool:
     if picture.shape[0] * picture.shape[1] > _MOST_PX or isinstance(found, NoCellsFound):
         return False
     if isinstance(found, Measurement) and found.pitch_px is not None:
-        return found.pitch_px < FINE_PITCH_PX and not {*found.reasons} & LIES_THERE
+        doubted = accepted(found) or not _seen_well(found)
+        return found.pitch_px < FINE_PITCH_PX and doubted and not {*found.reasons} & LIES_THERE
     with contextlib.suppress(NoBlockFound):
         return probe(wall_light(picture), recipe.polarity).pitch_px < FINE_PITCH_PX
     return False

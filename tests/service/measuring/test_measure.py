@@ -317,6 +317,19 @@ def test_on_a_tables_grain_a_block_is_found_by_its_strong_walls() -> None:
     assert seen.findings == ()
 
 
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[float | None]:
+    """The least rise of each trace's walls."""
+    asked: list[float | None] = []
+
+    def traced(picture: np.ndarray, settings: TraceSettings, **known: object) -> Trace:
+        asked.append(settings.least_rise)
+        return tracing.trace(picture, settings, **known)
+
+    monkeypatch.setattr(trace_check, "trace", traced)
+    return asked
+
+
 @pytest.mark.parametrize(
     ("scene", "reason", "looks"),
     [
@@ -326,18 +339,19 @@ def test_on_a_tables_grain_a_block_is_found_by_its_strong_walls() -> None:
     ],
 )
 def test_what_lies_over_an_edge_is_not_looked_past_nor_what_few_walls_tell(
-    scene: tuple[str, int], reason: Reason, looks: list[float | None], monkeypatch: pytest.MonkeyPatch
+    scene: tuple[str, int], reason: Reason, looks: list[float | None], asked: list[float | None]
 ) -> None:
-    asked: list[float | None] = []
-
-    def traced(picture: np.ndarray, settings: TraceSettings, **known: object) -> Trace:
-        asked.append(settings.least_rise)
-        return tracing.trace(picture, settings, **known)
-
-    monkeypatch.setattr(trace_check, "trace", traced)
     seen = measured(render(shop_floor_scene(*scene, alone=True).scene), PlainRecipe(network=False))
     assert seen.reasons[0] == reason
     assert asked == looks
+
+
+@pytest.mark.parametrize("limit", [{"max_area_mm2": 100.0}, {"max_vertices": 3, "tolerance_mm": 0.01}])
+def test_what_is_refused_for_its_size_alone_is_not_looked_at_again(
+    rendered, measurer: Measurer, limit: dict, asked: list[float | None]
+) -> None:
+    assert measurer.measure(rendered.picture, RECIPE.model_copy(update=limit), 20).findings
+    assert asked == [None]
 
 
 def test_of_two_blocks_no_network_draws_one(monkeypatch: pytest.MonkeyPatch) -> None:

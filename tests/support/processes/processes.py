@@ -119,7 +119,7 @@ def _started(words: list[str], log: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen([*COMBTRACE, *words], stdout=file, stderr=subprocess.STDOUT, env=ENVIRONMENT)
 
 
-def until(condition: Callable[[], Any], bound_s: float = 60, what: str = "it", pause_s: float = 0.02) -> Any:
+def until(condition: Callable[[], Any], bound_s: float = 300, what: str = "it", pause_s: float = 0.02) -> Any:
     """What `condition` gives once it is true; it is asked again after each pause."""
     give_up_at = time.monotonic() + bound_s
     while not (result := condition()):

@@ -14,7 +14,7 @@ from contour.synthetic import CellGeometry, Rendered, Scene, Table, camera_above
 from service.config.plain_recipe import PlainRecipe
 from service.measuring.measure import Measurer
 from service.reasons import Reason
-from tests.contour.narrow_features.test_narrow_features import BLOCK, PITCH, contour, dent
+from tests.support.pictures.narrow_shapes import BLOCK, PITCH, contour, dent
 
 CELL_MM = 8.0
 

@@ -96,7 +96,7 @@ class NodeClient:
             (self.told if "at" in said else self._answers).append(said)
 
     def _answer(self) -> dict[str, Any]:
-        until(lambda: bool(self._answers) or self._process.poll() is not None, 60, "node-opcua's answer")
+        until(lambda: bool(self._answers) or self._process.poll() is not None, what="node-opcua's answer")
         until(lambda: bool(self._answers), 5, "node-opcua's answer before its end")
         return self._answers.pop(0)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from service.web.people.pins import line_of
+from tests.support.processes.processes import BOUND_S
 
 TOKEN = "anna-has-this-token-0123"
 OTHER_TOKEN = "oleg-has-this-token-4567"
@@ -42,7 +43,9 @@ class Client:
 
     def ask(self, method: str, path: str, *, body: bytes | None = None, **headers: str) -> Reply:
         """Header names with _ for -; each request by a connection of its own."""
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60, source_address=(self.source, 0))
+        connection = http.client.HTTPConnection(
+            "127.0.0.1", self.port, timeout=BOUND_S, source_address=(self.source, 0)
+        )
         try:
             sent = {name.replace("_", "-"): value for name, value in headers.items()}
             connection.request(method, path, body, sent)

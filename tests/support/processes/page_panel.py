@@ -12,12 +12,11 @@ from playwright.sync_api import Browser, Page, Playwright, Route, expect
 
 from tests.support.processes.cell import Cell
 from tests.support.processes.page_client import Client
-from tests.support.processes.processes import until
+from tests.support.processes.processes import BOUND_S, until
 from tests.support.real_parts import need_program
 
-BOUND_MS = 300_000  # what gives way to jobs, on a busy machine
 LOOK_S = 0.1  # asked without a pause, the daemon answers instead of measuring
-expect.set_options(timeout=BOUND_MS)
+expect.set_options(timeout=1000 * BOUND_S)
 CHROMIUM = Path(__file__).with_name("chromium.sh")
 PANEL = {"width": 1280, "height": 800}
 FRAME = "#view image:not([visibility])"  # not the one that is still to come
@@ -71,7 +70,7 @@ def chromium(playwright: Playwright) -> Browser:
 def clean_page(browser: Browser, url: str, noise: Sequence[str] = (), **more: Any) -> Iterator[Page]:
     """The page there; nothing but the noise may go wrong in it, and nothing be loaded from elsewhere."""
     page = browser.new_page(viewport=PANEL, **more)
-    page.set_default_timeout(BOUND_MS)
+    page.set_default_timeout(1000 * BOUND_S)
     complaints: list[str] = []
     asked: list[str] = []
     page.on("console", lambda message: message.type == "error" and complaints.append(message.text))

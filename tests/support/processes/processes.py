@@ -24,10 +24,12 @@ from tests.support.processes.forked import Forked
 COMBTRACE = [sys.executable, "-m", "service.cli.main"]
 ROOT = Path(__file__).parents[3]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}
+BOUND_S = 300.0
+"""What is not there by then does not come, however busy the machine is: what gives way to jobs may wait a minute."""
 
 
 def combtrace(
-    *arguments: str | Path, cwd: Path | None = None, bound_s: float = 60, variables: dict[str, str] | None = None
+    *arguments: str | Path, cwd: Path | None = None, bound_s: float = BOUND_S, variables: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
     """Run a command to its end; with a folder or variables of its own it starts from nothing."""
     if forked.begun and cwd is None and variables is None:
@@ -79,7 +81,7 @@ class Process:
         self._process.kill()
         self._process.wait()
 
-    def stop(self, bound_s: float = 60) -> int:
+    def stop(self, bound_s: float = BOUND_S) -> int:
         """SIGTERM, and its exit status."""
         self.send(signal.SIGTERM)
         return self.ended(bound_s)
@@ -88,7 +90,7 @@ class Process:
         """A signal."""
         self._process.send_signal(number)
 
-    def ended(self, bound_s: float = 60) -> int:
+    def ended(self, bound_s: float = BOUND_S) -> int:
         """Its exit status, once it has ended by itself."""
         try:
             return self._process.wait(bound_s)
@@ -119,7 +121,7 @@ def _started(words: list[str], log: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen([*COMBTRACE, *words], stdout=file, stderr=subprocess.STDOUT, env=ENVIRONMENT)
 
 
-def until(condition: Callable[[], Any], bound_s: float = 300, what: str = "it", pause_s: float = 0.02) -> Any:
+def until(condition: Callable[[], Any], bound_s: float = BOUND_S, what: str = "it", pause_s: float = 0.02) -> Any:
     """What `condition` gives once it is true; it is asked again after each pause."""
     give_up_at = time.monotonic() + bound_s
     while not (result := condition()):
@@ -139,7 +141,7 @@ def jobs(journal: Path) -> list[dict[str, Any]]:
     """All jobs of a journal, read by SQLite's own hands while the service may be writing."""
     if not journal.exists():
         return []
-    database = sqlite3.connect(f"file:{journal}?mode=ro", uri=True, timeout=60)
+    database = sqlite3.connect(f"file:{journal}?mode=ro", uri=True, timeout=BOUND_S)
     try:
         database.row_factory = sqlite3.Row
         return [dict(row) for row in database.execute("SELECT * FROM jobs ORDER BY job_id")]

@@ -8,6 +8,8 @@ import select
 import time
 import tty
 
+from tests.support.processes.processes import BOUND_S
+
 
 class Terminal:
     """The far end of a pseudo-terminal that the daemon opens as its serial port."""
@@ -22,7 +24,7 @@ class Terminal:
     def type(self, data: bytes) -> None:
         os.write(self.master, data)
 
-    def line(self, bound_s: float = 60) -> str:
+    def line(self, bound_s: float = BOUND_S) -> str:
         """The next line that the daemon sent."""
         give_up_at = time.monotonic() + bound_s
         while b"\n" not in self._rest:
@@ -33,7 +35,7 @@ class Terminal:
         line, _, self._rest = self._rest.partition(b"\n")
         return line.decode("ascii").strip()
 
-    def acknowledged(self, bound_s: float = 60) -> int:
+    def acknowledged(self, bound_s: float = BOUND_S) -> int:
         """The job that the next line acknowledges."""
         word, job = self.line(bound_s).split()
         assert word == "ACK"

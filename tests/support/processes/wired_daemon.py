@@ -18,6 +18,7 @@ from service.measuring.measurement import Measurement
 from service.records.job import Job, TriggerStamp
 from service.state import State
 from service.wiring.daemon import build
+from tests.support.processes.processes import BOUND_S
 from tests.support.service.waiting import until
 
 RECTANGLE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0], [0.0, 50.0]])
@@ -63,7 +64,7 @@ class WiredDaemon:
         fault = self.parts.health.first()
         return "" if fault is None else f"{int(fault.reason)} {fault.text}"
 
-    async def ready(self, bound_s: float = 60.0) -> None:
+    async def ready(self, bound_s: float = BOUND_S) -> None:
         await until(lambda: self.parts.health.state is State.READY, bound_s)
 
     async def job(self) -> Job:

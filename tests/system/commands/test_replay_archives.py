@@ -82,7 +82,7 @@ def test_a_cluster_gives_the_same_rows_with_a_worker_killed_and_one_of_another_o
         assert "no worker has the versions of here" in alone.stderr
         workers = [dask.add_worker() for _ in range(2)]
         with subprocess.Popen([*COMBTRACE, *words], stderr=subprocess.PIPE, env=ENVIRONMENT, text=True) as run:
-            until(lambda: list(tmp_path.glob("*.parts/batch-*")) or output.exists(), 60, "the first rows")
+            until(lambda: list(tmp_path.glob("*.parts/batch-*")) or output.exists(), what="the first rows")
             workers[0].kill()
             _, said = run.communicate(timeout=120)
     assert run.returncode == 2, said

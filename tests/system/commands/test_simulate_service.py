@@ -14,7 +14,7 @@ from pymodbus.client import ModbusTcpClient
 from tests.support.controller.protocol_decoder import decode_contour
 from tests.support.controller.scanned_server import scanned_server
 from tests.support.interop.programs import libmodbus_tcp
-from tests.support.processes.processes import Process, combtrace, free_port, jobs, lines, until
+from tests.support.processes.processes import BOUND_S, Process, combtrace, free_port, jobs, lines, until
 
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "controllers" / "linuxcnc"))
@@ -112,7 +112,7 @@ def test_registers_that_a_stranger_serves_hold_the_contour_where_the_configurati
         )
         assert done.returncode == 0, done.stderr
         assert re.match(r"job \d+ written", done.stdout)
-        client = ModbusTcpClient("127.0.0.1", port=port, timeout=60)
+        client = ModbusTcpClient("127.0.0.1", port=port, timeout=BOUND_S)
         assert client.connect()
         header = client.read_holding_registers(500, count=32).registers
         payload = client.read_holding_registers(532, count=header[7]).registers

@@ -19,6 +19,7 @@ from service.state import State
 from service.wiring.bounds import target
 from service.wiring.errors import WiringError
 from tests.support.controller.fault_proxy import Fate, FaultProxy
+from tests.support.processes.processes import BOUND_S
 from tests.support.processes.wired_daemon import WiredDaemon, wired
 from tests.support.service.waiting import until
 
@@ -244,7 +245,7 @@ async def test_a_job_that_a_late_write_of_another_service_met_is_settled_by_the_
         controller.write_as_another(one.parts.journal.owner % 65535 + 1, 7)
         await until(lambda: ownership.conflict)
         assert not ticket.settled.done()
-        assert (await asyncio.wait_for(ticket.settled, 60)).outcome is Outcome.ACCEPTED
+        assert (await asyncio.wait_for(ticket.settled, BOUND_S)).outcome is Outcome.ACCEPTED
         assert "combtrace confirm" in one.reason
         controller.pace = controller._program._pace = Pace()
         assert one.parts.executor.confirm() == [

@@ -140,7 +140,7 @@ def test_a_reason_is_seen_in_the_fail_line_the_register_and_the_log(
     terminal.type(f"TRIG recipe={number}\n".encode())
     job = terminal.acknowledged(30)
     assert job == cell.number(number), "the cases before this one must run too: each takes one picture"
-    assert terminal.line(60) == f"FAIL {job} {case.code} {case.name}"
+    assert terminal.line() == f"FAIL {job} {case.code} {case.name}"
     until(lambda: registers(cell) == (case.code, job), what=f"reject_reason {case.code} of job {job}")
     outcome = Reason(case.code).outcome
     said = f"job {job} {outcome}: {case.code} {case.name}: "
@@ -235,7 +235,7 @@ def text_after(folder: Path, ends: list[tuple[int, int, str]], **options: Any) -
             terminal.type(b"TRIG\n")
             job = terminal.acknowledged(30)
             assert job == started.number(nth)
-            assert terminal.line(60).startswith(f"FAIL {job} {code} {name}" if code else f"DONE {job} ")
+            assert terminal.line().startswith(f"FAIL {job} {code} {name}" if code else f"DONE {job} ")
             until(lambda code=code, job=job: registers(started) == (code, job), what=f"reject_reason {code}")
             said = f"job {job} refused: {code} {name}: "
             until(lambda code=code, said=said: code == 0 or said in started.service.text, what=said)

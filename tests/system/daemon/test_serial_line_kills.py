@@ -116,7 +116,7 @@ def test_a_job_that_a_stop_cut_short_is_told_after_the_next_start(tmp_path: Path
         until(lambda: sent(cell, number), what="the contour on its way")
         assert cell.service.stop() == 0
         cell.service = cell.start_service()
-        heard = terminal.line(60)
+        heard = terminal.line()
         (job,) = jobs(cell.journal)
         assert heard.startswith(
             f"DONE {number} " if job["outcome"] == "accepted" else f"FAIL {number} {job['reason']} "
@@ -181,7 +181,7 @@ def test_the_trigger_command_hears_the_end_after_a_kill_and_a_restart(tmp_path: 
             cell.service.kill()
             time.sleep(1)
             cell.service = cell.start_service()
-            assert command.ended(60) == EXIT_OK, command.text
+            assert command.ended() == EXIT_OK, command.text
             assert [line.split()[:2] for line in command.text.splitlines()] == [["ACK", number], ["DONE", number]]
     finally:
         panel.close()

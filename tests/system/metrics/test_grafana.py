@@ -19,7 +19,7 @@ import pytest
 
 from tests.support.interop.programs import NODE_INSTALL, node_modules
 from tests.support.processes.cell import ON_SAMPLES, Cell
-from tests.support.processes.processes import free_port, until
+from tests.support.processes.processes import BOUND_S, free_port, until
 from tests.support.real_parts import need_program
 
 PACKAGING = Path(__file__).parents[3] / "packaging"
@@ -156,7 +156,7 @@ def answers(url: str, expression: str) -> list[Any]:
     """What Prometheus answers; nothing while it is starting."""
     query = urllib.parse.urlencode({"query": expression})
     try:
-        with urllib.request.urlopen(f"{url}/query?{query}", timeout=60) as reply:
+        with urllib.request.urlopen(f"{url}/query?{query}", timeout=BOUND_S) as reply:
             told = json.load(reply)
     except ConnectionRefusedError:
         return []
@@ -181,7 +181,7 @@ def test_a_real_prometheus_answers_every_question_of_a_daemon_at_work(prometheus
 
 
 def test_the_questions_name_only_what_the_daemon_serves(prometheus: str) -> None:
-    with urllib.request.urlopen(f"{prometheus}/label/__name__/values", timeout=60) as reply:
+    with urllib.request.urlopen(f"{prometheus}/label/__name__/values", timeout=BOUND_S) as reply:
         served = set(json.load(reply)["data"])
     named = {name for _, expression in QUESTIONS for name in NAME.findall(expression)}
     assert len(named) > 18

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.processes.cell import ON_SAMPLES, Cell
-from tests.support.processes.processes import free_port, until
+from tests.support.processes.processes import BOUND_S, free_port, until
 from tests.support.real_parts import need_program
 
 RULES = Path(__file__).parents[3] / "packaging" / "prometheus"
@@ -19,7 +19,7 @@ NAME = re.compile(r"\b(combtrace_[a-z0-9_]+)\b")
 
 
 def served(port: int) -> str:
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=60) as answer:
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=BOUND_S) as answer:
         return answer.read().decode()
 
 
@@ -76,7 +76,7 @@ def test_prometheus_own_tool_accepts_what_is_served(text: str) -> None:
 )
 def test_prometheus_own_tool_accepts_the_alert_rules_and_their_tests(command: tuple[str, ...]) -> None:
     promtool = need_program("promtool", "apt-get install prometheus")
-    done = subprocess.run([promtool, *command], cwd=RULES, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([promtool, *command], cwd=RULES, capture_output=True, text=True, check=False, timeout=BOUND_S)
     assert done.returncode == 0, done.stdout + done.stderr
 
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from tests.support.pictures.combs import write_combs
-from tests.support.processes.processes import ENVIRONMENT, Process, free_port, until
+from tests.support.processes.processes import BOUND_S, ENVIRONMENT, Process, free_port, until
 
 PROGRAM = """
 import json, sys, threading
@@ -27,7 +27,7 @@ def test_a_daemon_without_it_imports_nothing_of_it_and_has_no_thread_for_it(tmp_
         "service: {state_dir: state}\njournal: {path: journal.sqlite}\narchive: {path: archive}\n"
     )
     command = [sys.executable, "-c", PROGRAM, "run", "--once", "--config", str(config)]
-    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=BOUND_S, check=False)
     modules, threads = json.loads(done.stdout.splitlines()[-1])
     assert (modules, [name for name in threads if "opcua" in name]) == ([], [])
     assert "written" in done.stderr, "a job was done"

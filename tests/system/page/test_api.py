@@ -19,7 +19,7 @@ from service.daemon.control import ask
 from service.web.models import Drawing, Job, Jobs, Notes, Reasons, ServiceState
 from tests.support.processes.cell import ON_SAMPLES, Cell
 from tests.support.processes.page_client import OTHER_TOKEN, THIRD_TOKEN, TOKEN, Client, token_file
-from tests.support.processes.processes import free_port, until
+from tests.support.processes.processes import BOUND_S, free_port, until
 
 
 @dataclass
@@ -212,7 +212,7 @@ def test_nothing_can_be_uploaded(served: Served) -> None:
     assert client.order("/api/v1/halt", Content_Type="multipart/form-data; boundary=x").status == 415
     assert client.order("/api/v1/halt", Content_Type="application/x-www-form-urlencoded").status == 415
     assert client.order("/api/v1/halt", content={"reason": "x" * 5000}).status == 413
-    connection = http.client.HTTPConnection("127.0.0.1", client.port, timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", client.port, timeout=BOUND_S)
     headers = {"Authorization": f"Bearer {TOKEN}", "Content-Type": "application/json"}
     connection.request("POST", "/api/v1/halt", iter([b" " * 3000] * 3), headers, encode_chunked=True)
     assert connection.getresponse().status == 413
@@ -348,7 +348,7 @@ def test_a_flood_of_connections_leaves_the_daemon_its_descriptors(served: Served
     opened = []
     try:
         for _ in range(150):
-            opened.append(socket.create_connection(("127.0.0.1", served.client.port), timeout=60))
+            opened.append(socket.create_connection(("127.0.0.1", served.client.port), timeout=BOUND_S))
         until(
             lambda: sum(map(was_closed, opened)) >= 80, 6, "an end of those beyond the bound"
         )  # sooner than by silence
@@ -363,7 +363,7 @@ class Viewer:
     """Reads the event stream, or does not."""
 
     def __init__(self, port: int) -> None:
-        self.socket = socket.create_connection(("127.0.0.1", port), timeout=60)
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=BOUND_S)
         self.socket.sendall(b"GET /api/v1/events HTTP/1.1\r\nHost: localhost\r\n\r\n")
         self.lines = self.socket.makefile("rb")
         self.status = int(self.lines.readline().split()[1])

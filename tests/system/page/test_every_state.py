@@ -119,7 +119,7 @@ def test_the_live_view_and_dialogs_are_whole_and_axe_core_finds_nothing_serious(
     page.wait_for_selector("#trigger:enabled")
     page.evaluate((node_modules() / "axe-core" / "axe.min.js").read_text())
     page.locator("#live").click()
-    page.wait_for_selector('#live-verdict[data-kind="accepted"]', timeout=60_000)
+    page.wait_for_selector('#live-verdict[data-kind="accepted"]')
     wrong = {"live": page.evaluate(FAULTS) + page.evaluate(AXE) + page.evaluate(CUT)}
     page.evaluate("document.getElementById('by-person').hidden = false")
     for dialog, opener in DIALOGS.items():

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.processes.page_client import TOKEN, token_file
-from tests.support.processes.processes import Process, free_port, until
+from tests.support.processes.processes import BOUND_S, Process, free_port, until
 from tests.support.real_parts import need_program
 
 
@@ -53,13 +53,13 @@ def test_over_tls_and_without_tokens_it_can_only_be_looked_at(tmp_path: Path) ->
         url = f"https://localhost:{port}/api/v1"
         until(lambda: "page: https://127.0.0.1" in process.text, what="the page")
         time.sleep(0.2)
-        with urllib.request.urlopen(f"{url}/state", timeout=60, context=trusting) as answer:
+        with urllib.request.urlopen(f"{url}/state", timeout=BOUND_S, context=trusting) as answer:
             seen = json.loads(answer.read())
         assert (seen["link"], seen["calibration"]) == (None, None)
         headers = {"Content-Type": "application/json", "Authorization": f"Bearer {TOKEN}"}
         order = urllib.request.Request(f"{url}/halt", b"{}", headers)
         with pytest.raises(urllib.error.HTTPError) as refused:
-            urllib.request.urlopen(order, timeout=60, context=trusting)
+            urllib.request.urlopen(order, timeout=BOUND_S, context=trusting)
         assert (refused.value.code, "set page.token_file" in refused.value.read().decode()) == (403, True)
         refused.value.close()
     finally:

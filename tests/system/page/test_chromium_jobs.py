@@ -276,6 +276,7 @@ def test_the_filmstrip_freezes_filters_and_opens_one_with_all_its_values(panel: 
     panel.client.order("/api/v1/trigger")
     expect(page.locator("#count-missed")).to_have_text("1")
     panel.client.order("/api/v1/resume")
+    expect(page.locator("#state")).to_have_text("Ready")  # what is said of the halt goes, and what is below moves up
     page.locator("#count-missed").tap()
     expect(page.locator("#counts")).to_contain_text(f"this page: {Reason.NOT_READY.explained().sentence}")
     page.keyboard.press("Escape")

@@ -56,11 +56,13 @@ _BEVEL_LONG, _LOST = 2.0, 1.0
 _ROUND, _ASTRAY = np.radians(200.0), (0.25, 1.0)
 # So is the floor of a notch, no longer than that, between edges that turn in by so much from one to the other, from
 # which its witnesses lie so far, root mean square, pitches: a line, an arc, and one that turns by so much itself. Along
-# round floors they lie within 0.03, and 0.1 to 0.27 where an arc was drawn through corners. So is a floor that nothing
-# was seen of, so long: there a line steps aside to the next.
+# round floors they lie within 0.03, and 0.1 to 0.27 where an arc was drawn through corners. So is an arc between two
+# corners of so much, one beside which a line or an arc steps aside by so much, or that so few witnesses lead to, one
+# that is no longer than that and not round, and one that nothing was seen of: there a line steps aside to the next.
+# Light between walls does not tell of these: the place that is told lies so far out of the floor.
 _FLOOR_LONG, _FLOOR_TURN, _ROUND_FLOOR_TURN = 7.5, np.radians(135.0), np.radians(100.0)
 _FLOOR_OFF, _BENT_FLOOR_OFF, _ROUND_FLOOR_OFF = 0.25, 0.12, 0.06
-_STEP_LONG = 1.0
+_CORNER, _STEP_LONG, _LEAD, _SHORT_FLOOR, _OUT_OF_FLOOR = np.radians(30.0), 1.0, 3, 5.0, 1.25
 # An outlier has no say in where a line lies.
 _LEAST_WEIGHT = 1e-9
 
@@ -91,7 +93,7 @@ def untold(
         if _may_be_a_corner(witnesses, index, residual[index], price, arc)
     ]
     places += _hardly_seen(witnesses, segments, lone, found, inlier)
-    places += _vague_floors(witnesses, segments, found, residual, chains)
+    places += _vague_floors(witnesses, segments, found, inlier, residual, chains)
     places += _bent_lines(witnesses, segments, lone, found, residual)
     places += _maybe_bevelled(witnesses, segments, found, inlier)
     places += _unseen_corners(witnesses, segments, found, inlier, residual, chains)
@@ -139,28 +141,44 @@ def _may_be_a_corner(
 
 
 def _vague_floors(
-    witnesses: Witnesses, segments: Segments, found: Joints, residual: Float64s, chains: list[Chain]
+    witnesses: Witnesses,
+    segments: Segments,
+    found: Joints,
+    inlier: Bools,
+    residual: Float64s,
+    chains: list[Chain],
 ) -> list[np.complex128]:
-    """What lies farthest from floors of notches that may as well run otherwise, and middles of those not seen."""
+    """Places before floors of notches that may as well run otherwise, and middles of those not seen."""
     at_ends = [_at_ends(segments, found, k) for k in range(len(segments))]
     ends, tangents = (np.array(both) for both in zip(*at_ends, strict=True))
     # By how much the outline turns in at the joint behind each segment, and along each.
     joint = np.angle(tangents[:, 1] * rolled(tangents[:, 0], -1).conjugate())
-    chord = np.abs(ends[:, 1] - ends[:, 0])
-    own = -2.0 * np.arcsin(np.clip(0.5 * chord * segments.models.curvature, -1.0, 1.0))
-    step = np.abs(found.end - found.begin) / witnesses.pitch_px
-    places: list[np.complex128] = (0.5 * (found.end + found.begin))[
-        (step > _STEP_LONG) & (np.abs(joint) > _FLOOR_TURN)
-    ].tolist()
+    chord = ends[:, 1] - ends[:, 0]
+    long = np.abs(chord) / witnesses.pitch_px
+    own = -2.0 * np.arcsin(np.clip(0.5 * np.abs(chord) * segments.models.curvature, -1.0, 1.0))
+    if (own + joint).sum() > 0.0:
+        return []  # all of a hole turns in
+    aside = np.abs(found.end - found.begin) > _STEP_LONG * witnesses.pitch_px
+    unseen = aside & (np.abs(joint) > _FLOOR_TURN)
+    places: list[np.complex128] = (0.5 * (found.end + found.begin))[unseen].tolist()
     round_ = own > _ROUND_FLOOR_TURN
-    floor = (round_ | (own + joint + rolled(joint, 1) > _FLOOR_TURN)) & (chord < _FLOOR_LONG * witnesses.pitch_px)
+    floor = (round_ | (own + joint + rolled(joint, 1) > _FLOOR_TURN)) & (long < _FLOOR_LONG)
     floor[[k for chain in chains for k in chain.segments]] = False
+    of_each = [segments.members(k, len(witnesses)) for k in range(len(segments))]
+    few = ~segments.bend & np.array([np.count_nonzero(inlier[index]) < _LEAD for index in of_each])
+    doubted = (rolled(few, 1) | rolled(few, -1)) & (len(segments) > 2)
+    doubted |= (
+        aside
+        | rolled(aside, 1)
+        | (~round_ & (long < _SHORT_FLOOR))
+        | (segments.bend & (np.minimum(joint, rolled(joint, 1)) > _CORNER))
+    )
     for k in np.flatnonzero(floor).tolist():
-        index = segments.members(k, len(witnesses))
-        off = np.minimum(np.abs(residual[index]) / witnesses.pitch_px, 1.0)
+        off = np.minimum(np.abs(residual[of_each[k]]) / witnesses.pitch_px, 1.0)
         most = _ROUND_FLOOR_OFF if round_[k] else _BENT_FLOOR_OFF if segments.bend[k] else _FLOOR_OFF
-        if np.sqrt((off**2).mean()) > most:
-            places.append(witnesses.points[index][int(off.argmax())])
+        if np.sqrt((off**2).mean()) > most or doubted[k]:
+            out = -1j * chord[k] / max(abs(chord[k]), 1e-9)
+            places.append(ends[k].mean() + _OUT_OF_FLOOR * witnesses.pitch_px * out)
     return places
 
 

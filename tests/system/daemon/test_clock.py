@@ -59,7 +59,8 @@ def test_jobs_go_on_whichever_way_the_clock_jumps(tmp_path: Path, clock: Path) -
     found = jobs(cell.journal)
     years = {str(job["taken_at"])[:4] for job in found}
     assert len(years) >= 3, f"the clock did not jump: {years}"
+    if found[-1]["reason"] == Reason.ABORTED:  # the stop cut the last one short
+        found.pop()
     others = {(job["outcome"], job["reason"]) for job in found if job["outcome"] not in ("accepted", None)}
-    # What is in flight as the clock jumps is not sent again; what was cut short was sent by then, or not.
-    cut_short = {("failed", Reason.SERVICE_RESTARTED), ("failed", Reason.ABORTED)}
-    assert others <= {("failed", Reason.EXPIRED), *cut_short}, "no frame is stale"
+    # What is in flight as the clock jumps is not sent again; what the kill cut short was sent by then, or not.
+    assert others <= {("failed", Reason.EXPIRED), ("failed", Reason.SERVICE_RESTARTED)}, "no frame is stale"

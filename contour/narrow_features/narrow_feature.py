@@ -21,9 +21,8 @@ def narrow_feature(contour: Contour, pitch_px: float, *, notches: bool = False) 
 
     A corner is none, nor is the end of an arm: there the edges beside it run another way, and no foot is beside them.
     """
-    found = [
-        one for ring in contour.rings for one in [deepest_bump(ring, pitch_px, notches=notches)] if one is not None
-    ]
+    bumps = (deepest_bump(ring, pitch_px, notches=notches) for ring in contour.rings)
+    found = [bump for bump in bumps if bump is not None]
     large = _LARGE * area(contour) / pitch_px**2
     found += arms(contour, pitch_px, large) + slits(contour, pitch_px, NOTCH if notches else WIDTH)
     found += _necks(contour.exterior, pitch_px)

@@ -58,9 +58,9 @@ def _steps_along(corners: Ring, pitch_px: float, *, notches: bool) -> list[Narro
     rises &= (high > _STEP_HIGH[0]) & (high < _STEP_HIGH[1])
     found = []
     for foot in np.flatnonzero(rises).tolist():
-        if notches and _turned_in(turn, foot) > _NOTCH_RAD:
-            continue
         top = rolled(np.arange(len(corners)), -foot - 1)
+        if notches and _turned_in(turn[top[::-1]]) > _NOTCH_RAD:
+            continue
         turned_by = np.cumsum(turn[top[1:]])  # a corner may be a round one
         end = int(np.argmax(np.abs(turned_by) > least)) + 1
         # At its foot: slanting sides are as wide as they are long there.
@@ -72,10 +72,9 @@ def _steps_along(corners: Ring, pitch_px: float, *, notches: bool) -> list[Narro
     return found
 
 
-def _turned_in(turn: Float64s, foot: int) -> float:
-    """By how much a ring turns in on end before a corner and at it, radians."""
-    before = rolled(turn, -foot - 1)[::-1]
-    return -float(before[: int(np.argmax(before > 0.0))].sum())
+def _turned_in(turn: Float64s) -> float:
+    """By how much a ring that turns so, backwards from a corner, turns in until it last turned out, radians."""
+    return -float(turn[: int(np.argmax(turn > 0.0))].sum())
 
 
 def jogs(ring: Ring, pitch_px: float) -> list[NarrowFeature]:

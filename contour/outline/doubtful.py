@@ -149,11 +149,11 @@ def _vague_floors(
     chains: list[Chain],
 ) -> list[np.complex128]:
     """Places before floors of notches that may as well run otherwise, and middles of those not seen."""
-    at_ends = [_at_ends(segments, found, k) for k in range(len(segments))]
-    ends, tangents = (np.array(both) for both in zip(*at_ends, strict=True))
+    begin, end = rolled(found.begin, 1), found.end
+    (_, sets_out), (_, comes_in) = feet(segments.models, begin), feet(segments.models, end)
     # By how much the outline turns in at the joint behind each segment, and along each.
-    joint = np.angle(tangents[:, 1] * rolled(tangents[:, 0], -1).conjugate())
-    chord = ends[:, 1] - ends[:, 0]
+    joint = np.angle(comes_in * rolled(sets_out, -1).conj())
+    chord = end - begin
     long = np.abs(chord) / witnesses.pitch_px
     own = -2.0 * np.arcsin(np.clip(0.5 * np.abs(chord) * segments.models.curvature, -1.0, 1.0))
     if (own + joint).sum() > 0.0:
@@ -166,19 +166,15 @@ def _vague_floors(
     floor[[k for chain in chains for k in chain.segments]] = False
     of_each = [segments.members(k, len(witnesses)) for k in range(len(segments))]
     few = ~segments.bend & np.array([np.count_nonzero(inlier[index]) < _LEAD for index in of_each])
-    doubted = (rolled(few, 1) | rolled(few, -1)) & (len(segments) > 2)
-    doubted |= (
-        aside
-        | rolled(aside, 1)
-        | (~round_ & (long < _SHORT_FLOOR))
-        | (segments.bend & (np.minimum(joint, rolled(joint, 1)) > _CORNER))
-    )
+    doubted = rolled(few, 1) | rolled(few, -1) | aside | rolled(aside, 1)
+    doubted |= ~round_ & (long < _SHORT_FLOOR)
+    doubted |= segments.bend & (np.minimum(joint, rolled(joint, 1)) > _CORNER)
     for k in np.flatnonzero(floor).tolist():
         off = np.minimum(np.abs(residual[of_each[k]]) / witnesses.pitch_px, 1.0)
         most = _ROUND_FLOOR_OFF if round_[k] else _BENT_FLOOR_OFF if segments.bend[k] else _FLOOR_OFF
         if np.sqrt((off**2).mean()) > most or doubted[k]:
             out = -1j * chord[k] / max(abs(chord[k]), 1e-9)
-            places.append(ends[k].mean() + _OUT_OF_FLOOR * witnesses.pitch_px * out)
+            places.append(0.5 * (begin[k] + end[k]) + _OUT_OF_FLOOR * witnesses.pitch_px * out)
     return places
 
 

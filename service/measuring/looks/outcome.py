@@ -41,7 +41,7 @@ def tried(outlined: Callable[[Look], Measurement], look: Look) -> Outcome:
 
 def best(first: Outcome, looks: Iterator[Look], outlined: Callable[[Look], Measurement], on_stage: OnStage) -> Outcome:
     """What a first look found, or the first of others that nothing speaks against, if something does against that."""
-    if isinstance(first, EdgeContradicted) or _seen_well(first):
+    if isinstance(first, EdgeContradicted) or accepted(first) or _does_not_fit(first):
         return first
     reasons = {*first.reasons} if isinstance(first, Measurement) else set[Reason]()
     for look in looks:
@@ -64,9 +64,9 @@ def accepted(found: Outcome) -> TypeGuard[Measurement]:
     return isinstance(found, Measurement) and not found.findings
 
 
-def _seen_well(found: Outcome) -> bool:
-    """Whether a look found an outline against which nothing speaks but its size and place."""
-    return isinstance(found, Measurement) and {*found.reasons} <= _OF_ITS_SIZE_AND_PLACE
+def _does_not_fit(found: Measurement | NoBlockFound) -> bool:
+    """Whether its size and place, and nothing else, speak against an outline."""
+    return isinstance(found, Measurement) and bool(found.reasons) and {*found.reasons} <= _OF_ITS_SIZE_AND_PLACE
 
 
 def fine(picture: NDArray[np.uint8], found: Outcome, recipe: AnyRecipe) -> bool:
@@ -76,8 +76,7 @@ def fine(picture: NDArray[np.uint8], found: Outcome, recipe: AnyRecipe) -> bool:
     if picture.shape[0] * picture.shape[1] > _MOST_PX or isinstance(found, NoCellsFound):
         return False
     if isinstance(found, Measurement) and found.pitch_px is not None:
-        doubted = accepted(found) or not _seen_well(found)
-        return found.pitch_px < FINE_PITCH_PX and doubted and not {*found.reasons} & LIES_THERE
+        return found.pitch_px < FINE_PITCH_PX and not _does_not_fit(found) and not {*found.reasons} & LIES_THERE
     with contextlib.suppress(NoBlockFound):
         return probe(wall_light(picture), recipe.polarity).pitch_px < FINE_PITCH_PX
     return False

@@ -24,6 +24,7 @@ from contour.acceptance.polygon_findings import (
     not_cuttable,
     outside_calibration,
     outside_work_area,
+    too_many_holes,
     too_many_points,
     too_unsure,
 )
@@ -75,6 +76,7 @@ def judge(
         touches_border(outlines, view.size, limits.border_px),
         reaches_frame(trace),
         area_out_of_limits(polygon.area_mm2, limits),
+        too_many_holes(polygon.pixels, limits.max_holes),
         # Where something lies over the edge, that is why the picture says otherwise there, and where the edge is vague.
         *(() if covered else (disagrees(traced, limits.max_disagreement_pitches), vague(trace))),
         too_unsure(polygon.millimetres, budget, limits.max_uncertainty_mm),
@@ -101,6 +103,7 @@ def judge_millimetres(contour: Contour, limits: Limits, bound_mm: float | None) 
     shape = None if defect is None else Finding(Refusal.SELF_INTERSECTING, f"The contour cannot be cut: {defect}.")
     findings = [
         area_out_of_limits(area(contour), limits),
+        too_many_holes(contour, limits.max_holes, "mm"),
         too_unsure(contour, budget, limits.max_uncertainty_mm),
         outside_work_area(contour, limits.work_area_mm),
         too_many_points(contour, limits.max_vertices),

@@ -52,6 +52,7 @@ class Limits:
 
     min_area_mm2: float = 0.0
     max_area_mm2: float = float("inf")
+    max_holes: int = 1000
     max_vertices: int = 4000
     border_px: float = 2.0
     work_area_mm: Ring | None = None

@@ -1,11 +1,11 @@
-"""What speaks against a polygon: its area, place, uncertainty, number of vertices, and shape."""
+"""What speaks against a polygon: its area, holes, place, uncertainty, number of vertices, and shape."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from contour.acceptance.error_budget import ErrorBudget
-from contour.acceptance.findings import Finding, Limits, Refusal, around, runs_where
+from contour.acceptance.findings import Finding, Limits, Refusal, around, closed, runs_where
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.geometry.rings import Contour, Ring, contour_defect
 from contour.geometry.segments import BoxTree, contains, first_meeting
@@ -23,6 +23,19 @@ def area_out_of_limits(area_mm2: float | None, limits: Limits) -> Finding | None
         Refusal.AREA_OUT_OF_LIMITS,
         f"The contour's area is {area_mm2:.0f} mm², the recipe expects {limits.min_area_mm2:.0f} to "
         f"{limits.max_area_mm2:.0f} mm². Check that the block is the recipe's, and the lighting.",
+    )
+
+
+def too_many_holes(contour: Contour, most: int, unit: str = "px") -> Finding | None:
+    """More holes than the recipe's block may have: what is too much may be a thing that lies on it."""
+    if len(contour.holes) <= most:
+        return None
+    x, y = contour.holes[0].mean(axis=0)
+    return Finding(
+        Refusal.AREA_OUT_OF_LIMITS,
+        f"The contour's holes are more than the recipe allows, {len(contour.holes)} in place of {most}: one lies "
+        f"around ({x:.0f}, {y:.0f}) {unit}. Check that nothing lies on the block, and that the block is the recipe's.",
+        tuple(closed(hole) for hole in contour.holes) if unit == "px" else (),
     )
 
 

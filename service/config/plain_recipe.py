@@ -29,6 +29,7 @@ class PlainRecipe:
     budget_mm: float = 0.0
     min_area_mm2: float = 100.0
     max_area_mm2: float = 4_000_000.0
+    max_holes: int = 1000
     polarity: Literal["auto", "bright", "dark"] = "auto"
     binarize: Literal["flat", "otsu"] | int = "flat"
     edge: Literal["auto", "cut", "cells"] = "auto"

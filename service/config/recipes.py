@@ -170,6 +170,9 @@ class Recipe(Model):
     )
     min_area_mm2: float = Field(100, ge=0, le=4e9, description="Smallest accepted area, mm², holes taken off.")
     max_area_mm2: float = Field(4_000_000, gt=0, le=4e9, description="Largest accepted area, mm², holes taken off.")
+    max_holes: int = Field(
+        1000, ge=0, le=1000, description="Most holes that the block may have; what else looks like one lies on it."
+    )
     polarity: Literal["auto", "bright", "dark"] = Field("auto", description="Walls against the table.")
     binarize: Literal["flat", "otsu"] | Annotated[int, Field(ge=0, le=255)] = Field(
         "flat", description="How walls are told from gaps: flat, otsu, or a fixed grey level 0 to 255."

@@ -377,6 +377,7 @@ class Measurer:
         return Limits(
             min_area_mm2=recipe.min_area_mm2,
             max_area_mm2=recipe.max_area_mm2,
+            max_holes=recipe.max_holes,
             max_vertices=recipe.max_vertices,
             work_area_mm=self._work_area_mm,
             sure=None if self._calibration is None else self._calibration.uncertainty,

@@ -89,6 +89,20 @@ def test_an_area_beyond_the_recipes_limits_names_all_three_numbers(mm_per_px: fl
     assert "1000 to 20000 mm²" in finding.text
 
 
+@pytest.mark.parametrize("mm_per_px", [None, 1.0])
+def test_more_holes_than_the_recipe_allows_are_refused_with_a_place(mm_per_px: float | None) -> None:
+    hole = SQUARE[::-1] * 2 + 110
+    holed = polygon(SQUARE * 10 + 100, (hole, hole + 40), mm_per_px=mm_per_px)
+    limits = replace(LIMITS, max_vertices=12)
+    assert judge(holed, FRAME, replace(limits, max_holes=2)) == ()
+    (finding,) = judge(holed, FRAME, replace(limits, max_holes=1))
+    assert finding.refusal == Refusal.AREA_OUT_OF_LIMITS
+    assert "2 in place of 1" in finding.text
+    x, y = hole.mean(axis=0)
+    assert f"({x:.0f}, {y:.0f}) px" in finding.text
+    assert len(finding.shown_px) == 2
+
+
 def test_limits_in_millimetres_do_not_apply_without_a_calibration() -> None:
     far_away = SQUARE + 1e6
     limits = replace(LIMITS, max_area_mm2=2.0, min_area_mm2=1.0, work_area_mm=far_away)

@@ -25,6 +25,7 @@ from service.measuring import measure
 from service.measuring.calibration_file import load_record
 from service.measuring.measure import Measurer, trace_settings
 from service.reasons import Reason
+from tests.support.scenes.edge_scenes import HOLED
 from tests.support.scenes.sample_scenes import THICKNESS_MM, sample_scenes
 from tests.support.scenes.shop_floor.blocks import shop_floor_block
 from tests.support.scenes.shop_floor.covers import clamp, hand_or_cable, tape
@@ -111,6 +112,12 @@ def test_the_recipes_limits_refuse(rendered, measurer: Measurer, change: dict, r
     seen = measurer.measure(rendered.picture, RECIPE.model_copy(update=change), THICKNESS_MM)
     assert seen.reasons == (reason,)
     assert seen.pixels is not None
+
+
+@pytest.mark.parametrize(("most", "refused"), [(1, ()), (0, (Reason.AREA_OUT_OF_LIMITS,))])
+def test_a_hole_is_refused_where_the_recipes_block_has_none(most: int, refused: tuple[Reason, ...]) -> None:
+    seen = Measurer(None).measure(render(HOLED).picture, RECIPE.model_copy(update={"max_holes": most}), 0.0)
+    assert seen.reasons == refused
 
 
 def test_a_region_in_pixels_and_the_same_in_millimetres_see_the_same(rendered, measurer: Measurer) -> None:

@@ -49,7 +49,9 @@ _SIMPLE_PX = 0.25
 _ON_CUT_PX, _PARTED_PX = 2.0, 2
 _NO_CUTS = np.empty((0, 2, 2))
 # Where cells differ from the table by so many grey levels, what differs by less than this share of that is a bay that a
-# cut closed, no cell that it opened. Nearer to a wall its blur tells nothing, nor does what little is left of it then.
+# cut closed, no cell that it opened: of what the half of them differs by at least, as light falls into cells that were
+# opened, and they may show the table as it is. Nearer to a wall its blur tells nothing, nor does what little is left
+# of it then.
 _FLOOR_LEVELS, _LIKE_FLOOR, _FROM_WALL_PX, _LEAST_FREE = 6.0, 0.35, 7, 0.1
 # Of the width of the edge: half a level off moves the outline by so much. And of a wall's: the outermost one leans,
 # shows its side, or stands on a foot: in photographs nobody can say which of that is the edge. Webs of a sheet do not.
@@ -149,10 +151,14 @@ def _without_bays(closed: Bytes, shut: Bytes, parted: Bytes, apart: Apart, pitch
     bay = np.zeros(len(area), np.bool_)
     bay[owner[part_area > _LARGEST_CELL * cell]] = True
     bay[0] = False
+    differ = {0: floor}
     for number in 1 + np.flatnonzero(area[1:] > _LEAST_BAY * pitch_px * pitch_px) if floor >= _FLOOR_LEVELS else ():
         inner = apart.difference[(labels == number) & free]
-        enough = len(inner) > _LEAST_FREE * area[number]
-        bay[number] |= enough and median(inner.astype(np.float64)) <= _LIKE_FLOOR * floor
+        if len(inner) > _LEAST_FREE * area[number]:
+            differ[number] = median(inner.astype(np.float64))
+    usual = min(floor, median(np.array(list(differ.values()))))
+    for number, level in differ.items() if usual >= _FLOOR_LEVELS else ():
+        bay[number] |= level <= _LIKE_FLOOR * usual
     # With the cut across its mouth.
     bays = cv2.dilate(bay.astype(np.uint8)[labels], np.ones((3, 3), np.uint8))
     return np.where(bays > 0, apart.region, closed)

@@ -13,7 +13,15 @@ from contour.errors import NoCellsFound
 from contour.geometry.arrays import Bools, Bytes, Float64s, Indices, Int32s, median, quantile, quantiles
 from contour.image.opencv import inverted, opened, pieces_and_areas, pieces_and_middles
 from contour.image.side_by_side import side_by_side
-from contour.walls.comb_likeness import Comb, apart, filled_shares, lattice_order, surely_comb
+from contour.walls.comb_likeness import (
+    MOSTLY_SQUARES,
+    ROUND_SQUARES,
+    Comb,
+    apart,
+    filled_shares,
+    lattice_order,
+    surely_comb,
+)
 from contour.walls.wall_mask import FINE_PITCH, Smooth, wall_mask
 
 _TILE_PX = 512
@@ -54,7 +62,7 @@ class CellScale:
     connected: float
     level: float
     floor: float
-    form: Callable[[], tuple[float, float, float, float, float]]
+    form: Callable[[], tuple[float, float, float, float, float, float]]
 
     @property
     def score(self) -> float:
@@ -72,7 +80,7 @@ class CellScale:
     def comb(self) -> Comb:
         """What tells a comb from other things that have patches side by side."""
         regular = self.regularity * self.filled
-        order, triangles, solid, circled, parted = self.form()
+        order, triangles, squares, solid, circled, parted = self.form()
         return Comb(
             self.pitch_px,
             self.wall_px,
@@ -84,6 +92,7 @@ class CellScale:
             solid=solid,
             circled=circled,
             triangular=triangles > 0.5 * order,
+            square=squares > MOSTLY_SQUARES and circled > ROUND_SQUARES,
             apart=parted,
         )
 

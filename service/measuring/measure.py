@@ -409,9 +409,10 @@ def _second_opinion(
 ) -> tuple[Finding, ...]:
     """What networks say against the outline: comb beyond it, things over it, no cells within it, a seam through it.
 
-    Closed cells are none that they know.
+    Closed cells are none that they know, nor are triangles, squares, and sheets.
     """
-    if traced.edge != "cut" or traced.pitch_px is None or traced.look is None:
+    known = traced.edge == "cut" and (traced.comb is None or traced.comb.core)
+    if not known or traced.pitch_px is None or traced.look is None:
         return ()
     outline = traced.contour if rectifier is None else rectified_edges(traced.contour, rectifier)
     part, first = (picture, np.zeros(2)) if region is None else region.cut(picture)

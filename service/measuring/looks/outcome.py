@@ -51,12 +51,21 @@ def best(first: Outcome, looks: Iterator[Look], outlined: Callable[[Look], Measu
         again = tried(outlined, look._replace(on_dark=not reasons & LIES_THERE))
         if accepted(again):
             return again
+        if look.network and _may_be_drawn_wrong(again):
+            break
         if isinstance(again, Measurement):
-            if look.network and Reason.EDGE_COVERED in again.reasons:
-                break  # what lies over an edge that is drawn would be drawn away
             reasons |= {Reason.SEVERAL_BLOCKS} & {*again.reasons}
     on_stage("table")
     return first
+
+
+def _may_be_drawn_wrong(found: Outcome) -> bool:
+    """Whether something lies over an edge that a network drew, which would be drawn away, or walls that it drew close
+    border cells: it knows cut blocks alone, and other looks may take the teeth of such a border for ends of walls.
+    """
+    if not isinstance(found, Measurement):
+        return isinstance(found, EdgeContradicted)
+    return Reason.EDGE_COVERED in found.reasons or found.edge in ("cells", "mixed")
 
 
 def accepted(found: Outcome) -> TypeGuard[Measurement]:

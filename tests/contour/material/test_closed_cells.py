@@ -21,11 +21,12 @@ PITCH, COLUMNS, ROWS, LEFT, TOP = 40, 8, 6, 60, 50
 CUT_X = LEFT + PITCH * COLUMNS - PITCH // 2
 
 
-def cut_squares(bay: int) -> Bytes:
-    """Square cells, the last column cut open along a vertical line; the floor of one of these is of level `bay`."""
+def cut_squares(bay: int, opened: int = FLOOR) -> Bytes:
+    """Square cells, the last column cut open along a vertical line; floors of these are `opened`, of one `bay`."""
     picture = np.full((340, 460), TABLE, np.uint8)
     right, bottom = LEFT + PITCH * COLUMNS, TOP + PITCH * ROWS
     cv2.rectangle(picture, (LEFT, TOP), (right, bottom), FLOOR, -1)
+    cv2.rectangle(picture, (right - PITCH, TOP), (right, bottom), opened, -1)
     cv2.rectangle(picture, (right - PITCH, TOP + 2 * PITCH), (right, TOP + 3 * PITCH), bay, -1)
     for x in range(LEFT, right + 1, PITCH):
         cv2.line(picture, (x, TOP), (x, bottom), WALL, 5)
@@ -35,9 +36,9 @@ def cut_squares(bay: int) -> Bytes:
     return np.asarray(cv2.GaussianBlur(picture, (0, 0), 0.8), np.uint8)
 
 
-def area_along_cut(bay: int) -> float:
+def area_along_cut(bay: int, opened: int = FLOOR) -> float:
     """What lies in the outline of these cells along the cut, square pixels."""
-    picture = cut_squares(bay)
+    picture = cut_squares(bay, opened)
     material = material_edge(picture, PITCH, wall_mask(picture, PITCH, bright=True).mask)
     cut = np.array([[[CUT_X, TOP - 2.0], [CUT_X, TOP + PITCH * ROWS + 2.0]]])
     return area(closed_along(material, cut, PITCH).contour)
@@ -46,6 +47,12 @@ def area_along_cut(bay: int) -> float:
 def test_a_bay_that_shows_the_table_is_no_cell_that_a_cut_opened() -> None:
     cell = (PITCH // 2 - 2.5) * (PITCH - 5)
     assert area_along_cut(FLOOR) - area_along_cut(TABLE) == pytest.approx(cell, rel=0.15)
+
+
+@pytest.mark.parametrize("opened", [TABLE, TABLE - 2, TABLE - 5])
+def test_cells_that_a_cut_opened_may_all_show_the_table(opened: int) -> None:
+    """Light falls into them from beside the block; in whole cells it does not."""
+    assert area_along_cut(opened, opened) == pytest.approx(area_along_cut(FLOOR), rel=0.003)
 
 
 def test_what_touches_a_line_in_one_place_alone_is_no_cut() -> None:

@@ -16,7 +16,15 @@ from contour.errors import NoBlockFound
 from contour.polygon.polygon import cutting_polygon
 from contour.tracing.trace import TraceSettings
 from contour.tracing.tracing import trace
-from contour.walls.comb_likeness import Comb, apart, filled_shares, lattice_order, surely_comb, unlike_comb
+from contour.walls.comb_likeness import (
+    MOSTLY_SQUARES,
+    Comb,
+    apart,
+    filled_shares,
+    lattice_order,
+    surely_comb,
+    unlike_comb,
+)
 from tests.support.pictures.small_scenes import block
 
 
@@ -145,6 +153,16 @@ def test_stretched_cells_have_neighbours_opposite_each_other(stretch: float) -> 
     places = honeycomb(20.0, 14) * [1.0, stretch]
     inner = ((places > 30.0) & (places < places.max(axis=0) - 30.0)).all(axis=1)
     assert lattice_order(places, 20.0 * np.sqrt(stretch))[0] > 0.8 * np.mean(inner)
+
+
+def test_squares_are_told_from_hexagons_also_where_they_lie_aslant_and_not_quite_even() -> None:
+    rng = np.random.default_rng(5)
+    turn = np.exp(0.3j)
+    row, column = np.mgrid[:12, :12].reshape(2, -1)
+    aslant = (column + 1j * row) * 20.0 * turn
+    squares = np.column_stack((aslant.real, aslant.imag)) + rng.normal(0.0, 0.4, (144, 2))
+    assert lattice_order(squares, 20.0)[2] > MOSTLY_SQUARES
+    assert lattice_order(honeycomb(20.0, 12), 20.0)[2] < 0.5 * MOSTLY_SQUARES
 
 
 def test_hexagons_stay_apart_and_a_boards_squares_do_not() -> None:

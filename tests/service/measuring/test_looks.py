@@ -1,0 +1,59 @@
+"""Which of several looks at a picture counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from contour.errors import EdgeContradicted, NoBlockFound
+from contour.synthetic import render
+from service.config.recipes import Recipe
+from service.measuring.looks.look import Look
+from service.measuring.looks.outcome import best
+from service.measuring.measure import Measurer
+from service.measuring.measurement import Measurement
+from tests.support.scenes.edge_scenes import HOLED
+
+PLAIN = Look(np.zeros((8, 8), np.uint8))
+DRAWN = PLAIN._replace(draw=lambda **_: None)
+
+
+@pytest.fixture(scope="module")
+def accepted() -> Measurement:
+    found = Measurer(None).measure(render(HOLED).picture, Recipe(number=1, name="default"), 0.0)
+    assert not found.reasons
+    return found
+
+
+def found_by(drawn: Measurement | Exception, accepted: Measurement) -> Measurement | Exception:
+    """What counts where a plain look saw no block, drawn walls showed this, and later looks find what they accept."""
+
+    def outlined(look: Look) -> Measurement:
+        if look.network and not look.by_border:
+            if isinstance(drawn, Exception):
+                raise drawn
+            return drawn
+        return accepted
+
+    first = NoBlockFound("no block found")
+    looks = iter([DRAWN, DRAWN._replace(by_border=True), PLAIN._replace(least_rise=1.0)])
+    return best(first, looks, outlined, lambda _: None)
+
+
+def test_what_drawn_walls_do_not_show_later_looks_may(accepted: Measurement) -> None:
+    assert found_by(NoBlockFound("no block found"), accepted) is accepted
+
+
+def test_where_drawn_walls_close_their_cells_no_later_look_counts(accepted: Measurement) -> None:
+    """It would take teeth of closed cells for ends of walls: two lattices were accepted so, off by 0.6 and 0.7."""
+    assert isinstance(found_by(EdgeContradicted("closed", "mixed"), accepted), NoBlockFound)
+    unsure = replace(
+        accepted,
+        edge="mixed",
+        findings=Measurer(None)
+        .measure(np.full((64, 64), 30, np.uint8), Recipe(number=1, name="default"), 0.0)
+        .findings,
+    )
+    assert isinstance(found_by(unsure, accepted), NoBlockFound)

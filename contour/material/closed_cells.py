@@ -151,14 +151,14 @@ def _without_bays(closed: Bytes, shut: Bytes, parted: Bytes, apart: Apart, pitch
     bay = np.zeros(len(area), np.bool_)
     bay[owner[part_area > _LARGEST_CELL * cell]] = True
     bay[0] = False
-    differ = {0: floor}
+    differ = np.full(len(area), np.nan)
     for number in 1 + np.flatnonzero(area[1:] > _LEAST_BAY * pitch_px * pitch_px) if floor >= _FLOOR_LEVELS else ():
         inner = apart.difference[(labels == number) & free]
         if len(inner) > _LEAST_FREE * area[number]:
             differ[number] = median(inner.astype(np.float64))
-    usual = min(floor, median(np.array(list(differ.values()))))
-    for number, level in differ.items() if usual >= _FLOOR_LEVELS else ():
-        bay[number] |= level <= _LIKE_FLOOR * usual
+    usual = min(floor, median(np.append(differ[~np.isnan(differ)], floor)))
+    if usual >= _FLOOR_LEVELS:
+        bay |= differ <= _LIKE_FLOOR * usual
     # With the cut across its mouth.
     bays = cv2.dilate(bay.astype(np.uint8)[labels], np.ones((3, 3), np.uint8))
     return np.where(bays > 0, apart.region, closed)

@@ -117,9 +117,11 @@ def parted_strip(free: Openings) -> Parted | None:
 
 def _to_outline(opening: Bools, block: Bools, pitch: float) -> Bytes | None:
     """An opening, (h, w), and what leads from both of its ends straight on to the outline of the block, 1 there; None
-    where that is far, or lies aside.
+    where that is far, or lies aside, or the opening lies between samples.
     """
     row, column = np.nonzero(opening)
+    if len(row) < 2:
+        return None
     place = np.column_stack([column, row]).astype(np.float64)
     middle = place.mean(axis=0)
     axis = np.linalg.eigh(np.cov((place - middle).T))[1][:, 1]

@@ -78,3 +78,13 @@ def test_a_strip_is_parted_by_an_opening_though_walls_of_both_touch_at_its_ends(
 def test_cells_that_merge_at_the_end_of_all_lines_are_no_row(column: int) -> None:
     """A line's sum took in the first of the next direction's, and no cell lay on it."""
     assert parted_by_row(with_opening(8, 11, column)) is None
+
+
+def test_an_opening_between_the_samples_of_coarse_cells_parts_nothing() -> None:
+    """A triangular lattice had one: its picture ended in an error of numpy's."""
+    free = with_opening(1, 11)
+    thin = free.numbers.copy()
+    long = int(np.argmax(free.long))
+    thin[:, ::3][thin[:, ::3] == long] = 0
+    coarse = replace(free, numbers=thin, pitch=18.0, centre=free.centre)
+    assert parted_strip(coarse) is None

@@ -18,6 +18,9 @@ SIZE = 192
 _SURE = 0.9
 # So many are made of two parts, as of two blocks; and so many of the others of a seam lie about it.
 _JOINED, _AT_SEAM = 0.18, 0.4
+# So many of those that are to be holed are, of which so many holes are things that lie there, most of them about as
+# light as the table.
+_HOLED, _LAID, _AS_TABLE, _INSIDE, _IN_COMB = 0.75, 0.6, 0.7, 0.5, 0.8
 # Of those of two parts, so many have one on the other, and so many a splice between them.
 _STACKED, _GLUED = 0.15, 0.35
 
@@ -34,9 +37,11 @@ class Crop(NamedTuple):
     seam: Float32s
 
 
-def crop(one: Example, rng: np.random.Generator) -> Crop:
-    """A part of the example, drawn at random."""
-    light, (wall, comb, thing, seam) = _joined(one, rng) if rng.random() < _JOINED else _part(one, rng)
+def crop(one: Example, rng: np.random.Generator, *, holed: bool = False) -> Crop:
+    """A part of the example, drawn at random; `holed`: mostly with a hole in the block, or what looks like one."""
+    light, (wall, comb, thing, seam) = _joined(one, rng) if rng.random() < _JOINED else _part(one, rng, inside=holed)
+    if holed and rng.random() < _HOLED:
+        light, (wall, comb, thing, seam) = _like_hole(light, [wall, comb, thing, seam], rng)
     if rng.random() < 0.12:
         light = _lined(light, wall, thing, rng)
     if rng.random() < 0.08:
@@ -64,11 +69,13 @@ def crop(one: Example, rng: np.random.Generator) -> Crop:
     return Crop(light, wall * free, comb * free, thing, seam * free)
 
 
-def _part(one: Example, rng: np.random.Generator) -> tuple[Float32s, list[Float32s]]:
-    """Light of the picture, or of one of its channels, about a place that mostly is near the outline, turned, mirrored
-    and sized at random; and the shares of walls, comb, things and seams there.
+def _part(one: Example, rng: np.random.Generator, *, inside: bool) -> tuple[Float32s, list[Float32s]]:
+    """Light of the picture, or of one of its channels, about a place that mostly is near the outline, or within it,
+    turned, mirrored and sized at random; and the shares of walls, comb, things and seams there.
     """
     which = rng.random()
+    if inside and which < _INSIDE:
+        which = _IN_COMB
     places = one.seam[::4, ::4] > 100 if rng.random() < _AT_SEAM else _places(one.comb[::4, ::4], which)
     if not places.any():
         places = _places(one.comb[::4, ::4], which)
@@ -117,7 +124,7 @@ def _joined(one: Example, rng: np.random.Generator) -> tuple[Float32s, list[Floa
     alike = turn + (float(rng.normal(0.0, 2.0)) if rng.random() < 0.6 else float(rng.uniform(0.0, 360.0)))
     size, mirrored = math.exp(rng.uniform(-0.12, 0.12)), rng.random() < 0.5
     larger = size * math.exp(rng.uniform(-0.3, 0.3) * (rng.random() < 0.25))
-    within = _places(one.comb[::4, ::4], 0.8)
+    within = _places(one.comb[::4, ::4], _IN_COMB)
     first, second = (
         _seen_by(one, view, channel, _place(within, rng))
         for view in (_View(turn, size, mirrored), _View(alike, larger, mirrored))
@@ -224,6 +231,94 @@ def _cut_out(rng: np.random.Generator) -> Float32s:
         corners = cv2.boxPoints((middle.tolist(), sides, float(rng.uniform(0.0, 180.0))))
         lay(mask, corners, 255)
     return _share(mask)
+
+
+def _like_hole(light: Float32s, shares: list[Float32s], rng: np.random.Generator) -> tuple[Float32s, list[Float32s]]:
+    """With a hole that shows the table, in shade at its rim, or with a thing in its place: as light, with another
+    surface, a rim, a knob, a shadow on the block.
+    """
+    comb, thing = shares[1], shares[2]
+    inside = cv2.erode((comb > _SURE).astype(np.uint8), np.ones((9, 9), np.uint8))[::4, ::4] > 0
+    if not inside.any():
+        return light, shares
+    mask, across = _hole_or_body(_place(inside, rng), rng)
+    out = (1.0 - comb) * (1.0 - thing) > _SURE
+    within = light[comb > _SURE]
+    level = median(light[out]) if np.count_nonzero(out) > 50 else quantile(within, rng.uniform(0.05, 0.95))
+    texture = pattern(rng, SIZE) if rng.random() < 0.6 else noise(rng, SIZE, float(rng.uniform(1.0, 60.0)))
+    table = np.float32(level) * (1.0 + np.float32(rng.uniform(0.0, 0.25)) * texture)
+    if rng.random() > _LAID:
+        depth = cv2.distanceTransform((mask > 0.5).astype(np.uint8), cv2.DIST_L2, 5)
+        shade = np.float32(rng.uniform(0.0, 0.7)) * np.exp(-depth / float(rng.uniform(2.0, 20.0)))
+        away = cv2.warpAffine(
+            mask, _aside(float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(0.0, 14.0))), (SIZE,) * 2
+        )
+        cast = cv2.GaussianBlur(1.0 - away, (0, 0), float(rng.uniform(0.5, 4.0))) * np.float32(rng.uniform(0.0, 0.6))
+        body = table * (1.0 - shade) * (1.0 - cast) * np.float32(rng.uniform(0.6, 1.05))
+        kept = 1.0 - mask
+        shares = [shares[0] * kept, comb * kept, thing, shares[3] * kept]
+    else:
+        light, body = _thing_body(light, table, mask, across, rng)
+        shares = [*shares[:2], np.maximum(thing, mask), shares[3]]
+    return np.asarray(light * (1.0 - mask) + np.clip(body, 0.0, 255.0) * mask, np.float32), shares
+
+
+def _hole_or_body(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
+    """The shape of a hole or a thing about a place, and how far across it a place lies, -1...1."""
+    if rng.random() < 0.3:
+        return _disc(middle, rng)
+    mask = np.zeros((SIZE, SIZE), np.uint8)
+    most = 150.0 if rng.random() < 0.5 else 450.0
+    if most > SIZE:  # its rim runs through the part, its middle need not
+        turn = float(rng.uniform(0.0, 2.0 * math.pi))
+        middle = middle + float(rng.uniform(0.0, 0.4 * most)) * np.array([math.cos(turn), math.sin(turn)])
+    if rng.random() < 0.6:
+        sides = np.exp(rng.uniform(math.log(30.0), math.log(most), 2))
+        lay(mask, cv2.boxPoints((middle.tolist(), sides.tolist(), float(rng.uniform(0.0, 180.0)))), 255)
+        if rng.random() < 0.4:
+            soft = cv2.GaussianBlur(mask, (0, 0), float(rng.uniform(2.0, 8.0)))
+            mask = np.clip((soft.astype(np.float32) - 127.0) * 8.0 + 127.0, 0.0, 255.0).astype(np.uint8)
+    else:
+        count = int(rng.choice([5, 6, 8, 60]))
+        turns = np.arange(count) * 2.0 * math.pi / count + rng.uniform(0.0, 6.0)
+        lay(mask, middle + float(rng.uniform(20.0, 0.5 * most)) * np.column_stack((np.cos(turns), np.sin(turns))), 255)
+    return _share(mask), _slope(rng)
+
+
+def _thing_body(
+    light: Float32s, table: Float32s, mask: Float32s, across: Float32s, rng: np.random.Generator
+) -> tuple[Float32s, Float32s]:
+    """The light around a thing that lies there, which may be in its shadow, and that of its body."""
+    level = float(table.mean()) * math.exp(rng.uniform(-0.25, 0.25))
+    if rng.random() > _AS_TABLE:
+        level = float(rng.uniform(10.0, 245.0))
+    surface = pattern(rng, SIZE) if rng.random() < 0.6 else noise(rng, SIZE, float(rng.uniform(1.0, 40.0)))
+    body = np.float32(level) * (1.0 + np.float32(rng.uniform(0.0, 0.3)) * surface)
+    body = body * (1.0 + np.float32(rng.uniform(-0.5, 0.5) * (rng.random() < 0.6)) * across)
+    depth = cv2.distanceTransform((mask > 0.5).astype(np.uint8), cv2.DIST_L2, 5)
+    lamp = 1.0 + np.float32(rng.uniform(0.0, 1.0)) * _slope(rng)
+    for _ in range(int(rng.integers(0, 4))):  # rims, grooves, a bevel
+        place, wide = float(rng.uniform(0.0, 12.0)), float(rng.uniform(0.5, 3.0))
+        ring = np.exp(-(((depth - place) / wide) ** 2))
+        body = body + np.float32(rng.uniform(-0.5, 0.7) * max(level, 40.0)) * ring * lamp
+    if rng.random() < 0.5:  # a knob, a socket, a head with corners
+        y, x = np.nonzero(mask > 0.5)
+        middle = np.array([x.mean(), y.mean()]) if len(x) else np.full(2, 0.5 * SIZE)
+        radius, corners = float(rng.uniform(0.15, 0.7)) * float(depth.max()), int(rng.choice([6, 6, 40, 40, 4]))
+        turns = np.arange(corners) * 2.0 * math.pi / corners + rng.uniform(0.0, 6.0)
+        knob = np.zeros((SIZE, SIZE), np.uint8)
+        lay(knob, middle + radius * np.column_stack((np.cos(turns), np.sin(turns))), 255)
+        head = _share(knob)
+        cast = cv2.GaussianBlur(np.roll(head, tuple(rng.integers(-5, 6, 2).tolist()), (0, 1)), (0, 0), 1.5)
+        body = body * (1.0 - np.float32(rng.uniform(0.0, 0.6)) * cast)
+        body = body * (1.0 - head) + head * np.float32(level * rng.uniform(0.6, 1.5))
+        edge = np.abs(cv2.GaussianBlur(head, (0, 0), 1.0) - head)
+        body = body + np.float32(rng.uniform(-1.0, 1.0) * level) * edge * lamp
+    if rng.random() < 0.65:
+        far = float(rng.uniform(0.0, 12.0))
+        cast = cv2.warpAffine(mask, _aside(float(rng.uniform(0.0, 2.0 * math.pi)), far), (SIZE, SIZE))
+        light = light * (1.0 - np.float32(rng.uniform(0.1, 0.8)) * cv2.GaussianBlur(cast, (0, 0), 0.5 + 0.4 * far))
+    return np.asarray(light, np.float32), np.asarray(body, np.float32)
 
 
 def _on_other_table(

@@ -39,7 +39,8 @@ _FEW = 96
 
 class _Plan(NamedTuple):
     """A network: the channels of each of its sizes, how far apart its lowest layers look, how many layers lead up; what
-    it tells of, each with what it counts; and how many times smaller than crops are it sees pictures.
+    it tells of, each with what it counts; how many times smaller than crops are it sees pictures; and whether most of
+    these have a hole, or a thing that looks like one.
     """
 
     widths: tuple[int, int, int, int]
@@ -47,12 +48,14 @@ class _Plan(NamedTuple):
     layers_up: int
     told: dict[str, float]
     smaller: int
+    holed: bool = False
 
 
 PLANS = {
     "comb": _Plan((12, 24, 48, 64), (1, 2, 4, 2), 2, {"wall": 2.0, "comb": 1.0, "thing": 1.0}, 1),
     "beyond": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 1.0, "thing": 0.5}, 2),
     "seams": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 1.0, "thing": 0.5, "seam": 1.0}, 2),
+    "holes": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 0.5, "thing": 1.0}, 2, holed=True),
 }
 
 
@@ -107,8 +110,8 @@ class _Sure(nn.Module):
 
 
 class _Crops(torch.utils.data.IterableDataset[tuple[Tensor, ...]]):
-    def __init__(self, examples: Sequence[Example], seed: int) -> None:
-        self.examples, self.seed = examples, seed
+    def __init__(self, examples: Sequence[Example], seed: int, *, holed: bool) -> None:
+        self.examples, self.seed, self.holed = examples, seed, holed
 
     def __iter__(self) -> Iterator[tuple[Tensor, ...]]:
         cv2.setNumThreads(1)
@@ -116,7 +119,7 @@ class _Crops(torch.utils.data.IterableDataset[tuple[Tensor, ...]]):
         rng = np.random.default_rng([self.seed, 0 if worker is None else worker.id])
         while True:
             one = self.examples[int(rng.integers(len(self.examples)))]
-            yield tuple(torch.from_numpy(np.ascontiguousarray(plane)) for plane in crop(one, rng))
+            yield tuple(torch.from_numpy(np.ascontiguousarray(plane)) for plane in crop(one, rng, holed=self.holed))
 
 
 def loss(told: Tensor, true: dict[str, Tensor], plan: _Plan) -> Tensor:
@@ -137,7 +140,9 @@ def loss(told: Tensor, true: dict[str, Tensor], plan: _Plan) -> Tensor:
 
 def teach(network: Network, plan: _Plan, examples: Sequence[Example], minutes: float, rate: float, seed: int) -> None:
     """Show it parts of the examples for so long, less and less of each of which it takes to heart."""
-    crops = torch.utils.data.DataLoader(_Crops(examples, seed), batch_size=_BATCH, num_workers=2, prefetch_factor=4)
+    crops = torch.utils.data.DataLoader(
+        _Crops(examples, seed, holed=plan.holed), batch_size=_BATCH, num_workers=2, prefetch_factor=4
+    )
     taught = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=1e-3)
     began, lately = time.monotonic(), []
     for number, planes in enumerate(crops):

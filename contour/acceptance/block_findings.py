@@ -238,7 +238,20 @@ def judge_opinion(opinion: SecondOpinion, pitch_px: float) -> tuple[Finding, ...
         findings.append(_corner_beyond(opinion.corner, pitch_px))
     if opinion.seam is not None:
         findings.append(_seam(opinion.seam, pitch_px))
+    if opinion.laid is not None:
+        findings.append(_no_hole(opinion.laid, pitch_px))
     return tuple(findings)
+
+
+def _no_hole(laid: Doubt, pitch_px: float) -> Finding:
+    (x, y), wide = laid.place_px, laid.pitches
+    return _finding_at(
+        Refusal.EDGE_COVERED,
+        (x, y),
+        0.5 * wide * pitch_px,
+        f"Something seems to lie on the block near ({x:.0f}, {y:.0f}) px, {wide:.1f} cells wide, where a "
+        "hole was traced. Look at the overlay; take it away, or set max_disagreement_pitches: 0 for such a hole.",
+    )
 
 
 def _left_out(beyond: Doubt, pitch_px: float) -> Finding:

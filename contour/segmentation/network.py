@@ -69,6 +69,13 @@ def comb_things_and_seams(light: Bytes, pitch_px: float) -> tuple[Bytes, Float32
     return sized, _told("comb_beyond.onnx", 2, even), _told("seams.onnx", 3, even)
 
 
+def comb_and_laid(light: Bytes, pitch_px: float) -> Float32s:
+    """As `comb_and_things`, by a network that was taught on from that one with holes, and with what looks like one and
+    is a thing that lies on the comb.
+    """
+    return _told("holes.onnx", 2, _evened(light, LIGHT_PITCH_PX / pitch_px)[1])
+
+
 def _evened(light: Bytes, size: float) -> tuple[Bytes, Float32s]:
     """The picture, (H, W), at so many times its size, its sides multiples of 8, (h, w), as it is and of mean 0 and unit
     spread.

@@ -11,6 +11,7 @@ import pytest
 from contour.geometry.rings import Contour
 from contour.segmentation.second_opinion import SecondOpinion, second_opinion
 from contour.synthetic import Rendered, area_coverage, render
+from tests.support.scenes.edge_scenes import HOLED, PLAIN
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 
@@ -163,3 +164,27 @@ def test_a_seam_between_two_blocks_is_seen_with_its_place(apart: float) -> None:
     assert seam is not None
     assert seam.place_px[0] == pytest.approx(middle, abs=pitch)
     assert seam.pitches > 5.0
+
+
+@pytest.mark.parametrize("table", [0.6, 1.0, 1.5])
+def test_a_weight_about_as_light_as_the_table_is_told_from_a_hole(table: float) -> None:
+    """With a bevel, a knob, and a shadow on the cells beside it, where a hole shows stumps of walls."""
+    holed, plain = render(HOLED), render(PLAIN)
+    (hole,), pitch = holed.truth_px.holes, holed.pitch_px
+    assert second_opinion(holed.picture, holed.truth_px, pitch, nowhere).laid is None
+    level = table * float(np.median(holed.picture[:40]))
+    picture, middle, radius = (
+        plain.picture.copy(),
+        hole.mean(axis=0),
+        float(np.hypot(*(hole - hole.mean(axis=0)).T).mean()),
+    )
+    shade = np.zeros(picture.shape[:2], np.float32)
+    cv2.circle(shade, np.rint(middle + 0.4 * pitch).astype(int).tolist(), round(radius), 0.6, -1)
+    picture = np.asarray(picture * (1.0 - cv2.GaussianBlur(shade, (0, 0), 0.25 * pitch))[..., None], np.uint8)
+    for share, light in ((1.0, level), (0.92, 1.35 * level), (0.82, level), (0.4, 0.6 * level), (0.36, 1.1 * level)):
+        at = np.rint(16.0 * middle).astype(int).tolist()
+        cv2.circle(picture, at, round(16.0 * share * radius), (light, light, light), -1, cv2.LINE_AA, 4)
+    laid = second_opinion(picture, holed.truth_px, pitch, nowhere).laid
+    assert laid is not None
+    assert np.hypot(*(middle - laid.place_px)) < pitch
+    assert laid.pitches == pytest.approx(2.0 * radius / pitch, rel=0.1)

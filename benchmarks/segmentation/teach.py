@@ -1,6 +1,6 @@
 """Teaches the networks: `python -m benchmarks.segmentation.teach --out FILE.onnx` (`--help`), an hour on two cores;
-with `--plan beyond` the light one that looks beyond outlines, a quarter of one, and with `--plan seams`, mostly
-from that one on (`--start`), its like that tells seams.
+with `--plan beyond` the light one that looks beyond outlines, a quarter of one, and with `--plan seams` or `holes`,
+mostly from that one on (`--start`), its likes that tell seams, and what lies on comb from holes in it.
 
 What comes out differs in its last digits from machine to machine, and so from what is in `contour/segmentation/`.
 """

@@ -38,9 +38,10 @@ def test_an_example_is_the_same_for_the_same_seed(one: Example, seed: int) -> No
     )
 
 
-def test_of_a_crop_no_pixel_is_comb_and_a_thing_over_it_or_wall_without_comb(one: Example) -> None:
+@pytest.mark.parametrize("holed", [False, True])
+def test_of_a_crop_no_pixel_is_comb_and_a_thing_over_it_or_wall_without_comb(one: Example, holed: bool) -> None:
     rng = np.random.default_rng(4)
-    seen: list[Crop] = [crop(one, rng) for _ in range(60)]
+    seen: list[Crop] = [crop(one, rng, holed=holed) for _ in range(60)]
     for part in seen:
         assert all(plane.shape == (SIZE, SIZE) and plane.dtype == np.float32 for plane in part)
         assert all(plane.min() >= 0.0 and plane.max() <= 1.0 for plane in part[1:])
@@ -50,3 +51,12 @@ def test_of_a_crop_no_pixel_is_comb_and_a_thing_over_it_or_wall_without_comb(one
     assert sum(part.comb.max() > 0.9 for part in seen) >= 40
     assert sum(part.seam.max() > 0.9 for part in seen) >= 3
     assert sum(part.seam.max() < 0.1 for part in seen) >= 3
+
+
+def test_crops_that_are_holed_have_more_things_in_their_middle(one: Example) -> None:
+    def laid(*, holed: bool) -> int:
+        rng = np.random.default_rng(4)
+        middles = [crop(one, rng, holed=holed).thing[64:128, 64:128] for _ in range(60)]
+        return sum(bool(middle.mean() > 0.3) for middle in middles)
+
+    assert laid(holed=True) >= 2 * laid(holed=False) > 0

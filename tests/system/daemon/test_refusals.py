@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -150,6 +151,12 @@ def test_a_reason_is_seen_in_the_fail_line_the_register_and_the_log(
     assert (settled["job_id"], settled["outcome"], settled["reason"]) == (job, outcome, case.code)
 
 
+def pinged(terminal: Terminal) -> bool:
+    """Whether a PING is answered within a second."""
+    terminal.type(b"PING\n")
+    return bool(select.select([terminal.master], [], [], 1.0)[0])
+
+
 def test_without_its_calibration_the_daemon_takes_no_job_and_says_why(tmp_path: Path) -> None:
     terminal = Terminal()  # a line of its own: the other daemon listens on the other one
     started = Cell(
@@ -162,8 +169,9 @@ def test_without_its_calibration_the_daemon_takes_no_job_and_says_why(tmp_path: 
         until(lambda: started.controller.text, what="the controller")
         until(lambda: service_block(started)[SERVICE_STATE] == ERROR, what="service_state Error")
         assert "nowhere.yaml: cannot be read" in started.service.text
+        until(lambda: pinged(terminal), what="an answer: what is typed before the line is opened is lost")
         terminal.type(b"TRIG\n")
-        assert terminal.line(30) == "NAK 121 not_ready"
+        assert next(reply for reply in iter(terminal.line, "") if reply != "PONG") == "NAK 121 not_ready"
         assert started.settled() == []
     finally:
         started.stop()

@@ -11,6 +11,9 @@ from contour.image.pixel_sampling import sample_at
 
 _STEP = 0.5
 _TURNS = 4
+# The wall's own light is read so far behind its tip and farther, the background's so far beyond it, pixels; behind thin
+# walls, whose profiles are no longer than they are wide, that is one sample at least.
+_ASIDE_PX, _LEAST_REACH = 1.0, 1.1
 _FAR = 3.5
 # A wall that meets the cut at less than 20° has no end worth the name; it is fitted as if it met it so.
 _STEEPEST = 0.34
@@ -89,7 +92,7 @@ def fit_ends(light: Bytes, tip: Float64s, axis: Float64s, normal: Float64s, mode
     symmetric about the point where the axis meets the cut. Profiles are averaged along the cut as the coarse outline's
     `normal` (N, 2) gives it, so that a slanting end stays a sharp step.
     """
-    along = np.arange(-model.reach, model.out + _STEP / 2, _STEP)
+    along = np.arange(-max(model.reach, _LEAST_REACH), model.out + _STEP / 2, _STEP)
     cosine = np.maximum((axis * normal).sum(axis=1), _STEEPEST)
     sine = np.clip(axis[:, 0] * normal[:, 1] - axis[:, 1] * normal[:, 0], -1.0, 1.0)
     slope = np.where(cosine > _STEEPEST, sine / cosine, 0.0)
@@ -125,8 +128,8 @@ def _fit(profile: Float64s, along: Float64s, spread: Float64s, model: EndModel) 
     """Least squares of background + height · Φ((end − s)/spread) to each profile (N, S), by Gauss-Newton on all at
     once.
     """
-    top = medians(profile[:, along < -1.0], axis=1)
-    bottom = profile[:, along > 1.0].min(axis=1)
+    top = medians(profile[:, along < -_ASIDE_PX], axis=1)
+    bottom = profile[:, along > _ASIDE_PX].min(axis=1)
     end = _crossing(profile, along, 0.5 * (top + bottom))
     residual = profile
     variance = np.ones(len(profile))

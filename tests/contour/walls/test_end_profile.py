@@ -81,6 +81,14 @@ def test_dark_walls_are_fitted_like_bright_ones() -> None:
     assert np.allclose(bright.point, inverted.point, atol=1e-6)
 
 
+@pytest.mark.parametrize("reach", [0.5, 1.0])
+def test_profiles_no_longer_than_a_pixel_behind_the_tip_are_fitted_too(reach: float) -> None:
+    """As of walls of one pixel, which ended a job in an error."""
+    picture, end, axis, normal = cut_wall(1.2, 25.0, 0.0, 0.6)
+    found = fit_ends(picture, end[None], axis[None], normal[None], replace(model(1.0, 0.6), reach=reach))
+    assert abs(float((found.point[0] - end) @ normal)) < 1.0
+
+
 @pytest.mark.parametrize("width", [1.5, 3.0, 6.0])
 def test_the_true_width_of_a_blurred_wall_comes_back(width: float) -> None:
     place = np.linspace(-12, 12, 4801)

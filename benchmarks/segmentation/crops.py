@@ -19,7 +19,7 @@ _SURE = 0.9
 # So many are made of two parts, as of two blocks; and so many of the others of a seam lie about it.
 _JOINED, _AT_SEAM = 0.18, 0.4
 # So many of those that are to be holed are, of which so many holes are things that lie there, most of them about as
-# light as the table.
+# light as the table; so many of them lie in comb, as places are drawn by that number.
 _HOLED, _LAID, _AS_TABLE, _INSIDE, _IN_COMB = 0.75, 0.6, 0.7, 0.5, 0.8
 # Of those of two parts, so many have one on the other, and so many a splice between them.
 _STACKED, _GLUED = 0.15, 0.35
@@ -237,7 +237,7 @@ def _like_hole(light: Float32s, shares: list[Float32s], rng: np.random.Generator
     """With a hole that shows the table, in shade at its rim, or with a thing in its place: as light, with another
     surface, a rim, a knob, a shadow on the block.
     """
-    comb, thing = shares[1], shares[2]
+    wall, comb, thing, seam = shares
     inside = cv2.erode((comb > _SURE).astype(np.uint8), np.ones((9, 9), np.uint8))[::4, ::4] > 0
     if not inside.any():
         return light, shares
@@ -245,8 +245,8 @@ def _like_hole(light: Float32s, shares: list[Float32s], rng: np.random.Generator
     out = (1.0 - comb) * (1.0 - thing) > _SURE
     within = light[comb > _SURE]
     level = median(light[out]) if np.count_nonzero(out) > 50 else quantile(within, rng.uniform(0.05, 0.95))
-    texture = pattern(rng, SIZE) if rng.random() < 0.6 else noise(rng, SIZE, float(rng.uniform(1.0, 60.0)))
-    table = np.float32(level) * (1.0 + np.float32(rng.uniform(0.0, 0.25)) * texture)
+    surface = _surface(rng, 60.0)
+    table = np.float32(level) * (1.0 + np.float32(rng.uniform(0.0, 0.25)) * surface)
     if rng.random() > _LAID:
         depth = cv2.distanceTransform((mask > 0.5).astype(np.uint8), cv2.DIST_L2, 5)
         shade = np.float32(rng.uniform(0.0, 0.7)) * np.exp(-depth / float(rng.uniform(2.0, 20.0)))
@@ -256,10 +256,10 @@ def _like_hole(light: Float32s, shares: list[Float32s], rng: np.random.Generator
         cast = cv2.GaussianBlur(1.0 - away, (0, 0), float(rng.uniform(0.5, 4.0))) * np.float32(rng.uniform(0.0, 0.6))
         body = table * (1.0 - shade) * (1.0 - cast) * np.float32(rng.uniform(0.6, 1.05))
         kept = 1.0 - mask
-        shares = [shares[0] * kept, comb * kept, thing, shares[3] * kept]
+        shares = [wall * kept, comb * kept, thing, seam * kept]
     else:
         light, body = _thing_body(light, table, mask, across, rng)
-        shares = [*shares[:2], np.maximum(thing, mask), shares[3]]
+        shares = [wall, comb, np.maximum(thing, mask), seam]
     return np.asarray(light * (1.0 - mask) + np.clip(body, 0.0, 255.0) * mask, np.float32), shares
 
 
@@ -279,10 +279,20 @@ def _hole_or_body(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s,
             soft = cv2.GaussianBlur(mask, (0, 0), float(rng.uniform(2.0, 8.0)))
             mask = np.clip((soft.astype(np.float32) - 127.0) * 8.0 + 127.0, 0.0, 255.0).astype(np.uint8)
     else:
-        count = int(rng.choice([5, 6, 8, 60]))
-        turns = np.arange(count) * 2.0 * math.pi / count + rng.uniform(0.0, 6.0)
-        lay(mask, middle + float(rng.uniform(20.0, 0.5 * most)) * np.column_stack((np.cos(turns), np.sin(turns))), 255)
+        count, turn = int(rng.choice([5, 6, 8, 60])), float(rng.uniform(0.0, 6.0))
+        lay(mask, _even_corners(middle, float(rng.uniform(20.0, 0.5 * most)), count, turn), 255)
     return _share(mask), _slope(rng)
+
+
+def _even_corners(middle: Float64s, radius: float, count: int, turn: float) -> Float64s:
+    """The corners of an even polygon, (count, 2); of many, of a disc."""
+    turns = np.arange(count) * 2.0 * math.pi / count + turn
+    return middle + radius * np.column_stack((np.cos(turns), np.sin(turns)))
+
+
+def _surface(rng: np.random.Generator, coarsest: float) -> Float32s:
+    """What a surface differs from even light by: patterns, or grains so many pixels wide at most."""
+    return pattern(rng, SIZE) if rng.random() < 0.6 else noise(rng, SIZE, float(rng.uniform(1.0, coarsest)))
 
 
 def _thing_body(
@@ -292,7 +302,7 @@ def _thing_body(
     level = float(table.mean()) * math.exp(rng.uniform(-0.25, 0.25))
     if rng.random() > _AS_TABLE:
         level = float(rng.uniform(10.0, 245.0))
-    surface = pattern(rng, SIZE) if rng.random() < 0.6 else noise(rng, SIZE, float(rng.uniform(1.0, 40.0)))
+    surface = _surface(rng, 40.0)
     body = np.float32(level) * (1.0 + np.float32(rng.uniform(0.0, 0.3)) * surface)
     body = body * (1.0 + np.float32(rng.uniform(-0.5, 0.5) * (rng.random() < 0.6)) * across)
     depth = cv2.distanceTransform((mask > 0.5).astype(np.uint8), cv2.DIST_L2, 5)
@@ -305,9 +315,8 @@ def _thing_body(
         y, x = np.nonzero(mask > 0.5)
         middle = np.array([x.mean(), y.mean()]) if len(x) else np.full(2, 0.5 * SIZE)
         radius, corners = float(rng.uniform(0.15, 0.7)) * float(depth.max()), int(rng.choice([6, 6, 40, 40, 4]))
-        turns = np.arange(corners) * 2.0 * math.pi / corners + rng.uniform(0.0, 6.0)
         knob = np.zeros((SIZE, SIZE), np.uint8)
-        lay(knob, middle + radius * np.column_stack((np.cos(turns), np.sin(turns))), 255)
+        lay(knob, _even_corners(middle, radius, corners, float(rng.uniform(0.0, 6.0))), 255)
         head = _share(knob)
         cast = cv2.GaussianBlur(np.roll(head, tuple(rng.integers(-5, 6, 2).tolist()), (0, 1)), (0, 0), 1.5)
         body = body * (1.0 - np.float32(rng.uniform(0.0, 0.6)) * cast)

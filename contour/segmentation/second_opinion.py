@@ -97,7 +97,7 @@ def second_opinion(
     """
     part, first = _around(picture, contour.exterior, pitch_px)
     light, (comb, thing), (sure_comb, _, seam) = comb_things_and_seams(wall_light(part), pitch_px)
-    grid = _Grid(first, np.array(comb.shape[::-1]) / part.shape[1::-1])
+    grid = _Grid.over(part, first, comb)
     block = np.zeros(comb.shape, np.uint8)
     fill_finely(block, [grid.there(ring) for ring in contour.rings], 1)
     deep, away = (np.asarray(cv2.distanceTransform(side, cv2.DIST_L2, 5), np.float32) for side in (block, 1 - block))
@@ -121,6 +121,11 @@ class _Grid(NamedTuple):
 
     first: Float64s
     size: Float64s
+
+    @staticmethod
+    def over(part: Bytes, first: Float64s, told: Float32s) -> _Grid:
+        """That of what is told, (h, w), of a part of a picture whose first pixel lies there."""
+        return _Grid(first, np.array(told.shape[::-1]) / part.shape[1::-1])
 
     def there(self, points: Float64s) -> Float64s:
         """Places in the map of places in the picture, (N, 2)."""
@@ -232,8 +237,13 @@ def _hole(sides: _Sides, none: Bytes, grid: _Grid) -> Doubt | None:
             there[core] = room[core]
     if not there.any():
         return None
-    y, x = np.unravel_index(int(there.argmax()), there.shape)
-    return Doubt(2.0 * float(there.max()) / LIGHT_PITCH_PX, grid.place(float(x), float(y)))
+    return _widest(there, grid)
+
+
+def _widest(room: Float32s, grid: _Grid) -> Doubt:
+    """How wide the largest disc is that has room somewhere, and where; room: its radius, samples, (h, w)."""
+    y, x = np.unravel_index(int(room.argmax()), room.shape)
+    return Doubt(2.0 * float(room.max()) / LIGHT_PITCH_PX, grid.place(float(x), float(y)))
 
 
 def _corner(sides: _Sides, ring: Float64s, known: Bools, grid: _Grid) -> Doubt | None:
@@ -260,14 +270,13 @@ def _laid(picture: Bytes, holes: Sequence[Float64s], pitch_px: float) -> Doubt |
     for hole in holes:
         part, first = _around(picture, hole, pitch_px)
         _, thing = comb_and_laid(wall_light(part), pitch_px)
-        grid = _Grid(first, np.array(thing.shape[::-1]) / part.shape[1::-1])
+        grid = _Grid.over(part, first, thing)
         inside = np.zeros(thing.shape, np.uint8)
         fill_finely(inside, [grid.there(hole)], 1)
         depth = np.asarray(cv2.distanceTransform(inside, cv2.DIST_L2, 5), np.float32)
         within_rim = thing[depth > _WITHIN_RIM * LIGHT_PITCH_PX]
         if len(within_rim) and quantile(within_rim, _QUARTER) > _LAID:
-            y, x = np.unravel_index(int(depth.argmax()), depth.shape)
-            laid.append(Doubt(2.0 * float(depth.max()) / LIGHT_PITCH_PX, grid.place(float(x), float(y))))
+            laid.append(_widest(depth, grid))
     return max(laid, default=None)
 
 

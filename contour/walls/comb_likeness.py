@@ -176,9 +176,7 @@ def _among_triangles(square: Float64s) -> Bools:
     """Which cells have three neighbours at one distance and the next six at √3 of it, whatever their pitch looks like:
     squared distances to all cells, themselves too, (N, M).
     """
-    if square.shape[1] < 1 + _TRIANGLES:
-        return np.zeros(len(square), np.bool_)
-    ordered = np.sqrt(np.sort(np.partition(square, _TRIANGLES, axis=1)[:, 1 : 1 + _TRIANGLES], axis=1))
+    ordered = _nearest(square, _TRIANGLES)
     near, far = ordered[:, :3], ordered[:, 3:]
     even = (near[:, -1] < _EVEN * near[:, 0]) & (far[:, -1] < _EVEN * far[:, 0])
     return np.asarray(even & (far[:, 0] > _EVEN * near[:, -1]))
@@ -186,10 +184,17 @@ def _among_triangles(square: Float64s) -> Bools:
 
 def _among_squares(square: Float64s) -> Bools:
     """Which cells have four neighbours at one distance and the next ones at √2 of it, as `_among_triangles`."""
-    if square.shape[1] < 2 + _SQUARES:
-        return np.zeros(len(square), np.bool_)
-    near = np.sqrt(np.sort(np.partition(square, 1 + _SQUARES, axis=1)[:, 1 : 2 + _SQUARES], axis=1))
+    near = _nearest(square, 1 + _SQUARES)
     return np.asarray((near[:, -2] < _EVEN_SQUARES * near[:, 0]) & (near[:, -1] > _EVEN_SQUARES * near[:, -2]))
+
+
+def _nearest(square: Float64s, count: int) -> Float64s:
+    """How far each cell's nearest so many others are, in their order, (N, count), by squared distances to all cells,
+    itself too, (N, M); nowhere, 0, where there are fewer.
+    """
+    if square.shape[1] <= count:
+        return np.zeros((len(square), count))
+    return np.sqrt(np.sort(np.partition(square, count, axis=1)[:, 1 : 1 + count], axis=1))
 
 
 def apart(labels: Int32s, numbers: Indices, wall_px: float) -> float:

@@ -173,14 +173,11 @@ def test_a_weight_about_as_light_as_the_table_is_told_from_a_hole(table: float) 
     (hole,), pitch = holed.truth_px.holes, holed.pitch_px
     assert second_opinion(holed.picture, holed.truth_px, pitch, nowhere).laid is None
     level = table * float(np.median(holed.picture[:40]))
-    picture, middle, radius = (
-        plain.picture.copy(),
-        hole.mean(axis=0),
-        float(np.hypot(*(hole - hole.mean(axis=0)).T).mean()),
-    )
-    shade = np.zeros(picture.shape[:2], np.float32)
+    middle = hole.mean(axis=0)
+    radius = float(np.hypot(*(hole - middle).T).mean())
+    shade = np.zeros(plain.picture.shape[:2], np.float32)
     cv2.circle(shade, np.rint(middle + 0.4 * pitch).astype(int).tolist(), round(radius), 0.6, -1)
-    picture = np.asarray(picture * (1.0 - cv2.GaussianBlur(shade, (0, 0), 0.25 * pitch))[..., None], np.uint8)
+    picture = np.asarray(plain.picture * (1.0 - cv2.GaussianBlur(shade, (0, 0), 0.25 * pitch))[..., None], np.uint8)
     for share, light in ((1.0, level), (0.92, 1.35 * level), (0.82, level), (0.4, 0.6 * level), (0.36, 1.1 * level)):
         at = np.rint(16.0 * middle).astype(int).tolist()
         cv2.circle(picture, at, round(16.0 * share * radius), (light, light, light), -1, cv2.LINE_AA, 4)

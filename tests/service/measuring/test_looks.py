@@ -14,6 +14,7 @@ from service.measuring.looks.look import Look
 from service.measuring.looks.outcome import best
 from service.measuring.measure import Measurer
 from service.measuring.measurement import Measurement
+from service.reasons import Reason
 from tests.support.scenes.edge_scenes import HOLED
 
 PLAIN = Look(np.zeros((8, 8), np.uint8))
@@ -49,11 +50,5 @@ def test_what_drawn_walls_do_not_show_later_looks_may(accepted: Measurement) -> 
 def test_where_drawn_walls_close_their_cells_no_later_look_counts(accepted: Measurement) -> None:
     """It would take teeth of closed cells for ends of walls: two lattices were accepted so, off by 0.6 and 0.7."""
     assert isinstance(found_by(EdgeContradicted("closed", "mixed"), accepted), NoBlockFound)
-    unsure = replace(
-        accepted,
-        edge="mixed",
-        findings=Measurer(None)
-        .measure(np.full((64, 64), 30, np.uint8), Recipe(number=1, name="default"), 0.0)
-        .findings,
-    )
+    unsure = replace(accepted, edge="mixed", findings=((Reason.UNCERTAINTY_TOO_LARGE, "unsure"),))
     assert isinstance(found_by(unsure, accepted), NoBlockFound)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.segmentation.crops import SIZE, Crop, crop
+from benchmarks.segmentation.crops import Crop, crop
 from benchmarks.segmentation.examples import Example, example
+from benchmarks.segmentation.planes import SIZE
 from contour.segmentation.network import PITCH_PX
 from contour.walls.cell_scale import probe
 

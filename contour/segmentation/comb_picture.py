@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
-from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s, median, quantile
-from contour.image.opencv import box_mean, grown, opened, pieces_and_areas, shrunk_to, within
+from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s
+from contour.image.opencv import box_mean, deep, grown, opened, pieces_and_areas, shrunk_to, within
 from contour.image.pixel_sampling import sample_at
 from contour.segmentation.glare import glare
 from contour.segmentation.network import LIGHT_PITCH_PX, PITCH_PX, Segments, comb_and_things, segments
@@ -34,9 +35,8 @@ _TRIED_PX, _MOST_PX = 1e6, 4e6
 # What is surer than this is there. A thing at the edge of comb, of which so many pixels are looked at, need not be so
 # sure in the mean of so many: of 140 things over an edge on tables with structure, by two hands, none was drawn away.
 _SURE, _LEAST_THING, _EDGE_PX, _MEAN_PX = 0.5, 0.25, 9, 7
-# Pitches beside the comb, where of the table so much is darker than what counts as its light; and how light that is, of
-# walls over floors: of 50 tables as light as walls by 0.5 at least. What surely is no wall.
-_BESIDE, _LIGHTER, _LIGHT, _NO_WALL = (0.5, 2.5), 0.75, 0.4, 0.15
+# Of so few pixels there it is none. Gaps in comb no deeper than that, pitches, are ink or print: holes are wider.
+_FEW_PX, _GAP = 24, 0.6
 # The area of a cell, of its pitch's square.
 _CELL = math.sqrt(0.75)
 # Levels of black and, above it, of walls.
@@ -47,10 +47,9 @@ _SEEN_WALL, _ROOM, _ALONG_WALLS = 0.3, 0.65, -0.8
 _BORDER_PX, _EVEN_PX, _SHORTEST_PX = 4, 2.0, 40
 
 
-def comb_picture(picture: Bytes, *, on_dark: bool = False) -> tuple[Bytes, Source] | None:
+def comb_picture(picture: Bytes) -> tuple[Bytes, Source] | None:
     """The comb in a picture, grey (H, W) or BGR (H, W, 3), uint8: walls light, all else dark, (H, W), uint8; and what
-    that was drawn from. None where no comb is seen, where something may lie over its edge and, unless `on_dark`, on a
-    dark table.
+    that was drawn from. None where no comb is seen, and where something may lie over its edge.
     """
     light = wall_light(picture)
     score, pitch_px, found, box = 0.0, 0.0, None, (slice(None), slice(None))
@@ -74,7 +73,8 @@ def comb_picture(picture: Bytes, *, on_dark: bool = False) -> tuple[Bytes, Sourc
         found = segments(light, pitch_px, box)
         if _leaves(found.comb, box, light.shape):
             return None
-    if _something_over(found, picture) or not (on_dark or _on_light_table(found)):
+    found = _without_gaps(found)
+    if _something_over(found, picture):
         return None
     drawn = _drawn(found)
     border = (_border(found.comb) + 0.5) * (np.array(light.shape[::-1]) / drawn.shape[::-1]) - 0.5
@@ -138,28 +138,30 @@ def _middle(light: Bytes, pitch_px: float) -> Bytes:
     return np.ascontiguousarray(light[inner[0], inner[1]])
 
 
-def _on_light_table(seen: Segments) -> bool:
-    """Whether the table beside the comb is nearer to the walls' light than to that of what lies between them: on any
-    other one the picture tells by itself, and of what lies over an edge, or against it, more.
-    """
-    comb = seen.comb > _SURE
-    beside = (
-        (within(comb, _BESIDE[1] * PITCH_PX) > 0) & ~(within(comb, _BESIDE[0] * PITCH_PX) > 0) & (seen.thing < _SURE)
-    )
-    walls, floors = comb & (seen.wall > _SURE), comb & (seen.wall < _NO_WALL)
-    if not (beside.any() and walls.any() and floors.any()):
-        return False
-    floor, wall = median(seen.light[floors]), median(seen.light[walls])
-    lighter = quantile(seen.light[beside], _LIGHTER) - floor
-    return (lighter if wall > floor else -lighter) > _LIGHT * abs(wall - floor)
-
-
 def _something_over(seen: Segments, picture: Bytes) -> bool:
     """Whether a thing, or glare, may lie over the edge of the comb, or in a hole of it."""
-    comb = seen.comb > _SURE
+    comb = _large(seen.comb > _SURE)
     edge = cv2.morphologyEx(comb.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((_EDGE_PX, _EDGE_PX), np.uint8)) > 0
     lies = (box_mean(seen.thing, _MEAN_PX) > _LEAST_THING) | glare(picture, comb, PITCH_PX)
-    return bool((edge & lies).any())
+    _, area = pieces_and_areas((edge & lies).astype(np.uint8), 8)
+    return int(area.max(initial=0)) > _FEW_PX
+
+
+def _large(comb: Bools) -> Bools:
+    """The large pieces of comb, (h, w)."""
+    pieces, area = pieces_and_areas(comb.astype(np.uint8), 8)
+    return np.asarray((area > _PIECE * int(area.max()))[pieces] & (pieces > 0), np.bool_)
+
+
+def _without_gaps(seen: Segments) -> Segments:
+    """With comb where ink or a print hides it within the block, in gaps narrower than a hole, without a thing."""
+    gaps = seen.comb <= _SURE
+    pieces = pieces_and_areas(gaps.astype(np.uint8), 4)[0]
+    wide = np.zeros(int(pieces.max()) + 1, np.bool_)
+    wide[pieces[(deep(gaps, _GAP * PITCH_PX) > 0) | (box_mean(seen.thing, _MEAN_PX) > _LEAST_THING)]] = True
+    wide[0] = True
+    narrow = ~wide[pieces]
+    return replace(seen, comb=np.where(narrow, np.float32(1.0), seen.comb))
 
 
 def _border(comb: Float32s) -> Float64s:

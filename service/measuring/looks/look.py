@@ -23,15 +23,14 @@ _HARDLY_SEEN = {Reason.UNCERTAINTY_TOO_LARGE}
 
 class Look(NamedTuple):
     """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
-    settings of a trace; `draw`: has a network tell of it what to look at, `on_dark` on a dark table, too, `by_border`
-    not at ends of its walls, but at where its comb ends; `times`: how many times as large as it was taken it is.
+    settings of a trace; `draw`: has a network tell of it what to look at, `by_border` not at ends of its walls, but
+    at where its comb ends; `times`: how many times as large as it was taken it is.
     """
 
     picture: NDArray[np.uint8]
     relief: Relief | None = None
     least_rise: float | None = None
     draw: Callable[..., tuple[NDArray[np.uint8], Source] | None] | None = None
-    on_dark: bool = False
     by_border: bool = False
     times: int = 1
 
@@ -44,7 +43,7 @@ class Look(NamedTuple):
         """What to look at, and what it was drawn from; raise NoBlockFound where a network sees none, or is in doubt."""
         if self.draw is None:
             return self.picture, None
-        drawn = self.draw(on_dark=self.on_dark)
+        drawn = self.draw()
         on_stage("network")
         if drawn is None:
             raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")

@@ -48,7 +48,7 @@ def best(first: Outcome, looks: Iterator[Look], outlined: Callable[[Look], Measu
         on_stage("table")
         if not look.may_show_more(reasons, nowhere=isinstance(first, NoCellsFound)):
             continue
-        again = tried(outlined, look._replace(on_dark=not reasons & LIES_THERE))
+        again = tried(outlined, look)
         if accepted(again):
             return again
         if look.network and _may_be_drawn_wrong(again):

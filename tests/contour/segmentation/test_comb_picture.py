@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -10,11 +11,13 @@ import numpy as np
 import pytest
 
 from contour.geometry.agreement import distances_to, places_along
+from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.signed_distance import nearest
 from contour.segmentation import comb_picture as drawing
 from contour.segmentation.comb_picture import comb_picture
 from contour.segmentation.network import Segments
 from contour.synthetic import Rendered, area_coverage, pitch_px, render, render_empty_table
+from contour.walls.see_block import Source
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 
@@ -26,6 +29,24 @@ def scene_of(pitch: tuple[float, float]) -> Rendered:
         if pitch[0] < pitch_px(scene) < pitch[1]:
             return render(scene)
     raise AssertionError(pitch)
+
+
+def told_otherwise(monkeypatch: pytest.MonkeyPatch, change: Callable[[Segments], None]) -> None:
+    """Have what the network tells changed before it is drawn."""
+    told = drawing.segments
+
+    def changed(light: np.ndarray, *where: Any) -> Segments:
+        seen = told(light, *where)
+        change(seen)
+        return seen
+
+    monkeypatch.setattr(drawing, "segments", changed)
+
+
+def border_of(drawn: tuple[Bytes, Source] | None) -> Float64s:
+    assert drawn is not None
+    assert drawn[1].border is not None
+    return drawn[1].border
 
 
 @pytest.mark.parametrize("pitch", [(12.0, 15.0), (19.0, 23.0), (30.0, 40.0), (50.0, 60.0)])
@@ -84,14 +105,11 @@ def test_of_a_large_picture_no_more_is_asked_than_could_be_drawn(
 
 def test_where_walls_dont_show_in_comb_others_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     rendered = scene_of((19.0, 23.0))
-    told = drawing.segments
 
-    def with_filled_cells(light: np.ndarray, *where: Any) -> Segments:
-        seen = told(light, *where)
+    def with_filled_cells(seen: Segments) -> None:
         seen.wall[:, : seen.wall.shape[1] // 2] *= 0.1
-        return seen
 
-    monkeypatch.setattr(drawing, "segments", with_filled_cells)
+    told_otherwise(monkeypatch, with_filled_cells)
     drawn = comb_picture(rendered.picture)
     assert drawn is not None
     block = area_coverage(rendered.truth_px.rings, *rendered.picture.shape[1::-1]) > 0.5
@@ -100,10 +118,9 @@ def test_where_walls_dont_show_in_comb_others_are_drawn(monkeypatch: pytest.Monk
     assert from_walls[within].max() < rendered.pitch_px
 
 
-def test_on_a_dark_table_comb_is_drawn_where_that_is_asked() -> None:
+def test_on_a_dark_table_comb_is_drawn_too() -> None:
     rendered = render(shop_floor_scene("undisturbed", 95_000_003, alone=True).scene)
-    assert comb_picture(rendered.picture) is None
-    assert comb_picture(rendered.picture, on_dark=True) is not None
+    assert comb_picture(rendered.picture) is not None
 
 
 def test_comb_of_fine_cells_in_a_large_picture_is_drawn() -> None:
@@ -119,18 +136,45 @@ def test_comb_of_fine_cells_in_a_large_picture_is_drawn() -> None:
 def test_a_thing_within_the_comb_may_be_a_hole_and_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     rendered = scene_of((19.0, 23.0))
     assert comb_picture(rendered.picture) is not None
-    told = drawing.segments
 
-    def with_thing(light: np.ndarray, *where: Any) -> Segments:
-        seen = told(light, *where)
+    def with_thing(seen: Segments) -> None:
         rows, columns = np.nonzero(cv2.erode((seen.comb > 0.5).astype(np.uint8), np.ones((61, 61), np.uint8)))
         if len(rows):
             patch = slice(rows[0] - 20, rows[0] + 20), slice(columns[0] - 20, columns[0] + 20)
             seen.comb[patch], seen.wall[patch], seen.thing[patch] = 0.0, 0.0, 1.0
-        return seen
 
-    monkeypatch.setattr(drawing, "segments", with_thing)
+    told_otherwise(monkeypatch, with_thing)
     assert comb_picture(rendered.picture) is None
+
+
+def test_what_lies_away_from_the_block_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    def with_swarf_beneath_a_thing(seen: Segments) -> None:
+        seen.comb[10:20, 10:60], seen.thing[10:20, 10:60] = 1.0, 0.0
+        seen.comb[14:40, 30:40], seen.thing[14:40, 30:40] = 0.0, 1.0
+
+    told_otherwise(monkeypatch, with_swarf_beneath_a_thing)
+    assert comb_picture(scene_of((19.0, 23.0)).picture) is not None
+
+
+@pytest.mark.parametrize("sure", [0.1, 0.9], ids=["ink", "a cable"])
+def test_what_hides_less_than_a_cell_within_the_block_is_comb_if_it_is_no_thing(
+    sure: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rendered = scene_of((19.0, 23.0))
+    plain = comb_picture(rendered.picture)
+
+    def with_a_stroke(seen: Segments) -> None:
+        rows, columns = np.nonzero(cv2.erode((seen.comb > 0.5).astype(np.uint8), np.ones((61, 61), np.uint8)))
+        if len(rows):
+            stroke = slice(rows[0] - 30, rows[0] + 30), slice(columns[0] - 6, columns[0] + 6)
+            seen.comb[stroke], seen.wall[stroke], seen.thing[stroke] = 0.0, 0.0, sure
+
+    told_otherwise(monkeypatch, with_a_stroke)
+    inked = comb_picture(rendered.picture)
+    if sure > 0.5:
+        assert inked is None
+    else:
+        assert len(border_of(inked)) == pytest.approx(len(border_of(plain)), abs=2)
 
 
 def test_beside_glare_nothing_is_drawn() -> None:

@@ -58,9 +58,20 @@ def test_the_tables_own_shades_beside_a_block_are_no_walls_of_it() -> None:
     assert agreement(seen.pixels, rendered.truth_px).hausdorff_px < 0.5 * rendered.pitch_px
 
 
-@pytest.mark.parametrize("name", [*COVERED, "tape on a corner", "tape along an edge", "hard shadow"])
+@pytest.mark.parametrize("name", [*COVERED, "tape on a corner", "tape along an edge"])
 def test_what_lies_over_its_edge_is_refused_as_ever(name: str) -> None:
     assert measured(render(replace(LIGHT, things=THINGS[name]))).reasons != ()
+
+
+def test_a_hard_shadow_beside_it_hides_nothing() -> None:
+    rendered = render(replace(LIGHT, things=THINGS["hard shadow"]))
+    seen = measured(rendered)
+    assert seen.reasons == ()
+    assert seen.pixels is not None
+    assert seen.uncertainty_px is not None
+    near = agreement(seen.pixels, rendered.truth_px)
+    assert near.hausdorff_px < 1.0
+    assert near.holds(seen.uncertainty_px)
 
 
 def test_two_blocks_against_each_other_are_told_by_how_their_cells_are_lit() -> None:

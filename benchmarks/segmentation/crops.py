@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from benchmarks.segmentation.examples import SEAM_PITCHES, Example
-from benchmarks.segmentation.patterns import lay, noise, pattern
-from benchmarks.segmentation.planes import SIZE, SURE, aside, line, place, places, share
+from benchmarks.segmentation.patterns import lay, lay_disc, noise, pattern
+from benchmarks.segmentation.planes import SIZE, SURE, aside, depth, line, place, places, share
 from benchmarks.segmentation.things import covered, like_hole
 from contour.geometry.arrays import Bytes, Float32s, Float64s, median, quantile
 from contour.image.opencv import grey
@@ -205,11 +205,9 @@ def _cut_out(rng: np.random.Generator) -> Float32s:
         middle = rng.uniform(0.1 * SIZE, 0.9 * SIZE, 2)
         how = rng.random()
         if how < 0.35:
-            axes = rng.uniform(12.0, 60.0, 2) * 8
+            axes = rng.uniform(12.0, 60.0, 2)
             axes[1] = axes[0] if rng.random() < 0.6 else axes[1]
-            cv2.ellipse(
-                mask, (middle * 8).astype(int).tolist(), axes.astype(int).tolist(), 0, 0, 360, 255, -1, cv2.LINE_AA, 3
-            )
+            lay_disc(mask, middle, axes, 0.0, 255)
         elif how < 0.5:
             turns = float(rng.uniform(0.0, 6.3)) + np.array([0.0, 0.3, -0.3]) * float(rng.uniform(0.4, 2.0))
             far = np.array([0.0, 1.0, 1.0]) * float(rng.uniform(40.0, 140.0))
@@ -257,7 +255,7 @@ def _on_other_table(
     elif not dark and rng.random() < 0.3:
         level = rng.uniform(0.2, 1.3) * floors
     table = np.float32(level) * (1.0 + np.float32(rng.uniform(0.03, 0.4)) * pattern(rng, SIZE))
-    rim = np.exp(-cv2.distanceTransform((gone > 0.5).astype(np.uint8), cv2.DIST_L2, 5) / float(rng.uniform(2.0, 12.0)))
+    rim = np.exp(-depth(gone) / float(rng.uniform(2.0, 12.0)))
     table = table * np.where(gone > 0.0, 1.0 - np.float32(rng.uniform(0.1, 0.6)) * rim, 1.0)
     there = out * (1.0 - gone)
     own = light[there > SURE]

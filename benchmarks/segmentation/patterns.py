@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from contour.geometry.arrays import Bytes, Float32s
+from contour.geometry.arrays import Bytes, Float32s, Float64s
 
 # Lines are drawn to an eighth of a pixel.
 _SHIFT = 3
@@ -45,6 +45,12 @@ def lay(drawn: Float32s | Bytes, corners: np.ndarray[tuple[int, ...], np.dtype[A
     """Draw the convex hull of corners (N, 2) in that light, in place."""
     hull = cv2.convexHull((np.asarray(corners) * _PARTS).astype(np.int32))
     cv2.fillConvexPoly(drawn, hull, level, cv2.LINE_AA, _SHIFT)
+
+
+def lay_disc(drawn: Float32s | Bytes, middle: Float64s, axes: Float64s, turn: float, level: float) -> None:
+    """Draw an ellipse of these half axes, (2,), turned by so many degrees, in that light, in place."""
+    places = [(one * _PARTS).astype(int).tolist() for one in (middle, axes)]
+    cv2.ellipse(drawn, *places, turn, 0, 360, level, -1, cv2.LINE_AA, _SHIFT)
 
 
 def _grid(size: int) -> tuple[Float32s, Float32s]:

@@ -7,9 +7,21 @@ import math
 import cv2
 import numpy as np
 
-from benchmarks.segmentation.patterns import lay, noise, pattern
-from benchmarks.segmentation.planes import SIZE, SURE, aside, place, places, share, slope, surface
-from contour.geometry.arrays import Float32s, Float64s, median, quantile
+from benchmarks.segmentation.patterns import lay, lay_disc, noise, pattern
+from benchmarks.segmentation.planes import (
+    SIZE,
+    SURE,
+    along_and_off,
+    aside,
+    depth,
+    place,
+    places,
+    share,
+    slope,
+    surface,
+    table_light,
+)
+from contour.geometry.arrays import Float32s, Float64s, quantile
 
 # Of holes so many are things that lie there, most of them about as light as the table.
 _LAID, _AS_TABLE = 0.6, 0.7
@@ -24,14 +36,13 @@ def like_hole(light: Float32s, shares: list[Float32s], rng: np.random.Generator)
     if not inside.any():
         return light, shares
     mask, across = _hole_or_body(place(inside, rng), rng)
-    out = (1.0 - comb) * (1.0 - thing) > SURE
-    within = light[comb > SURE]
-    level = median(light[out]) if np.count_nonzero(out) > 50 else quantile(within, rng.uniform(0.05, 0.95))
+    level = table_light(light, comb, thing)
+    if level is None:
+        level = quantile(light[comb > SURE], rng.uniform(0.05, 0.95))
     grain = surface(rng, 60.0)
     table = np.float32(level) * (1.0 + np.float32(rng.uniform(0.0, 0.25)) * grain)
     if rng.random() > _LAID:
-        depth = np.minimum(cv2.distanceTransform((mask > 0.5).astype(np.uint8), cv2.DIST_L2, 5), np.float32(SIZE))
-        shade = np.float32(rng.uniform(0.0, 0.7)) * np.exp(-depth / float(rng.uniform(2.0, 20.0)))
+        shade = np.float32(rng.uniform(0.0, 0.7)) * np.exp(-depth(mask) / float(rng.uniform(2.0, 20.0)))
         away = cv2.warpAffine(
             mask, aside(float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(0.0, 14.0))), (SIZE,) * 2
         )
@@ -40,7 +51,7 @@ def like_hole(light: Float32s, shares: list[Float32s], rng: np.random.Generator)
         kept = 1.0 - mask
         shares = [wall * kept, comb * kept, thing, seam * kept]
     else:
-        light, body = _thing_body(light, table, mask, across, rng)
+        light, body = _thing_body(light, float(table.mean()), mask, across, rng)
         shares = [wall, comb, np.maximum(thing, mask), seam]
     return np.asarray(light * (1.0 - mask) + np.clip(body, 0.0, 255.0) * mask, np.float32), shares
 
@@ -73,25 +84,25 @@ def _even_corners(middle: Float64s, radius: float, count: int, turn: float) -> F
 
 
 def _thing_body(
-    light: Float32s, table: Float32s, mask: Float32s, across: Float32s, rng: np.random.Generator
+    light: Float32s, table: float, mask: Float32s, across: Float32s, rng: np.random.Generator
 ) -> tuple[Float32s, Float32s]:
-    """The light around a thing that lies there, which may be in its shadow, and that of its body."""
-    level = float(table.mean()) * math.exp(rng.uniform(-0.25, 0.25))
+    """The light around a thing that lies on such a table, which may be in its shadow, and that of its body."""
+    level = table * math.exp(rng.uniform(-0.25, 0.25))
     if rng.random() > _AS_TABLE:
         level = float(rng.uniform(10.0, 245.0))
     grain = surface(rng, 40.0)
     body = np.float32(level) * (1.0 + np.float32(rng.uniform(0.0, 0.3)) * grain)
     body = body * (1.0 + np.float32(rng.uniform(-0.5, 0.5) * (rng.random() < 0.6)) * across)
-    depth = np.minimum(cv2.distanceTransform((mask > 0.5).astype(np.uint8), cv2.DIST_L2, 5), np.float32(SIZE))
+    deep = depth(mask)
     lamp = 1.0 + np.float32(rng.uniform(0.0, 1.0)) * slope(rng)
     for _ in range(int(rng.integers(0, 4))):  # rims, grooves, a bevel
-        deep, wide = float(rng.uniform(0.0, 12.0)), float(rng.uniform(0.5, 3.0))
-        ring = np.exp(-(((depth - deep) / wide) ** 2))
+        rim, wide = float(rng.uniform(0.0, 12.0)), float(rng.uniform(0.5, 3.0))
+        ring = np.exp(-(((deep - rim) / wide) ** 2))
         body = body + np.float32(rng.uniform(-0.5, 0.7) * max(level, 40.0)) * ring * lamp
     if rng.random() < 0.5:  # a knob, a socket, a head with corners
         y, x = np.nonzero(mask > 0.5)
         middle = np.array([x.mean(), y.mean()]) if len(x) else np.full(2, 0.5 * SIZE)
-        radius, corners = float(rng.uniform(0.15, 0.7)) * float(depth.max()), int(rng.choice([6, 6, 40, 40, 4]))
+        radius, corners = float(rng.uniform(0.15, 0.7)) * float(deep.max()), int(rng.choice([6, 6, 40, 40, 4]))
         knob = np.zeros((SIZE, SIZE), np.uint8)
         lay(knob, _even_corners(middle, radius, corners, float(rng.uniform(0.0, 6.0))), 255)
         head = share(knob)
@@ -125,28 +136,26 @@ def covered(light: Float32s, comb: Float32s, thing: Float32s, rng: np.random.Gen
             -((across / np.float32(rng.uniform(0.1, 0.6))) ** 2)
         )
     if rng.random() < 0.35:
-        light, body = _thing_body(light, np.full_like(light, _table_level(light, comb, thing, rng)), over, across, rng)
+        light, body = _thing_body(light, _about_as_table(light, comb, thing, rng), over, across, rng)
     elif rng.random() < 0.3:
-        body = body * np.float32(_table_level(light, comb, thing, rng) / max(float(body.mean()), 1.0))
+        body = body * np.float32(_about_as_table(light, comb, thing, rng) / max(float(body.mean()), 1.0))
     if rng.random() < 0.3:
         body = body * (1.0 + np.float32(rng.uniform(0.05, 0.4)) * noise(rng, SIZE, float(rng.uniform(10.0, 60.0))))
     dense = over * np.float32(1.0 if rng.random() < 0.85 else rng.uniform(0.4, 0.8))
     return np.asarray(light * (1.0 - dense) + body * dense, np.float32), np.maximum(thing, over)
 
 
-def _table_level(light: Float32s, comb: Float32s, thing: Float32s, rng: np.random.Generator) -> float:
+def _about_as_table(light: Float32s, comb: Float32s, thing: Float32s, rng: np.random.Generator) -> float:
     """About as light as the table in the part, if it shows one."""
-    own = light[(1.0 - comb) * (1.0 - thing) > SURE]
-    return (median(own) if len(own) > 50 else float(rng.uniform(10.0, 230.0))) * math.exp(rng.uniform(-0.25, 0.25))
+    table = table_light(light, comb, thing)
+    return (float(rng.uniform(10.0, 230.0)) if table is None else table) * math.exp(rng.uniform(-0.25, 0.25))
 
 
 def _sheet(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float32s]:
     """A sheet, a cloth or a sleeve that goes on beyond the part: one border, or two as of a strap, or a corner."""
 
     def border() -> Float32s:
-        turn = float(rng.uniform(0.0, 2.0 * math.pi))
-        y, x = np.mgrid[:SIZE, :SIZE].astype(np.float32)
-        off = (x - np.float32(middle[0])) * math.cos(turn) + (y - np.float32(middle[1])) * math.sin(turn)
+        off = along_and_off(middle, float(rng.uniform(0.0, 2.0 * math.pi)))[0]
         if wavy:
             off = off + np.float32(rng.uniform(1.0, 12.0)) * noise(rng, SIZE, float(rng.uniform(15.0, 80.0)))
         return np.asarray(off, np.float32)
@@ -166,8 +175,8 @@ def _clamp(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float3
     """An arm with a foot, a screw, a plate."""
     over, across = _strip(middle, rng)
     for _ in range(int(rng.integers(1, 4))):
-        more, slope = (_disc if rng.random() < 0.5 else _strip)(middle + rng.uniform(-25.0, 25.0, 2), rng)
-        over, across = np.maximum(over, more), np.where(more > over, slope, across)
+        more, slant = (_disc if rng.random() < 0.5 else _strip)(middle + rng.uniform(-25.0, 25.0, 2), rng)
+        over, across = np.maximum(over, more), np.where(more > over, slant, across)
     return over, across
 
 
@@ -191,9 +200,7 @@ def _disc(middle: Float64s, rng: np.random.Generator) -> tuple[Float32s, Float32
     axes[1] = axes[0] if rng.random() < 0.5 else axes[1]
     mask = np.zeros((SIZE, SIZE), np.uint8)
     turn = float(rng.uniform(0.0, 180.0))
-    cv2.ellipse(
-        mask, (middle * 8).astype(int).tolist(), (axes * 8).astype(int).tolist(), turn, 0, 360, 255, -1, cv2.LINE_AA, 3
-    )
+    lay_disc(mask, middle, axes, turn, 255)
     y, x = np.mgrid[:SIZE, :SIZE]
     away = np.hypot(x - middle[0], y - middle[1]) / axes.max()
     return share(mask), np.clip(away - rng.uniform(0.0, 0.5), -1.0, 1.0).astype(np.float32)

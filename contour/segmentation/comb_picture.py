@@ -73,8 +73,9 @@ def comb_picture(picture: Bytes) -> tuple[Bytes, Source] | None:
         found = segments(light, pitch_px, box)
         if _leaves(found.comb, box, light.shape):
             return None
-    found = _without_gaps(found)
-    if _something_over(found, picture):
+    thing = np.asarray(box_mean(found.thing, _MEAN_PX) > _LEAST_THING, np.bool_)
+    found = replace(found, comb=_without_gaps(found.comb, thing))
+    if _something_over(found.comb > _SURE, thing, picture):
         return None
     drawn = _drawn(found)
     border = (_border(found.comb) + 0.5) * (np.array(light.shape[::-1]) / drawn.shape[::-1]) - 0.5
@@ -93,11 +94,10 @@ def _pitches(light: Bytes) -> list[tuple[float, tuple[slice, slice]]]:
         if light.size * (PITCH_PX / (_TWICE * guess)) ** 2 > _MOST_PX:
             continue
         comb = (comb_and_things(light, guess)[0] > _SURE).astype(np.uint8)
-        pieces, area = pieces_and_areas(opened(comb, _SPECK_PX), 8)
-        most = int(area.max())
+        large, most = _large(opened(comb, _SPECK_PX))
         if most > _CELLS * _CELL * LIGHT_PITCH_PX**2:
             areas[guess] = most / comb.size
-            boxes[guess] = _box((area > _PIECE * most)[pieces] & (pieces > 0), light.shape, _AROUND * guess)
+            boxes[guess] = _box(large, light.shape, _AROUND * guess)
     return [(guess, boxes[guess]) for guess in sorted(areas, key=areas.__getitem__, reverse=True)]
 
 
@@ -124,9 +124,7 @@ def _leaves(comb: Float32s, box: tuple[slice, slice], shape: tuple[int, ...]) ->
         first, last = one.start * small / side + PITCH_PX, one.stop * small / side - PITCH_PX
         edges.append(slice(int(first) if one.start > 0 else 0, int(last) if one.stop < side else small))
     inner[edges[0], edges[1]] = True
-    pieces, area = pieces_and_areas((comb > _SURE).astype(np.uint8), 8)
-    large = area > _PIECE * int(area.max())
-    return bool((large[pieces] & (pieces > 0) & ~inner).any())
+    return bool((_large((comb > _SURE).astype(np.uint8))[0] & ~inner).any())
 
 
 def _middle(light: Bytes, pitch_px: float) -> Bytes:
@@ -138,30 +136,28 @@ def _middle(light: Bytes, pitch_px: float) -> Bytes:
     return np.ascontiguousarray(light[inner[0], inner[1]])
 
 
-def _something_over(seen: Segments, picture: Bytes) -> bool:
-    """Whether a thing, or glare, may lie over the edge of the comb, or in a hole of it."""
-    comb = _large(seen.comb > _SURE)
-    edge = cv2.morphologyEx(comb.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((_EDGE_PX, _EDGE_PX), np.uint8)) > 0
-    lies = (box_mean(seen.thing, _MEAN_PX) > _LEAST_THING) | glare(picture, comb, PITCH_PX)
-    _, area = pieces_and_areas((edge & lies).astype(np.uint8), 8)
-    return int(area.max(initial=0)) > _FEW_PX
+def _something_over(comb: Bools, thing: Bools, picture: Bytes) -> bool:
+    """Whether what may be a thing, or glare, lies over the edge of the comb, or in a hole of it, all (h, w)."""
+    block, _ = _large(comb.astype(np.uint8))
+    edge = cv2.morphologyEx(block.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((_EDGE_PX, _EDGE_PX), np.uint8)) > 0
+    _, area = pieces_and_areas((edge & (thing | glare(picture, block, PITCH_PX))).astype(np.uint8), 8)
+    return int(area.max()) > _FEW_PX
 
 
-def _large(comb: Bools) -> Bools:
-    """The large pieces of comb, (h, w)."""
-    pieces, area = pieces_and_areas(comb.astype(np.uint8), 8)
-    return np.asarray((area > _PIECE * int(area.max()))[pieces] & (pieces > 0), np.bool_)
+def _large(mask: Bytes) -> tuple[Bools, int]:
+    """The large pieces of a mask of 0 and 1, (h, w), and the largest one's area."""
+    pieces, area = pieces_and_areas(mask, 8)
+    most = int(area.max())
+    return np.asarray((area > _PIECE * most)[pieces], np.bool_), most
 
 
-def _without_gaps(seen: Segments) -> Segments:
-    """With comb where ink or a print hides it within the block, in gaps narrower than a hole, without a thing."""
-    gaps = seen.comb <= _SURE
-    pieces = pieces_and_areas(gaps.astype(np.uint8), 4)[0]
-    wide = np.zeros(int(pieces.max()) + 1, np.bool_)
-    wide[pieces[(deep(gaps, _GAP * PITCH_PX) > 0) | (box_mean(seen.thing, _MEAN_PX) > _LEAST_THING)]] = True
-    wide[0] = True
-    narrow = ~wide[pieces]
-    return replace(seen, comb=np.where(narrow, np.float32(1.0), seen.comb))
+def _without_gaps(comb: Float32s, thing: Bools) -> Float32s:
+    """The comb, (h, w), also where ink or a print hides it: in gaps narrower than a hole, without a thing in them."""
+    gaps = comb <= _SURE
+    pieces, area = pieces_and_areas(gaps.astype(np.uint8), 4)
+    hides_comb = area > 0
+    hides_comb[pieces[(deep(gaps, _GAP * PITCH_PX) > 0) | thing]] = False
+    return np.where(hides_comb[pieces], np.float32(1.0), comb)
 
 
 def _border(comb: Float32s) -> Float64s:

@@ -28,11 +28,10 @@ LEAST_SPREAD = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """The picture at the network's size, (h, w), uint8, and how surely each pixel of it is the top of a wall, comb, and
-    a thing that lies over it, 0…1, (h, w), float32.
+    """How surely each pixel of a picture at the network's size is the top of a wall, comb, and a thing that lies over
+    it, 0…1, (h, w), float32.
     """
 
-    light: Bytes
     wall: Float32s
     comb: Float32s
     thing: Float32s
@@ -42,16 +41,16 @@ def segments(light: Bytes, pitch_px: float, box: tuple[slice, slice] | None = No
     """What the picture, (H, W), shows of cells of that pitch, at `PITCH_PX` a pitch, its sides multiples of 8; nothing
     outside of a box of it, rows and columns, if one is given.
     """
-    sized, even = _evened(light, PITCH_PX / pitch_px)
+    even = _evened(light, PITCH_PX / pitch_px)[1]
     if box is None:
-        return Segments(sized, *_told("comb.onnx", 3, even))
+        return Segments(*_told("comb.onnx", 3, even))
     told = np.zeros((3, *even.shape), np.float32)
     rows, columns = (
         slice(_HALVED * int(one.start * small / side / _HALVED), _HALVED * math.ceil(one.stop * small / side / _HALVED))
         for one, small, side in zip(box, even.shape, light.shape, strict=True)
     )
     told[:, rows, columns] = _told("comb.onnx", 3, even[rows, columns])
-    return Segments(sized, *told)
+    return Segments(*told)
 
 
 def comb_and_things(light: Bytes, pitch_px: float) -> Float32s:

@@ -30,7 +30,7 @@ class Look(NamedTuple):
     picture: NDArray[np.uint8]
     relief: Relief | None = None
     least_rise: float | None = None
-    draw: Callable[..., tuple[NDArray[np.uint8], Source] | None] | None = None
+    draw: Callable[[], tuple[NDArray[np.uint8], Source] | None] | None = None
     by_border: bool = False
     times: int = 1
 

@@ -43,6 +43,14 @@ def told_otherwise(monkeypatch: pytest.MonkeyPatch, change: Callable[[Segments],
     monkeypatch.setattr(drawing, "segments", changed)
 
 
+def hide_within(seen: Segments, half: tuple[int, int], thing: float) -> None:
+    """Take comb away over so many rows and columns to both sides of a place within it, with so sure a thing there."""
+    rows, columns = np.nonzero(cv2.erode((seen.comb > 0.5).astype(np.uint8), np.ones((61, 61), np.uint8)))
+    if len(rows):
+        patch = slice(rows[0] - half[0], rows[0] + half[0]), slice(columns[0] - half[1], columns[0] + half[1])
+        seen.comb[patch], seen.wall[patch], seen.thing[patch] = 0.0, 0.0, thing
+
+
 def border_of(drawn: tuple[Bytes, Source] | None) -> Float64s:
     assert drawn is not None
     assert drawn[1].border is not None
@@ -137,13 +145,7 @@ def test_a_thing_within_the_comb_may_be_a_hole_and_is_not_drawn(monkeypatch: pyt
     rendered = scene_of((19.0, 23.0))
     assert comb_picture(rendered.picture) is not None
 
-    def with_thing(seen: Segments) -> None:
-        rows, columns = np.nonzero(cv2.erode((seen.comb > 0.5).astype(np.uint8), np.ones((61, 61), np.uint8)))
-        if len(rows):
-            patch = slice(rows[0] - 20, rows[0] + 20), slice(columns[0] - 20, columns[0] + 20)
-            seen.comb[patch], seen.wall[patch], seen.thing[patch] = 0.0, 0.0, 1.0
-
-    told_otherwise(monkeypatch, with_thing)
+    told_otherwise(monkeypatch, lambda seen: hide_within(seen, (20, 20), 1.0))
     assert comb_picture(rendered.picture) is None
 
 
@@ -156,25 +158,17 @@ def test_what_lies_away_from_the_block_does_not_matter(monkeypatch: pytest.Monke
     assert comb_picture(scene_of((19.0, 23.0)).picture) is not None
 
 
-@pytest.mark.parametrize("sure", [0.1, 0.9], ids=["ink", "a cable"])
-def test_what_hides_less_than_a_cell_within_the_block_is_comb_if_it_is_no_thing(
-    sure: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ink_narrower_than_a_cell_within_the_block_is_comb(monkeypatch: pytest.MonkeyPatch) -> None:
     rendered = scene_of((19.0, 23.0))
     plain = comb_picture(rendered.picture)
-
-    def with_a_stroke(seen: Segments) -> None:
-        rows, columns = np.nonzero(cv2.erode((seen.comb > 0.5).astype(np.uint8), np.ones((61, 61), np.uint8)))
-        if len(rows):
-            stroke = slice(rows[0] - 30, rows[0] + 30), slice(columns[0] - 6, columns[0] + 6)
-            seen.comb[stroke], seen.wall[stroke], seen.thing[stroke] = 0.0, 0.0, sure
-
-    told_otherwise(monkeypatch, with_a_stroke)
+    told_otherwise(monkeypatch, lambda seen: hide_within(seen, (30, 6), 0.1))
     inked = comb_picture(rendered.picture)
-    if sure > 0.5:
-        assert inked is None
-    else:
-        assert len(border_of(inked)) == pytest.approx(len(border_of(plain)), abs=2)
+    assert len(border_of(inked)) == pytest.approx(len(border_of(plain)), abs=2)
+
+
+def test_a_cable_narrower_than_a_cell_within_the_block_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    told_otherwise(monkeypatch, lambda seen: hide_within(seen, (30, 6), 0.9))
+    assert comb_picture(scene_of((19.0, 23.0)).picture) is None
 
 
 def test_beside_glare_nothing_is_drawn() -> None:

@@ -310,7 +310,7 @@ def test_where_something_lies_over_an_edge_that_is_drawn_the_border_of_comb_is_n
         return trace_check.checked_trace(*looked, **known)
 
     border = np.empty((0, 2))
-    monkeypatch.setattr(measure, "comb_picture", lambda picture, **_: (picture, Source(picture, border)))
+    monkeypatch.setattr(measure, "comb_picture", lambda picture: (picture, Source(picture, border)))
     monkeypatch.setattr(measure, "checked_trace", checked)
     seen = measured(render(shop_floor_scene("tape", 1_880_001, alone=True).scene))
     assert Reason.EDGE_COVERED in seen.reasons

@@ -109,7 +109,7 @@ async def test_a_request_without_its_reply_is_unavailable_and_the_next_connectio
         SimulatedController(scan_s=0.001) as simulated,
         FaultProxy(simulated.port, lambda request: next(fates, Fate.PASS), lateness_s=0) as proxy,
     ):
-        controller = ModbusTcpController("127.0.0.1", proxy.port, timeout_s=0.3)
+        controller = ModbusTcpController("127.0.0.1", proxy.port, timeout_s=1.0)
         await controller.connect()
         with pytest.raises(ControllerError) as lost:
             await controller.write_transfer(5)

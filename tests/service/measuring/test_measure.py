@@ -25,6 +25,7 @@ from service.measuring import measure
 from service.measuring.calibration_file import load_record
 from service.measuring.measure import Measurer, trace_settings
 from service.reasons import Reason
+from tests.support.pictures.small_scenes import block
 from tests.support.scenes.edge_scenes import HOLED
 from tests.support.scenes.sample_scenes import THICKNESS_MM, sample_scenes
 from tests.support.scenes.shop_floor.blocks import shop_floor_block
@@ -75,7 +76,7 @@ def test_a_step_above_twice_the_core_is_logged_once_a_recipe(
     followed = Recipe(number=1, name="a", method="sliding-matrix", parameters={"step_px": 25})  # the core is 10
     given = Recipe(number=2, name="b", method="sliding-matrix", parameters={"step_px": 25, "core_px": 12})
     sound = Recipe(number=3, name="c", method="sliding-matrix", parameters={"step_px": 24, "core_px": 12})
-    measurer, part = Measurer(None), np.ascontiguousarray(rendered.picture[400:800, 500:1000])
+    measurer, part = Measurer(None), np.ascontiguousarray(rendered.picture[500:700, 600:850])
     for recipe in (followed, given, sound, followed, given):
         measurer.measure(part, recipe, THICKNESS_MM)
     assert [record.getMessage().split(":")[0] for record in caplog.records] == ["recipe 1", "recipe 2"]
@@ -132,10 +133,11 @@ def test_a_region_in_pixels_and_the_same_in_millimetres_see_the_same(rendered, m
 
 
 @pytest.mark.parametrize("shift", [(-60, 0), (60, 0), (0, -60), (0, 60)])
-def test_a_block_that_the_region_cuts_is_refused_with_words_for_it(rendered, measurer: Measurer, shift) -> None:
+def test_a_block_that_the_region_cuts_is_refused_with_words_for_it(shift) -> None:
+    rendered = block("rectangle")
     low, high = rendered.truth_px.exterior.min(axis=0) - 9, rendered.truth_px.exterior.max(axis=0) + 9
     box = (*(low + shift).tolist(), *(high + shift).tolist())
-    seen = measurer.measure(rendered.picture, RECIPE.model_copy(update={"roi_px": box}), THICKNESS_MM)
+    seen = measured(rendered, RECIPE.model_copy(update={"roi_px": box}))
     assert seen.reasons[0] == Reason.TOUCHES_BORDER
     assert "region of interest" in seen.texts[0]
 
@@ -258,10 +260,9 @@ def test_a_bridge_that_the_recipe_allows_is_in_the_bound_of_the_whole(
     assert allowed.uncertainty_mm == max(stretch.bound_mm or 0.0 for stretch in allowed.evidence)
 
 
-def test_without_a_calibration_no_length_in_millimetres_is_known_and_nothing_is_bridged(
-    rendered, half_bridged: None
-) -> None:
-    seen = Measurer(None).measure(rendered.picture, RECIPE.model_copy(update={"max_bridged_mm": 8.0}), 20)
+def test_without_a_calibration_no_length_in_millimetres_is_known_and_nothing_is_bridged(half_bridged: None) -> None:
+    picture = block("rectangle").picture
+    seen = Measurer(None).measure(picture, RECIPE.model_copy(update={"max_bridged_mm": 8.0}), 20)
     assert seen.reasons == (Reason.EDGE_COVERED,)
     assert seen.evidence_fields is not None
     assert {(stretch["from_mm"], stretch["to_mm"], stretch["bound_mm"]) for stretch in seen.evidence_fields} == {

@@ -14,7 +14,6 @@ from benchmarks.segmentation.planes import SIZE, SURE, aside, depth, line, place
 from benchmarks.segmentation.things import covered, like_hole
 from contour.geometry.arrays import Bytes, Float32s, Float64s, median, quantile
 from contour.image.opencv import grey
-from contour.segmentation.network import PITCH_PX
 
 # So many are made of two parts, as of two blocks; and so many of the others of a seam lie about it.
 _JOINED, _AT_SEAM = 0.25, 0.4
@@ -44,7 +43,7 @@ def crop(one: Example, rng: np.random.Generator, *, holed: bool = False) -> Crop
     if rng.random() < 0.12:
         light = _lined(light, wall, thing, rng)
     if rng.random() < 0.08:
-        light, (wall, comb, thing, seam) = _crushed(light, [wall, comb, thing, seam], rng)
+        light, (wall, comb, thing, seam) = _crushed(light, [wall, comb, thing, seam], one.pitch_px, rng)
     if rng.random() < 0.3:
         light = _of_other_foil(light, comb, rng)
     if rng.random() < 0.5:
@@ -52,11 +51,11 @@ def crop(one: Example, rng: np.random.Generator, *, holed: bool = False) -> Crop
         wall, comb, seam = wall * (1.0 - gone), comb * (1.0 - gone), seam * (1.0 - gone)
         light = _on_other_table(light, comb, thing, gone, rng, dark=one.dark)
     if rng.random() < 0.25:
-        light = _with_flanks(light, comb * (1.0 - thing), rng)
+        light = _with_flanks(light, comb * (1.0 - thing), one.pitch_px, rng)
     if rng.random() < 0.35:
         light = _shaded_by_block(light, comb, thing, rng)
     if rng.random() < 0.2:
-        light = _with_cast_walls(light, wall, 1.0 - np.maximum(comb, thing), rng)
+        light = _with_cast_walls(light, wall, 1.0 - np.maximum(comb, thing), one.pitch_px, rng)
     if rng.random() < 0.1:
         shade = np.float32(rng.uniform(-0.3, 0.5))
         light = light * (1.0 - shade * np.clip(0.5 + line(rng) / float(rng.uniform(1.0, 10.0)), 0.0, 1.0))
@@ -128,7 +127,7 @@ def _joined(one: Example, rng: np.random.Generator) -> tuple[Float32s, list[Floa
         through = np.minimum(first[0], second[0]) if one.dark else np.maximum(first[0], second[0])
         first, second = (np.asarray(through, np.float32), second[1]), (first[0], [*first[1][:3], np.zeros_like(off)])
     glued = how > 1.0 - _GLUED
-    gap = (float(rng.uniform(0.2, 1.6 if glued else 1.0)) * (glued or rng.random() < 0.7)) * PITCH_PX
+    gap = (float(rng.uniform(0.2, 1.6 if glued else 1.0)) * (glued or rng.random() < 0.7)) * one.pitch_px
     both = np.minimum(*(cv2.blur(part[1][1], (9, 9)) for part in (first, second))) > 0.3
     apart = np.float32(0.5 * gap * (how >= _STACKED)) * both
     sides = [np.clip(0.5 + away - apart, 0.0, 1.0) for away in (-off, off)]
@@ -141,7 +140,7 @@ def _joined(one: Example, rng: np.random.Generator) -> tuple[Float32s, list[Floa
         comb = np.maximum(comb, between)
     else:
         fill = quantile(first[0], rng.uniform(0.0, 0.3) if rng.random() < 0.6 else rng.uniform(0.3, 1.0))
-        seam = np.maximum(seam, (np.abs(off) < max(SEAM_PITCHES * PITCH_PX, 0.5 * gap)) & both)
+        seam = np.maximum(seam, (np.abs(off) < max(SEAM_PITCHES * one.pitch_px, 0.5 * gap)) & both)
     light = sides[0] * first[0] + sides[1] * second[0] + between * fill
     return np.asarray(light, np.float32), [np.asarray(part, np.float32) for part in (wall, comb, thing, seam)]
 
@@ -163,15 +162,17 @@ def _lined(light: Float32s, wall: Float32s, thing: Float32s, rng: np.random.Gene
     return np.asarray(light * (1.0 + shade), np.float32)
 
 
-def _crushed(light: Float32s, shares: list[Float32s], rng: np.random.Generator) -> tuple[Float32s, list[Float32s]]:
+def _crushed(
+    light: Float32s, shares: list[Float32s], pitch_px: float, rng: np.random.Generator
+) -> tuple[Float32s, list[Float32s]]:
     """With a row of cells that is pressed together or drawn out: no seam, as walls go on through it."""
-    off, wide = line(rng), float(rng.uniform(0.5, 1.5)) * PITCH_PX
+    off, wide = line(rng), float(rng.uniform(0.5, 1.5)) * pitch_px
     y, x = np.mgrid[:SIZE, :SIZE].astype(np.float32)
     rough = 1.0 + 0.5 * noise(rng, SIZE, float(rng.uniform(4.0, 16.0)))
     row = np.exp(-((off / wide) ** 2))
     push = np.asarray(rng.uniform(-0.5, 0.5) * off * row * rough, np.float32)
     across_y, across_x = np.gradient(off)
-    aside = np.float32(rng.uniform(0.0, 0.2) * PITCH_PX) * row
+    aside = np.float32(rng.uniform(0.0, 0.2) * pitch_px) * row
     to_x = (x + push * across_x + aside * noise(rng, SIZE, 6.0)).astype(np.float32)
     to_y = (y + push * across_y + aside * noise(rng, SIZE, 6.0)).astype(np.float32)
     light, *shares = (
@@ -267,12 +268,12 @@ def _on_other_table(
     return np.asarray(light * (1.0 - out) + np.clip(table, 0.0, 255.0) * out, np.float32)
 
 
-def _with_flanks(light: Float32s, comb: Float32s, rng: np.random.Generator) -> Float32s:
+def _with_flanks(light: Float32s, comb: Float32s, pitch_px: float, rng: np.random.Generator) -> Float32s:
     """As seen from aside: beyond the block's edge the walls that end there, down to the table, as deep as a cell."""
     turn, shade = float(rng.uniform(0.0, 2.0 * math.pi)), np.float32(rng.uniform(0.4, 1.0))
     within = light * comb
     flank, seen = within, comb
-    for deep in range(1, round(float(rng.uniform(0.15, 1.1)) * PITCH_PX)):
+    for deep in range(1, round(float(rng.uniform(0.15, 1.1)) * pitch_px)):
         down = aside(turn, deep)
         lower, there = (cv2.warpAffine(plane, down, (SIZE, SIZE)) for plane in (within, comb))
         more = np.maximum(there - seen, 0.0)
@@ -280,12 +281,14 @@ def _with_flanks(light: Float32s, comb: Float32s, rng: np.random.Generator) -> F
     return np.asarray(light * (1.0 - seen) + flank, np.float32)
 
 
-def _with_cast_walls(light: Float32s, wall: Float32s, table: Float32s, rng: np.random.Generator) -> Float32s:
+def _with_cast_walls(
+    light: Float32s, wall: Float32s, table: Float32s, pitch_px: float, rng: np.random.Generator
+) -> Float32s:
     """With what walls near the edge cast on the table, up to some cells away: shadows, or light, as foil does."""
     turn, first = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(0.0, 1.5)) * (rng.random() < 0.5)
     far = first + math.exp(rng.uniform(math.log(0.05), math.log(3.0)))
     cast = np.zeros_like(wall)
-    for away in range(round(first * PITCH_PX), round(far * PITCH_PX) + 1):
+    for away in range(round(first * pitch_px), round(far * pitch_px) + 1):
         cast = np.maximum(cast, cv2.warpAffine(wall, aside(turn, away), (SIZE, SIZE), borderMode=cv2.BORDER_REFLECT))
     cast = cv2.GaussianBlur(cast, (0, 0), float(rng.uniform(0.3, 3.0)))
     return np.asarray(light * (1.0 - np.float32(rng.uniform(-0.4, 0.7)) * cast * table), np.float32)

@@ -10,8 +10,12 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from benchmarks.fourth_hand.scene import KINDS as FOURTH_KINDS
+from benchmarks.fourth_hand.scene import scene as fourth_scene
 from benchmarks.other_hand.scene import KINDS as OTHER_KINDS
 from benchmarks.other_hand.scene import scene as other_scene
+from benchmarks.third_hand.scene import KINDS as THIRD_KINDS
+from benchmarks.third_hand.scene import scene as third_scene
 from contour.geometry.arrays import Bytes, Float32s, median
 from contour.image.opencv import grey, within
 from contour.segmentation.network import LEAST_SPREAD, PITCH_PX
@@ -32,14 +36,14 @@ KINDS = (*STRUCTURED * 3, *_OTHERS)
 _TOGETHER, SEAM_PITCHES = 0.2, 0.55
 _OWN_TOGETHER, _OTHERS_TOGETHER = ("pushed_together", "pushed_together", "offcut"), ("pair", "pair", "offcut")
 # So many are drawn by another hand; and so many of the things that lie over an edge do so on a table with structure.
-_BY_ANOTHER, _ON_STRUCTURED = 0.5, 0.5
+_BY_ANOTHER, _ON_STRUCTURED, _BY_MORE = 0.5, 0.5, 2.0 / 3.0
 _THINGS = ("tape", "clamp", "hand_or_cable")
 _OTHER_THINGS = ("tape", "clamp", "hand", "cable")
 
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """A picture, (h, w) or (h, w, 3), uint8, with cells of about `PITCH_PX`, and how much of each pixel is the top of a
+    """A picture, (h, w) or (h, w, 3), uint8, with cells of about that pitch, and how much of each pixel is the top of a
     wall, of a block, of a thing over it, and of a seam between two blocks, 255 all, (h, w), uint8. mean, spread: of its
     light. dark: whether walls are darker than what lies between them.
     """
@@ -52,29 +56,36 @@ class Example:
     mean: float
     spread: float
     dark: bool
+    pitch_px: float
 
 
-def example(seed: int) -> Example:
-    """The example of this seed, the same for the same."""
+def example(seed: int, pitch_px: float = PITCH_PX, *, more_hands: bool = False) -> Example:
+    """The example of this seed, the same for the same, with cells of about that pitch; with `more_hands` two of three
+    are drawn by hands who drew many things that lie over a block, and what looks like these.
+    """
     rng = np.random.default_rng([seed, 77])
-    drawn = _by_another(rng, seed) if rng.random() < _BY_ANOTHER else _own(rng, seed)
+    if more_hands and rng.random() < _BY_MORE:
+        drawn = _by_one_more(rng, seed)
+    else:
+        drawn = _by_another(rng, seed) if rng.random() < _BY_ANOTHER else _own(rng, seed)
     height, width = drawn.picture.shape[:2]
-    share = PITCH_PX / drawn.pitch_px * math.exp(float(rng.uniform(-_APART, _APART)))
+    share = pitch_px / drawn.pitch_px * math.exp(float(rng.uniform(-_APART, _APART)))
     size = max(64, round(width * share)), max(64, round(height * share))
     how = cv2.INTER_AREA if share < 1.0 else cv2.INTER_LINEAR
     picture = np.asarray(cv2.resize(drawn.picture, size, interpolation=how), np.uint8)
     comb = np.maximum.reduce(drawn.pieces)
     wall, block, over = (_sized(one, size, how) for one in (drawn.wall * comb, comb, drawn.thing))
-    seam = _seam_between([_sized(piece, size, how) for piece in drawn.pieces])
+    seam = _seam_between([_sized(piece, size, how) for piece in drawn.pieces], pitch_px)
     light = grey(picture)
     on, off = light[wall > 180], light[(wall < 20) & (block > 200)]
     dark = len(on) > 0 and len(off) > 0 and median(on) < median(off)
-    return Example(picture, wall, block, over, seam, float(light.mean()), max(float(light.std()), LEAST_SPREAD), dark)
+    even = float(light.mean()), max(float(light.std()), LEAST_SPREAD)
+    return Example(picture, wall, block, over, seam, *even, dark, pitch_px)
 
 
-def _seam_between(pieces: Sequence[Bytes]) -> Bytes:
-    """255 where two pieces, 255 each in (h, w), with cells of `PITCH_PX` lie against each other."""
-    beside = [within((piece > 127).astype(np.uint8), SEAM_PITCHES * PITCH_PX) for piece in pieces]
+def _seam_between(pieces: Sequence[Bytes], pitch_px: float) -> Bytes:
+    """255 where two pieces, 255 each in (h, w), with cells of that pitch lie against each other."""
+    beside = [within((piece > 127).astype(np.uint8), SEAM_PITCHES * pitch_px) for piece in pieces]
     return np.where(np.add.reduce(beside) > 1, np.uint8(255), np.uint8(0))
 
 
@@ -113,6 +124,14 @@ def _by_another(rng: np.random.Generator, seed: int) -> _Drawn:
     one = other_scene(kind, seed, on)
     wall, thing, *pieces = (np.asarray(part, np.float32) for part in (one.walls, one.hidden, *one.pieces))
     return _Drawn(one.picture, one.pitch_px, wall, pieces, thing)
+
+
+def _by_one_more(rng: np.random.Generator, seed: int) -> _Drawn:
+    third = rng.random() < 0.5
+    kind = str(rng.choice(THIRD_KINDS if third else FOURTH_KINDS))
+    one = third_scene(kind, seed) if third else fourth_scene(kind, seed)
+    wall, comb, thing = (np.asarray(part, np.float32) for part in (one.walls, one.comb, one.hidden))
+    return _Drawn(one.picture, one.pitch_px, wall, [comb], thing)
 
 
 def _sized(share: Float32s, size: tuple[int, int], how: int) -> Bytes:

@@ -1,6 +1,7 @@
 """Teaches the networks: `python -m benchmarks.segmentation.teach --out FILE.onnx` (`--help`), an hour on two cores;
 with `--plan beyond` the light one that looks beyond outlines, a quarter of one, and with `--plan seams` or `holes`,
-mostly from that one on (`--start`), its likes that tell seams, and what lies on comb from holes in it.
+mostly from that one on (`--start`), its likes that tell seams, and what lies on comb from holes in it; with
+`--plan covers` the one that sees more of the picture, and what lies over an edge, in eighty minutes.
 
 What comes out differs in its last digits from machine to machine, and so from what is in `contour/segmentation/`.
 """
@@ -25,7 +26,7 @@ from torch.nn import functional
 
 from benchmarks.segmentation.crops import Crop, crop
 from benchmarks.segmentation.examples import Example, example
-from contour.segmentation.network import PITCH_PX
+from contour.segmentation.network import LIGHT_PITCH_PX, PITCH_PX
 
 # Far from the seeds of every page and test.
 FIRST = 90_000_000
@@ -39,23 +40,26 @@ _FEW = 96
 
 class _Plan(NamedTuple):
     """A network: the channels of each of its sizes, how far apart its lowest layers look, how many layers lead up; what
-    it tells of, each with what it counts; how many times smaller than crops are it sees pictures; and whether most of
-    these have a hole, or a thing that looks like one.
+    it tells of, each with what it counts; how many times smaller than crops are it sees pictures; how many of these
+    mostly have a hole, or a thing that looks like one; the pitch of cells in them; and whether more hands draw them.
     """
 
-    widths: tuple[int, int, int, int]
+    widths: tuple[int, ...]
     apart: tuple[int, ...]
     layers_up: int
     told: dict[str, float]
     smaller: int
-    holed: bool = False
+    holed: float = 0.0
+    pitch_px: float = PITCH_PX
+    more_hands: bool = False
 
 
 PLANS = {
     "comb": _Plan((12, 24, 48, 64), (1, 2, 4, 2), 2, {"wall": 2.0, "comb": 1.0, "thing": 1.0}, 1),
     "beyond": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 1.0, "thing": 0.5}, 2),
     "seams": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 1.0, "thing": 0.5, "seam": 1.0}, 2),
-    "holes": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 0.5, "thing": 1.0}, 2, holed=True),
+    "holes": _Plan((8, 16, 24, 32), (1, 2, 4), 1, {"comb": 0.5, "thing": 1.0}, 2, holed=1.0),
+    "covers": _Plan((12, 24, 32, 48, 64), (1, 2, 4), 1, {"comb": 0.5, "thing": 1.0}, 1, 0.2, LIGHT_PITCH_PX, True),
 }
 
 
@@ -65,7 +69,7 @@ def _layer(before: int, after: int, apart: int = 1) -> nn.Sequential:
 
 
 class Network(nn.Module):
-    """Four sizes, each half of the one above it, down and up again: a U-Net of 274,000 weights, or of 58,000."""
+    """Sizes, each half of the one above it, down and up again: a U-Net of 274,000 weights, 250,000, or 58,000."""
 
     def __init__(self, plan: _Plan) -> None:
         super().__init__()
@@ -110,7 +114,7 @@ class _Sure(nn.Module):
 
 
 class _Crops(torch.utils.data.IterableDataset[tuple[Tensor, ...]]):
-    def __init__(self, examples: Sequence[Example], seed: int, *, holed: bool) -> None:
+    def __init__(self, examples: Sequence[Example], seed: int, *, holed: float) -> None:
         self.examples, self.seed, self.holed = examples, seed, holed
 
     def __iter__(self) -> Iterator[tuple[Tensor, ...]]:
@@ -119,12 +123,13 @@ class _Crops(torch.utils.data.IterableDataset[tuple[Tensor, ...]]):
         rng = np.random.default_rng([self.seed, 0 if worker is None else worker.id])
         while True:
             one = self.examples[int(rng.integers(len(self.examples)))]
-            yield tuple(torch.from_numpy(np.ascontiguousarray(plane)) for plane in crop(one, rng, holed=self.holed))
+            planes = crop(one, rng, holed=rng.random() < self.holed)
+            yield tuple(torch.from_numpy(np.ascontiguousarray(plane)) for plane in planes)
 
 
 def loss(told: Tensor, true: dict[str, Tensor], plan: _Plan) -> Tensor:
     """By how much what is told, (N, K, h, w), differs from what is true, each (N, 1, h, w)."""
-    near_px = round(0.5 * PITCH_PX / plan.smaller)
+    near_px = round(0.5 * plan.pitch_px / plan.smaller)
     window = 2 * near_px + 1, 1, near_px
     near = functional.max_pool2d(true["comb"], *window) + functional.max_pool2d(-true["comb"], *window)
     counts = 1.0 + (_NEAR - 1.0) * near
@@ -217,10 +222,11 @@ def main() -> None:
     parser.add_argument("--out", required=True, metavar="FILE", help="where the network goes, .onnx")
     options = parser.parse_args()
     cv2.setNumThreads(1)  # what is forked has none of its threads, and would wait for them
-    seeds = range(options.first, options.first + options.examples)
+    seeds, plan = range(options.first, options.first + options.examples), PLANS[options.plan]
     with ProcessPoolExecutor(2, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
-        examples = list(pool.map(example, seeds, chunksize=4))
-    plan = PLANS[options.plan]
+        examples = list(
+            pool.map(partial(example, pitch_px=plan.pitch_px, more_hands=plan.more_hands), seeds, chunksize=4)
+        )
     network = Network(plan).to(memory_format=torch.channels_last)
     if options.start is not None:
         crops = (crop(examples[number % len(examples)], np.random.default_rng(number)).light for number in range(_FEW))

@@ -163,13 +163,14 @@ def _without_image(checked: CheckedTrace, pitch_px: float) -> CheckedTrace:
 def _checked_edge(
     picture: Bytes, traced: Trace, pitch_px: float, relief: Relief | None, source: Source | None, *, notches: bool
 ) -> tuple[NarrowFeature | None, EdgePart | None, EdgePart | None, EdgePart | None, EdgePart | None]:
-    """What is narrow, alike, bare, overrun and runs on of an edge; the last alone where closed cells are serrated."""
+    """What is narrow, alike, bare, overrun and runs on of an edge; the last alone where closed cells are serrated, and
+    where two networks have told the edge."""
     # What was drawn has no borders on its table.
     taken, light = (picture, traced.light) if source is None else (source.picture, source.light)
     runs_on = border_beyond(_planes(taken, light), traced.contour, pitch_px)
     if runs_on is None and relief is not None and relief.even:
         runs_on = border_beyond(_planes(relief.lit, grey(relief.lit)), traced.contour, pitch_px, of_any_light=True)
-    if traced.evidence is None:
+    if traced.evidence is None or (source is not None and source.outline is not None):
         return None, None, None, None, runs_on
     return (
         narrow_feature(traced.contour, pitch_px, notches=notches),

@@ -22,7 +22,7 @@ _HOLE, _ANOTHER = 1.0, 0.02
 # radius at most. Where walls are drawn the picture shows some: they go together that well, within so many pitches.
 _APART, _BARE, _SEEN_WALL, _TOGETHER, _EVEN_PITCHES, _WALL_PITCHES = 0.45, 0.7, 0.3, 0.5, 0.5, 0.375
 # Walls surer than this part cells, none of which is so many times as large as most: of 45 right outlines two have one
-# that is, rows of crushed cells, and all of six that left out a slot of two cells.
+# that is, rows of crushed cells, and all of five that left out a slot of two cells.
 _PARTS, _LARGEST = 0.24, 2.5
 # A place is not asked about walls nearer to the border than that, pitches, nor light that changes by less, grey levels.
 _WITHIN, _LEAST_LIGHT = 0.6, 1.0

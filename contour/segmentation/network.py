@@ -18,10 +18,10 @@ PITCH_PX = 16.0
 LIGHT_PITCH_PX = 8.0
 """That of the light network, which takes a tenth of the time and tells of no walls."""
 
-# It halves the picture so often.
-_HALVED = 8
+# By so much networks make the picture smaller, and one of them, which halves it once more.
+_HALVED, _HALVED_MORE = 8, 16
 # Tiles, and what is seen around each of them: a quarter of a gigabyte, where a whole picture of 2 MP took 1.4.
-_TILE_PX, _AROUND_PX = 504, 48
+_TILE_PX, _LARGER_TILE_PX = (504, 48), (512, 128)
 # Grey levels: what spreads less is noise.
 LEAST_SPREAD = 4.0
 
@@ -75,11 +75,17 @@ def comb_and_laid(light: Bytes, pitch_px: float) -> Float32s:
     return _told("holes.onnx", 2, _evened(light, LIGHT_PITCH_PX / pitch_px)[1])
 
 
-def _evened(light: Bytes, size: float) -> tuple[Bytes, Float32s]:
-    """The picture, (H, W), at so many times its size, its sides multiples of 8, (h, w), as it is and of mean 0 and unit
-    spread.
+def comb_and_covers(light: Bytes, pitch_px: float) -> Float32s:
+    """As `comb_and_things`, by a network that sees more of the picture around each pixel, and knows more things."""
+    even = _evened(light, LIGHT_PITCH_PX / pitch_px, _HALVED_MORE)[1]
+    return _told("covers.onnx", 2, even, _LARGER_TILE_PX)
+
+
+def _evened(light: Bytes, size: float, halved: int = _HALVED) -> tuple[Bytes, Float32s]:
+    """The picture, (H, W), at so many times its size, its sides multiples of that, (h, w), as it is and of mean 0 and
+    unit spread.
     """
-    shape = tuple(_HALVED * max(_HALVED, round(side * size / _HALVED)) for side in light.shape)
+    shape = tuple(halved * max(_HALVED, round(side * size / halved)) for side in light.shape)
     sized = (shrunk_to if size < 1.0 else grown)(light, shape)
     even = sized.astype(np.float32)
     even -= even.mean()
@@ -87,20 +93,22 @@ def _evened(light: Bytes, size: float) -> tuple[Bytes, Float32s]:
     return sized, even
 
 
-def _told(name: str, channels: int, even: Float32s) -> Float32s:
-    """What the network in that file tells of each pixel of an evened picture, (h, w): (channels, h, w), float32."""
-    shape = even.shape
+def _told(name: str, channels: int, even: Float32s, tile_px: tuple[int, int] = _TILE_PX) -> Float32s:
+    """What the network in that file tells of each pixel of an evened picture, (h, w): (channels, h, w), float32; in
+    tiles of so many pixels, with so many around them.
+    """
+    shape, (side, around) = even.shape, tile_px
     # A net of OpenCV's holds what it computes, all layers of it: each thread has one of its own, for a tile at a time.
     network = cv2.dnn.readNetFromONNX(_network(name))
     told = np.empty((channels, *shape), np.float32)
-    for top in range(0, shape[0], _TILE_PX):
-        for left in range(0, shape[1], _TILE_PX):
-            above, before = max(0, top - _AROUND_PX), max(0, left - _AROUND_PX)
-            tile = even[above : top + _TILE_PX + _AROUND_PX, before : left + _TILE_PX + _AROUND_PX]
+    for top in range(0, shape[0], side):
+        for left in range(0, shape[1], side):
+            above, before = max(0, top - around), max(0, left - around)
+            tile = even[above : top + side + around, before : left + side + around]
             network.setInput(np.ascontiguousarray(tile)[None, None])
-            rows, columns = slice(top - above, top - above + _TILE_PX), slice(left - before, left - before + _TILE_PX)
+            rows, columns = slice(top - above, top - above + side), slice(left - before, left - before + side)
             part = np.asarray(network.forward(), np.float32)[0, :, rows, columns]
-            told[:, top : top + _TILE_PX, left : left + _TILE_PX] = part
+            told[:, top : top + side, left : left + side] = part
     return told
 
 

@@ -11,12 +11,14 @@ from contour.edge.edge_evidence import ring_evidence
 from contour.edge.edge_parts import EdgePart
 from contour.edge.mirrored_block import is_mirrored, mirrored_block
 from contour.edge.open_cells import without_open_cells
+from contour.edge.stretches import Stretch
 from contour.edge.table_look import TableLook, table_look
 from contour.edge.visible_edge import doubtful, visible_rings
 from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
-from contour.geometry.rings import Contour
+from contour.geometry.ring_lengths import RingLengths
+from contour.geometry.rings import Contour, Ring, oriented, oriented_contour, perimeter, signed_area
 from contour.image.opencv import grey
 from contour.material.floor_edge import floor_edge
 from contour.outline.uncertainty import uncertainty
@@ -44,8 +46,8 @@ from contour.tracing.trace import OnStage, Trace, TraceSettings
 from contour.tracing.wide_lines import wide_line
 from contour.walls.lightness import wall_light
 from contour.walls.pieces import Piece, with_earlier
-from contour.walls.see_block import SeenWalls, Source, see_block, see_walls, strong_walls
-from contour.walls.wall_evidence import BlockEvidence
+from contour.walls.see_block import Outline, SeenWalls, Source, see_block, see_walls, strong_walls
+from contour.walls.wall_evidence import BlockEvidence, RingEvidence
 
 # Bounds that are wider than that share of a pitch are refused.
 _SURE_PITCHES = 0.25
@@ -59,7 +61,7 @@ _ON_EVEN_TABLE = 1.4
 _GAP_PITCHES = 2.5
 # Beside comb that a network tells, shadows and grain of a table look like things along fewer cells than that: of 38
 # right outlines three do along more. A sheet of paper, a weight in the block and a tape that it took for table did.
-_LIES_BESIDE = 4.0
+_LIES_BESIDE, _PLACES_PER_PITCH = 4.0, 4
 # With more of the outline unseen than this there is nothing to say about its corners.
 _MOST_UNSEEN = 0.5
 # What of a thing lay inside the block as it was first seen shows once the rest of it is known.
@@ -92,6 +94,8 @@ def wall_tips(
     solid = Solid(picture, light, polarity, on_stage)
     if settings.edge == "cells":
         return solid.closed()
+    if source is not None and source.outline is not None:
+        return _told(source.outline, light, source.picture)
     walls = replace(see_walls(picture, light, polarity, solid.cells), relief=relief, source=source)
     if settings.least_rise is not None:
         walls = strong_walls(walls, settings.least_rise)
@@ -171,6 +175,43 @@ def _told_of(found: Trace, light: Bytes) -> Trace:
     sides = [(ring[::-1], bright) for ring in found.contour.rings for bright in (True, False)]
     floors = (floor_edge(light, ring, pitch_px, bright=bright) for ring, bright in sides)
     return replace(found, untold_px=_first(one.places[one.beyond] for one in floors))
+
+
+def _told(outline: Outline, light: Bytes, picture: Bytes) -> Trace:
+    """The trace of an outline that was told, of comb drawn in that light from a picture. Raises NoBlockFound where that
+    shows something beside it that is no table, nor a shadow.
+    """
+    pitch_px = outline.pitch_px
+    rings = tuple(
+        _told_ring(oriented(ring, number == 0), pitch_px) for number, ring in enumerate(outline.contour.rings)
+    )
+    _check_beyond(picture, BlockEvidence(rings, pitch_px, 0.0, "bright", 0.0, 0.0, 0.0, 0.0))
+    # As any other is traced, with the material on its left seen with y up.
+    contour = oriented_contour(outline.contour, counter_clockwise=False)
+    seen = (
+        Stretch(number, 0.0, perimeter(ring), "seen", None, outline.bound_px)
+        for number, ring in enumerate(contour.rings)
+    )
+    return Trace(
+        "wall-tips",
+        "bright",
+        pitch_px,
+        contour,
+        light,
+        uncertainty_px=outline.bound_px,
+        edge="cut",
+        evidence=tuple(seen),
+    )
+
+
+def _told_ring(ring: Ring, pitch_px: float) -> RingEvidence:
+    """Some places of a ring that was told, with the material on its left by its shoelace, as what witnesses it."""
+    lengths = RingLengths.of(ring)
+    position = np.arange(0.0, lengths.length, pitch_px / _PLACES_PER_PITCH)
+    normal, of_all = lengths.normals(position, pitch_px), np.zeros(len(position))
+    return RingEvidence(
+        ring, signed_area(ring) < 0.0, lengths.at(position), position, normal, of_all, of_all.astype(np.int8)
+    )
 
 
 def _wide(found: Trace, walls: SeenWalls) -> EdgePart | None:

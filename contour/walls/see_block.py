@@ -11,8 +11,9 @@ import numpy as np
 
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float64s
+from contour.geometry.rings import Contour
 from contour.image.pixel_grid import averaged, coarse_step, pixels_of
-from contour.image.region import Region
+from contour.image.region import Region, shifted
 from contour.relief.relief import Relief
 from contour.walls.cell_scale import CellScale, probe
 from contour.walls.coarse_block import coarse_block, small_openings
@@ -40,14 +41,24 @@ _GLARE = 1.5
 _STRANDS_PITCHES = 5.0
 
 
+@dataclass(frozen=True)
+class Outline:
+    """An outline that was told without walls' ends, pixels, the pitch of its cells, and within what 95 % of it lie."""
+
+    contour: Contour
+    pitch_px: float
+    bound_px: float
+
+
 @dataclass(frozen=True, eq=False)
 class Source:
     """The picture that another one was drawn from, grey (H, W) or BGR (H, W, 3), uint8, and where its comb ends, some
-    four places a pitch, (N, 2), pixels; None where ends of walls are to tell.
+    four places a pitch, (N, 2), pixels; None where ends of walls are to tell, or an outline that was told.
     """
 
     picture: Bytes
-    border: Float64s | None
+    border: Float64s | None = None
+    outline: Outline | None = None
 
     @cached_property
     def light(self) -> Bytes:
@@ -57,7 +68,8 @@ class Source:
     def cut(self, region: Region) -> Source:
         """The same of the part of the picture that lies in a region's box."""
         part, first = region.cut(self.picture)
-        return Source(part, None if self.border is None else self.border - first)
+        outline = self.outline and replace(self.outline, contour=shifted(self.outline.contour, -first))
+        return Source(part, None if self.border is None else self.border - first, outline)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from contour.calibration.calibration import Calibration
 from contour.edge.known_table import OverTable, over_known_table
 from contour.errors import CalibrationError, EdgeContradicted, NoBlockFound, ParameterError
 from contour.geometry.agreement import rectified_edges
-from contour.geometry.arrays import Float64s
+from contour.geometry.arrays import Bools, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, densified
@@ -234,7 +234,8 @@ class Measurer:
             if recipe.network:
                 draw = cache(partial(comb_picture, picture))
                 yield Look(picture, draw=draw, times=times)
-                yield Look(picture, draw=draw, times=times, by_border=True)
+                yield Look(picture, draw=draw, times=times, by="border")
+                yield Look(picture, draw=draw, times=times, by="networks")
             yield Look(picture, least_rise=_STRONG_WALLS, times=times)
 
     def _outlined(
@@ -412,7 +413,7 @@ def _second_opinion(
     Closed cells are none that they know, nor are triangles, squares, and sheets.
     """
     known = traced.edge == "cut" and (traced.comb is None or traced.comb.core)
-    if not known or traced.pitch_px is None or traced.look is None:
+    if not known or traced.pitch_px is None or traced.evidence is None:
         return ()
     outline = traced.contour if rectifier is None else rectified_edges(traced.contour, rectifier)
     part, first = (picture, np.zeros(2)) if region is None else region.cut(picture)
@@ -422,9 +423,17 @@ def _second_opinion(
         if one.hidden_or_filled
     ]
     dark = traced.polarity == "dark"
-    opinion = second_opinion(part, shifted(outline, -first), traced.pitch_px, traced.look.loose_at, told, dark=dark)
+    loose = _none if traced.look is None else traced.look.loose_at
+    opinion = second_opinion(part, shifted(outline, -first), traced.pitch_px, loose, told, dark=dark)
     watch.lap("network")
+    if traced.look is None:
+        opinion = opinion._replace(over=None, laid=None)
     return judge_opinion(opinion.moved(*first.tolist()), traced.pitch_px)
+
+
+def _none(points: Float64s) -> Bools:
+    """Of points, (N, 2), which lie on loose pieces where none are known."""
+    return np.zeros(len(points), np.bool_)
 
 
 def rejections(findings: tuple[Finding, ...]) -> tuple[Rejection, ...]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
 from contour.relief.relief import Relief
+from contour.segmentation.comb_picture import CombPicture
 from contour.tracing.trace import OnStage
 from contour.walls.see_block import Source
 from service.reasons import Reason
@@ -23,15 +24,15 @@ _HARDLY_SEEN = {Reason.UNCERTAINTY_TOO_LARGE}
 
 class Look(NamedTuple):
     """A picture, (H, W) grey or (H, W, 3) BGR, or what differs in it from a known table; `least_rise` as in the
-    settings of a trace; `draw`: has a network tell of it what to look at, `by_border` not at ends of its walls, but
-    at where its comb ends; `times`: how many times as large as it was taken it is.
+    settings of a trace; `draw`: has a network tell of it what to look at, `by` ends of the walls that it draws, the
+    border of its comb, or the outline that two networks tell; `times`: how many times as large as it was taken it is.
     """
 
     picture: NDArray[np.uint8]
     relief: Relief | None = None
     least_rise: float | None = None
-    draw: Callable[[], tuple[NDArray[np.uint8], Source] | None] | None = None
-    by_border: bool = False
+    draw: Callable[[], CombPicture | None] | None = None
+    by: Literal["ends", "border", "networks"] = "ends"
     times: int = 1
 
     @property
@@ -46,9 +47,11 @@ class Look(NamedTuple):
         drawn = self.draw()
         on_stage("network")
         if drawn is None:
-            raise NoBlockFound("no block found: a network sees no comb with nothing over its edge")
-        picture, source = drawn
-        return picture, source if self.by_border else replace(source, border=None)
+            raise NoBlockFound("no block found: a network sees no comb")
+        if self.by == "networks":
+            return drawn.drawn, drawn.outlined()
+        source = drawn.walled()
+        return drawn.drawn, source if self.by == "border" else replace(source, border=None)
 
     def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
         """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""

@@ -44,28 +44,31 @@ def best(first: Outcome, looks: Iterator[Look], outlined: Callable[[Look], Measu
     if isinstance(first, EdgeContradicted) or accepted(first) or _does_not_fit(first):
         return first
     reasons = {*first.reasons} if isinstance(first, Measurement) else set[Reason]()
+    covered = False
     for look in looks:
         on_stage("table")
+        # What lies over an edge that a network drew would be drawn away by all looks but one that knows more things.
+        if covered and look.by != "networks":
+            continue
         if not look.may_show_more(reasons, nowhere=isinstance(first, NoCellsFound)):
             continue
         again = tried(outlined, look)
         if accepted(again):
             return again
-        if look.network and _may_be_drawn_wrong(again):
+        if look.network and _closes_cells(again):
             break
+        covered = covered or (look.network and isinstance(again, Measurement) and Reason.EDGE_COVERED in again.reasons)
         if isinstance(again, Measurement):
             reasons |= {Reason.SEVERAL_BLOCKS} & {*again.reasons}
     on_stage("table")
     return first
 
 
-def _may_be_drawn_wrong(found: Outcome) -> bool:
-    """Whether something lies over an edge that a network drew, which would be drawn away, or walls that it drew close
-    border cells: it knows cut blocks alone, and other looks may take the teeth of such a border for ends of walls.
+def _closes_cells(found: Outcome) -> bool:
+    """Whether walls that a network drew close border cells: it knows cut blocks alone, and other looks may take the
+    teeth of such a border for ends of walls.
     """
-    if not isinstance(found, Measurement):
-        return isinstance(found, EdgeContradicted)
-    return Reason.EDGE_COVERED in found.reasons or found.edge in ("cells", "mixed")
+    return found.edge in ("cells", "mixed") if isinstance(found, Measurement) else isinstance(found, EdgeContradicted)
 
 
 def accepted(found: Outcome) -> TypeGuard[Measurement]:

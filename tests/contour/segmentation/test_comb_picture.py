@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -10,14 +11,15 @@ import cv2
 import numpy as np
 import pytest
 
+from contour.errors import NoBlockFound
 from contour.geometry.agreement import distances_to, places_along
-from contour.geometry.arrays import Bytes, Float64s
+from contour.geometry.arrays import Float64s
+from contour.geometry.rings import Contour
 from contour.geometry.signed_distance import nearest
 from contour.segmentation import comb_picture as drawing
-from contour.segmentation.comb_picture import comb_picture
+from contour.segmentation.comb_picture import CombPicture, comb_picture
 from contour.segmentation.network import Segments
 from contour.synthetic import Rendered, area_coverage, pitch_px, render, render_empty_table
-from contour.walls.see_block import Source
 from tests.support.scenes.shop_floor_scenes import shop_floor_scene
 
 
@@ -51,10 +53,41 @@ def hide_within(seen: Segments, half: tuple[int, int], thing: float) -> None:
         seen.comb[patch], seen.wall[patch], seen.thing[patch] = 0.0, 0.0, thing
 
 
-def border_of(drawn: tuple[Bytes, Source] | None) -> Float64s:
+def is_drawn(picture: np.ndarray) -> bool:
+    """Whether walls are drawn to tell where the block ends."""
+    drawn = comb_picture(picture)
     assert drawn is not None
-    assert drawn[1].border is not None
-    return drawn[1].border
+    with contextlib.suppress(NoBlockFound):
+        return drawn.walled().border is not None
+    return False
+
+
+def farthest_from_walls(drawn: CombPicture | None, rendered: Rendered) -> float:
+    """How far a place well within the block lies from drawn walls, pixels."""
+    assert drawn is not None
+    block = area_coverage(rendered.truth_px.rings, *rendered.picture.shape[1::-1]) > 0.5
+    within = cv2.distanceTransform(block.astype(np.uint8), cv2.DIST_L2, 5) > rendered.pitch_px
+    return float(cv2.distanceTransform((drawn.drawn < 100).astype(np.uint8), cv2.DIST_L2, 5)[within].max())
+
+
+def border_of(drawn: CombPicture | None) -> Float64s:
+    assert drawn is not None
+    border = drawn.walled().border
+    assert border is not None
+    return border
+
+
+@cache
+def told_scene() -> Rendered:
+    """A block on wood of which two networks tell the same."""
+    return render(shop_floor_scene("wood", 95_000_008, alone=True).scene)
+
+
+def outline_of(drawn: CombPicture | None) -> Contour:
+    assert drawn is not None
+    outline = drawn.outlined().outline
+    assert outline is not None
+    return outline.contour
 
 
 @pytest.mark.parametrize("pitch", [(12.0, 15.0), (19.0, 23.0), (30.0, 40.0), (50.0, 60.0)])
@@ -62,8 +95,8 @@ def test_cells_of_any_size_are_found(pitch: tuple[float, float]) -> None:
     rendered = scene_of(pitch)
     drawn = comb_picture(rendered.picture)
     assert drawn is not None
-    assert drawn[0].shape == rendered.picture.shape[:2]
-    rows, columns = np.nonzero(drawn[0] > 100)
+    assert drawn.drawn.shape == rendered.picture.shape[:2]
+    rows, columns = np.nonzero(drawn.drawn > 100)
     truth = rendered.truth_px.exterior
     for seen, ring in ((columns, truth[:, 0]), (rows, truth[:, 1])):
         assert seen.min() == pytest.approx(ring.min(), abs=0.6 * rendered.pitch_px)
@@ -73,13 +106,19 @@ def test_cells_of_any_size_are_found(pitch: tuple[float, float]) -> None:
 @pytest.mark.parametrize("pitch", [(12.0, 15.0), (19.0, 23.0), (30.0, 40.0), (50.0, 60.0)])
 def test_where_comb_ends_is_told_all_around(pitch: tuple[float, float]) -> None:
     rendered = scene_of(pitch)
-    drawn = comb_picture(rendered.picture)
-    assert drawn is not None
-    truth = rendered.truth_px
-    off = distances_to(drawn[1].border, truth) / rendered.pitch_px
+    border, truth = border_of(comb_picture(rendered.picture)), rendered.truth_px
+    off = distances_to(border, truth) / rendered.pitch_px
     assert np.median(off) < 0.08
     assert np.quantile(off, 0.95) < 0.3
-    assert nearest(places_along(truth, 1.0), drawn[1].border).max() < 1.5 * rendered.pitch_px
+    assert nearest(places_along(truth, 1.0), border).max() < 1.5 * rendered.pitch_px
+
+
+def test_an_outline_is_told_all_around() -> None:
+    rendered = told_scene()
+    outline, truth = outline_of(comb_picture(rendered.picture)), rendered.truth_px
+    off = distances_to(places_along(outline, 1.0), truth) / rendered.pitch_px
+    assert np.quantile(off, 0.95) < 0.2
+    assert max(off.max(), distances_to(places_along(truth, 1.0), outline).max() / rendered.pitch_px) < 0.5
 
 
 @pytest.mark.parametrize("kind", ["undisturbed", "wood", "brushed", "slots", "old_cuts", "expanded", "cork", "ribbed"])
@@ -118,12 +157,7 @@ def test_where_walls_dont_show_in_comb_others_are_drawn(monkeypatch: pytest.Monk
         seen.wall[:, : seen.wall.shape[1] // 2] *= 0.1
 
     told_otherwise(monkeypatch, with_filled_cells)
-    drawn = comb_picture(rendered.picture)
-    assert drawn is not None
-    block = area_coverage(rendered.truth_px.rings, *rendered.picture.shape[1::-1]) > 0.5
-    within = cv2.distanceTransform(block.astype(np.uint8), cv2.DIST_L2, 5) > rendered.pitch_px
-    from_walls = cv2.distanceTransform((drawn[0] < 100).astype(np.uint8), cv2.DIST_L2, 5)
-    assert from_walls[within].max() < rendered.pitch_px
+    assert farthest_from_walls(comb_picture(rendered.picture), rendered) < rendered.pitch_px
 
 
 def test_on_a_dark_table_comb_is_drawn_too() -> None:
@@ -135,18 +169,15 @@ def test_comb_of_fine_cells_in_a_large_picture_is_drawn() -> None:
     """At 16 pixels a pitch the picture has 6 million, what shows comb a fraction of them."""
     rendered = scene_of((12.0, 15.0))
     wide = cv2.copyMakeBorder(rendered.picture, 700, 100, 100, 700, cv2.BORDER_CONSTANT, value=(80, 80, 80))
-    drawn = comb_picture(wide)
-    assert drawn is not None
-    off = distances_to(drawn[1].border - [100.0, 700.0], rendered.truth_px) / rendered.pitch_px
+    off = distances_to(border_of(comb_picture(wide)) - [100.0, 700.0], rendered.truth_px) / rendered.pitch_px
     assert np.quantile(off, 0.9) < 0.3
 
 
 def test_a_thing_within_the_comb_may_be_a_hole_and_is_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    rendered = scene_of((19.0, 23.0))
-    assert comb_picture(rendered.picture) is not None
-
+    picture = scene_of((19.0, 23.0)).picture
+    assert is_drawn(picture)
     told_otherwise(monkeypatch, lambda seen: hide_within(seen, (20, 20), 1.0))
-    assert comb_picture(rendered.picture) is None
+    assert not is_drawn(picture)
 
 
 def test_what_lies_away_from_the_block_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,25 +186,42 @@ def test_what_lies_away_from_the_block_does_not_matter(monkeypatch: pytest.Monke
         seen.comb[14:40, 30:40], seen.thing[14:40, 30:40] = 0.0, 1.0
 
     told_otherwise(monkeypatch, with_swarf_beneath_a_thing)
-    assert comb_picture(scene_of((19.0, 23.0)).picture) is not None
+    assert is_drawn(scene_of((19.0, 23.0)).picture)
+
+
+def test_where_the_network_that_knows_more_things_sees_one_at_the_edge_no_outline_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drawn = comb_picture(told_scene().picture)
+    assert outline_of(drawn)
+    covers = drawing.comb_and_covers
+
+    def covered(light: np.ndarray, pitch: float) -> np.ndarray:
+        comb, thing = covers(light, pitch)
+        return np.stack((comb, np.maximum(thing, 0.3)))
+
+    monkeypatch.setattr(drawing, "comb_and_covers", covered)
+    with pytest.raises(NoBlockFound, match="nothing over its edge"):
+        outline_of(drawn)
 
 
 def test_ink_narrower_than_a_cell_within_the_block_is_comb(monkeypatch: pytest.MonkeyPatch) -> None:
     rendered = scene_of((19.0, 23.0))
-    plain = comb_picture(rendered.picture)
     told_otherwise(monkeypatch, lambda seen: hide_within(seen, (30, 6), 0.1))
-    inked = comb_picture(rendered.picture)
-    assert len(border_of(inked)) == pytest.approx(len(border_of(plain)), abs=2)
+    assert farthest_from_walls(comb_picture(rendered.picture), rendered) < rendered.pitch_px
 
 
 def test_a_cable_narrower_than_a_cell_within_the_block_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     told_otherwise(monkeypatch, lambda seen: hide_within(seen, (30, 6), 0.9))
-    assert comb_picture(scene_of((19.0, 23.0)).picture) is None
+    assert not is_drawn(scene_of((19.0, 23.0)).picture)
 
 
 def test_beside_glare_nothing_is_drawn() -> None:
     rendered = scene_of((19.0, 23.0))
     corner = rendered.truth_px.exterior[0]
     lit = cv2.circle(rendered.picture.copy(), np.rint(corner).astype(int).tolist(), 60, (255, 255, 255), -1)
-    assert comb_picture(rendered.picture) is not None
-    assert comb_picture(lit) is None
+    assert is_drawn(rendered.picture)
+    assert not is_drawn(lit)
+    drawn = comb_picture(lit)
+    with pytest.raises(NoBlockFound, match="nothing over its edge"):
+        outline_of(drawn)

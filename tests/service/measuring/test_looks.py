@@ -32,14 +32,14 @@ def found_by(drawn: Measurement | Exception, accepted: Measurement) -> Measureme
     """What counts where a plain look saw no block, drawn walls showed this, and later looks find what they accept."""
 
     def outlined(look: Look) -> Measurement:
-        if look.network and not look.by_border:
+        if look.network and look.by == "ends":
             if isinstance(drawn, Exception):
                 raise drawn
             return drawn
         return accepted
 
     first = NoBlockFound("no block found")
-    looks = iter([DRAWN, DRAWN._replace(by_border=True), PLAIN._replace(least_rise=1.0)])
+    looks = iter([DRAWN, DRAWN._replace(by="border"), PLAIN._replace(least_rise=1.0)])
     return best(first, looks, outlined, lambda _: None)
 
 
@@ -52,3 +52,18 @@ def test_where_drawn_walls_close_their_cells_no_later_look_counts(accepted: Meas
     assert isinstance(found_by(EdgeContradicted("closed", "mixed"), accepted), NoBlockFound)
     unsure = replace(accepted, edge="mixed", findings=((Reason.UNCERTAINTY_TOO_LARGE, "unsure"),))
     assert isinstance(found_by(unsure, accepted), NoBlockFound)
+
+
+def test_where_something_lies_over_drawn_ends_of_walls_two_networks_alone_may_tell_an_outline(
+    accepted: Measurement,
+) -> None:
+    asked: list[str] = []
+
+    def outlined(look: Look) -> Measurement:
+        asked.append(look.by if look.network else "walls")
+        return replace(accepted, findings=((Reason.EDGE_COVERED, "a thing"),))
+
+    looks = iter([DRAWN, DRAWN._replace(by="border"), DRAWN._replace(by="networks"), PLAIN._replace(least_rise=1.0)])
+    first = NoBlockFound("no block found")
+    assert best(first, looks, outlined, lambda _: None) is first
+    assert asked == ["ends", "networks"]

@@ -14,11 +14,11 @@ from contour.acceptance.trace_check import CheckedTrace
 from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.edge.stretches import Stretch
 from contour.errors import ParameterError, PictureError
-from contour.geometry.rings import area, farthest, hausdorff, perimeter
+from contour.geometry.rings import Contour, area, farthest, hausdorff, perimeter
 from contour.synthetic import render
 from contour.tracing import tracing
 from contour.tracing.trace import Trace, TraceSettings
-from contour.walls.see_block import Source
+from contour.walls.see_block import Outline, Source
 from service.config.plain_recipe import PlainRecipe
 from service.config.recipes import Recipe
 from service.measuring import measure
@@ -300,23 +300,33 @@ def test_what_lies_over_an_edge_on_such_a_table_is_not_drawn_away(cover: Drawn, 
     assert measured(render(scene)).findings
 
 
-def test_where_something_lies_over_an_edge_that_is_drawn_the_border_of_comb_is_not_asked(
+def test_where_something_lies_over_an_edge_that_is_drawn_networks_are_asked_and_strong_walls_are_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    by_border: list[bool] = []
+    looked: list[tuple[bool, float | None]] = []
 
-    def checked(*looked: Any, **known: Any) -> CheckedTrace:
-        source = looked[-1]
-        by_border.append(source is not None and source.border is not None)
-        return trace_check.checked_trace(*looked, **known)
+    def checked(picture: np.ndarray, settings: TraceSettings, *known: Any, **more: Any) -> CheckedTrace:
+        source = known[-1]
+        looked.append((source is not None and source.outline is not None, settings.least_rise))
+        return trace_check.checked_trace(picture, settings, *known, **more)
 
-    border = np.empty((0, 2))
-    monkeypatch.setattr(measure, "comb_picture", lambda picture: (picture, Source(picture, border)))
+    rendered = render(shop_floor_scene("tape", 1_880_001, alone=True).scene)
+    outline = Outline(Contour(rendered.truth_px.exterior + 0.6 * rendered.pitch_px), rendered.pitch_px, 1.0)
+
+    class Drawn:
+        drawn = rendered.picture
+
+        def walled(self) -> Source:
+            return Source(rendered.picture)
+
+        def outlined(self) -> Source:
+            return Source(rendered.picture, outline=outline)
+
+    monkeypatch.setattr(measure, "comb_picture", lambda _picture: Drawn())
     monkeypatch.setattr(measure, "checked_trace", checked)
-    seen = measured(render(shop_floor_scene("tape", 1_880_001, alone=True).scene))
+    seen = measured(rendered)
     assert Reason.EDGE_COVERED in seen.reasons
-    assert len(by_border) > 1
-    assert not any(by_border)
+    assert looked == [(False, None), (False, None), (True, None)]
 
 
 def test_on_a_tables_grain_a_block_is_found_by_its_strong_walls() -> None:

@@ -16,8 +16,9 @@ from contour.image.pixel_sampling import sample_at
 from contour.segmentation.network import PITCH_PX, Segments
 
 _SURE, _SPECK_PX = 0.5, 3
-# Holes have so many square pitches at least; what is smaller is a cell. So large a piece beside the block is another.
-_HOLE, _ANOTHER = 1.0, 0.02
+# Holes have so many square pitches at least; what is smaller is a cell. Below some more, a disc of 2.2 cells, it may be
+# cells that are lost. So large a piece beside the block is another; a block lies so far from the picture's border.
+_HOLE, _SURE_HOLE, _ANOTHER, _FROM_BORDER = 1.0, 3.8, 0.02, 0.5
 # The borders that two networks tell lie no farther apart, pitches. A disc without walls in it, in the block, has that
 # radius at most. Where walls are drawn the picture shows some: they go together that well, within so many pitches.
 _APART, _BARE, _SEEN_WALL, _TOGETHER, _EVEN_PITCHES, _WALL_PITCHES = 0.45, 0.7, 0.3, 0.5, 0.5, 0.375
@@ -53,13 +54,20 @@ def comb_outline(light: Bytes, seen: Segments, other: Float32s) -> tuple[Contour
 
 def _block_of(comb: Float32s) -> Bools:
     """The largest piece of comb, (h, w), with what is too small for a hole. Raises NoBlockFound where another piece is
-    no speck beside it.
+    no speck beside it, where it goes on to the picture's border, and where a hole may be cells that are lost.
     """
     pieces, area = _pieces(comb)
     *_, another, largest = sorted((*area.tolist(), 0))
     if another > _ANOTHER * largest:
         raise NoBlockFound("no block found: a network sees more than one piece of comb")
-    return _whole(pieces == int(area.argmax()) if largest else np.zeros(comb.shape, np.bool_))
+    block = _whole(pieces == int(area.argmax()) if largest else np.zeros(comb.shape, np.bool_))
+    rim = round(_FROM_BORDER * PITCH_PX)
+    if np.count_nonzero(block) > np.count_nonzero(block[rim:-rim, rim:-rim]):
+        raise NoBlockFound("no block found: comb goes on to the last pixels of what a network was asked about")
+    _, holes = pieces_and_areas((~block).astype(np.uint8), 4)
+    if holes[1:].min() < _SURE_HOLE * PITCH_PX**2:
+        raise NoBlockFound("no block found: a network sees a hole so small that cells may be lost there")
+    return block
 
 
 def _same_of(comb: Float32s, block: Bools) -> Bools:

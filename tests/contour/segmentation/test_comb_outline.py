@@ -116,3 +116,20 @@ def test_a_tip_that_a_network_leaves_out_is_refused() -> None:
     light, told = seen(POINTED)
     with pytest.raises(NoBlockFound, match="tip of its border"):
         comb_outline(light, told, told.comb)
+
+
+def test_comb_that_goes_on_to_the_last_pixels_is_refused() -> None:
+    light, told = seen(np.where(SQUARE == 60.0, -20.0, SQUARE))
+    with pytest.raises(NoBlockFound, match="last pixels"):
+        comb_outline(light, told, told.comb)
+
+
+@pytest.mark.parametrize(("half", "refused"), [(14.0, True), (18.0, False)])
+def test_a_hole_of_two_cells_may_be_cells_that_are_lost(half: float, refused: bool) -> None:
+    square = [200.0, 200.0] + half * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]])
+    light, told = seen(SQUARE, square)
+    if refused:
+        with pytest.raises(NoBlockFound, match="cells may be lost"):
+            comb_outline(light, told, told.comb)
+    else:
+        assert len(comb_outline(light, told, told.comb)[0].holes) == 1

@@ -11,6 +11,7 @@ import pytest
 
 from contour.errors import NoBlockFound, ParameterError, PictureError
 from contour.geometry.agreement import places_along
+from contour.geometry.rings import oriented_contour, perimeter
 from contour.geometry.signed_distance import nearest
 from contour.synthetic import (
     CellGeometry,
@@ -28,7 +29,7 @@ from contour.synthetic import (
 )
 from contour.tracing.trace import Trace, TraceSettings
 from contour.tracing.wall_tips import wall_tips
-from contour.walls.see_block import Source
+from contour.walls.see_block import Outline, Source
 
 SETTINGS = TraceSettings(method="wall-tips")
 CAMERA = camera_above(800, 600, 0.375, distance_mm=1500.0)
@@ -285,3 +286,24 @@ def test_where_what_lies_beside_drawn_comb_is_no_table_nothing_is_traced(level: 
             wall_tips(left, SETTINGS, source=source)
     else:
         assert wall_tips(left, SETTINGS, source=source).contour.exterior[:, 0].max() < half + 0.5 * pitch
+
+
+def test_an_outline_that_was_told_is_the_contour_all_seen() -> None:
+    rendered = block()
+    outline = Outline(rendered.truth_px, rendered.pitch_px, 1.5)
+    found = wall_tips(rendered.picture, SETTINGS, source=Source(rendered.picture, outline=outline))
+    assert found.contour == oriented_contour(rendered.truth_px, counter_clockwise=False)
+    assert (found.uncertainty_px, found.pitch_px, found.edge) == (1.5, rendered.pitch_px, "cut")
+    told = [(part.ring, part.from_px, part.to_px, part.state, part.bound_px) for part in found.evidence or ()]
+    lengths = [perimeter(ring) for ring in found.contour.rings]
+    assert told == [(number, 0.0, length, "seen", 1.5) for number, length in enumerate(lengths)]
+
+
+def test_an_outline_that_was_told_beside_what_is_no_table_is_refused() -> None:
+    rendered = block()
+    outline = Outline(rendered.truth_px, rendered.pitch_px, 1.5)
+    left, top = rendered.truth_px.exterior.min(axis=0)
+    sheet = rendered.picture.copy()
+    sheet[int(top) : int(top) + 200, : int(left)] = 230
+    with pytest.raises(NoBlockFound, match="something lies beside it"):
+        wall_tips(sheet, SETTINGS, source=Source(sheet, outline=outline))

@@ -25,6 +25,7 @@ __all__ = ["no_task_is_left", "nothing_is_left", "pytest_collection_modifyitems"
 
 FIRST = (
     "tests/contracts/test_camera_contract.py",
+    "tests/docs/test_tutorial.py",
     "tests/system/",
     "tests/hil/",
     "tests/soak/",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 
@@ -17,26 +15,9 @@ from benchmarks.fourth_hand.tables import MARKS, soil, table_top
 from benchmarks.fourth_hand.textures import blur, paint
 from benchmarks.fourth_hand.things import OVER, across, beside, edge_place
 from benchmarks.fourth_hand.view import look
-from contour.geometry.arrays import Bools, Bytes, Float64s
+from benchmarks.third_hand.scene import Scene
 
 KINDS: tuple[str, ...] = (*OVER, *INNOCENT)
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """A picture, (H, W) grey or (H, W, 3) BGR, 700 to 1500 pixels wide, and what is true of it.
-
-    `rings` are the block's exterior and then its holes, each (N, 2) in pixels, x before y, of its top; `pitch_px` is
-    its cells'. The rest is (H, W): where a thing lies over the block, and goes on beside it (`hidden`), where walls'
-    tops are seen (`walls`), and what lies within the block, holes not, under things too (`comb`).
-    """
-
-    picture: Bytes
-    rings: tuple[Float64s, ...]
-    pitch_px: float
-    hidden: Bools
-    walls: Bools
-    comb: Bools
 
 
 def scene(kind: str, seed: int) -> Scene:

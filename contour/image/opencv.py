@@ -111,6 +111,11 @@ def grown(picture: Anything, shape: tuple[int, ...]) -> Anything:
     return cast(Anything, cv2.resize(picture, (shape[1], shape[0]), interpolation=cv2.INTER_LINEAR))
 
 
+def sized(picture: Anything, shape: tuple[int, ...]) -> Anything:
+    """The picture at another shape (H, W), shrunk or grown by its number of pixels."""
+    return (grown if np.prod(shape) > picture.size else shrunk_to)(picture, shape)
+
+
 def enlarged(picture: Anything, times: int) -> Anything:
     """The picture so many times as large, (times · H, times · W), its edges as sharp as they were."""
     return cast(Anything, cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_CUBIC))

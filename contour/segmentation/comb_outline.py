@@ -60,12 +60,11 @@ def _block_of(comb: Float32s) -> Bools:
     *_, another, largest = sorted((*area.tolist(), 0))
     if another > _ANOTHER * largest:
         raise NoBlockFound("no block found: a network sees more than one piece of comb")
-    block = _whole(pieces == int(area.argmax()) if largest else np.zeros(comb.shape, np.bool_))
+    block, holes = _whole(pieces == int(area.argmax()) if largest else np.zeros(comb.shape, np.bool_))
     rim = round(_FROM_BORDER * PITCH_PX)
     if np.count_nonzero(block) > np.count_nonzero(block[rim:-rim, rim:-rim]):
         raise NoBlockFound("no block found: comb goes on to the last pixels of what a network was asked about")
-    _, holes = pieces_and_areas((~block).astype(np.uint8), 4)
-    if holes[1:].min() < _SURE_HOLE * PITCH_PX**2:
+    if (holes < _SURE_HOLE * PITCH_PX**2).any():
         raise NoBlockFound("no block found: a network sees a hole so small that cells may be lost there")
     return block
 
@@ -75,7 +74,7 @@ def _same_of(comb: Float32s, block: Bools) -> Bools:
     pieces, area = _pieces(comb)
     there = np.bincount(pieces[block], minlength=len(area)) > 0
     there[0] = False
-    return _whole(there[pieces])
+    return _whole(there[pieces])[0]
 
 
 def _pieces(comb: Float32s) -> tuple[Int32s, Int64s]:
@@ -83,10 +82,11 @@ def _pieces(comb: Float32s) -> tuple[Int32s, Int64s]:
     return pieces_and_areas(opened((comb > _SURE).astype(np.uint8), _SPECK_PX), 8)
 
 
-def _whole(block: Bools) -> Bools:
-    """A block with what is too small for a hole in it."""
+def _whole(block: Bools) -> tuple[Bools, Int64s]:
+    """A block with what is too small for a hole in it, and the areas of what is not, what lies around it too."""
     gaps, size = pieces_and_areas((~block).astype(np.uint8), 4)
-    return np.asarray(block | (size < _HOLE * PITCH_PX**2)[gaps], np.bool_)
+    small = size < _HOLE * PITCH_PX**2
+    return np.asarray(block | small[gaps], np.bool_), size[1:][~small[1:]]
 
 
 def _apart(one: Bools, other: Bools) -> Float32s:
@@ -105,17 +105,22 @@ def _apart(one: Bools, other: Bools) -> Float32s:
 def _check_walls(light: Bytes, wall: Float32s, block: Bools) -> None:
     """Raise NoBlockFound where a block shows no walls, or none where walls are drawn."""
     inner = cv2.distanceTransform(block.astype(np.uint8), cv2.DIST_L2, 5)
-    bare = (inner > _BARE * PITCH_PX) & (within(wall > _SEEN_WALL, _BARE * PITCH_PX) == 0)
-    together = _together(light.astype(np.float32), wall)[inner > _WITHIN * PITCH_PX]
-    if bare.any() or not len(together):
+    bare, asked = (inner > _BARE * PITCH_PX) & without_walls(wall, _BARE), inner > _WITHIN * PITCH_PX
+    if bare.any() or not asked.any():
         raise NoBlockFound("no block found: a network sees comb where it sees no walls")
-    least = float((together * np.sign(np.median(together))).min())
-    rooms = np.sort(pieces_and_areas((block & (wall < _PARTS)).astype(np.uint8), 4)[1])
+    rooms = pieces_and_areas((block & (wall < _PARTS)).astype(np.uint8), 4)[1]
     cells = rooms[rooms > _SPECK_PX**2]
-    if not len(cells) or cells[-1] > _LARGEST * median(cells):
+    if not len(cells) or cells.max() > _LARGEST * median(cells):
         raise NoBlockFound("no block found: a network sees comb with cells missing, or with a hole too small to tell")
+    together = _together(light.astype(np.float32), wall)[asked]
+    least = float((together * np.sign(np.median(together))).min())
     if least < _TOGETHER:
         raise NoBlockFound(f"no block found: a network sees walls where the picture hardly shows any ({least:.2f})")
+
+
+def without_walls(wall: Float32s, pitches: float) -> Bools:
+    """Where no wall surely is within so many pitches in a map of them, (h, w)."""
+    return np.asarray(within(wall > _SEEN_WALL, pitches * PITCH_PX) == 0, np.bool_)
 
 
 def _together(light: Float32s, wall: Float32s) -> Float32s:
@@ -133,24 +138,30 @@ def _together(light: Float32s, wall: Float32s) -> Float32s:
 def _outline(block: Bools, comb: Float32s) -> Contour:
     """The border of a block in a map of comb, (h, w) each, samples."""
     found = cv2.findContours(block.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)[0]
-    rings = [_with_corners(_evened(_on_border(ring[:, 0].astype(np.float64), comb))) for ring in found]
+    even = np.asarray(cv2.GaussianBlur(comb, (0, 0), 1.0), np.float32)
+    pixels = [ring[:, 0].astype(np.float64) for ring in found]
+    ways = np.split(outward(even, np.concatenate(pixels)), np.cumsum([len(ring) for ring in pixels])[:-1])
+    rings = [_with_corners(_evened(_on_border(*ring, even))) for ring in zip(pixels, ways, strict=True)]
     rings.sort(key=lambda ring: -abs(signed_area(ring)))
     return Contour(rings[0], tuple(rings[1:]))
 
 
-def _on_border(ring: Ring, comb: Float32s) -> Ring:
-    """The pixels at a block's border, (N, 2), each moved to where the map falls through half."""
-    even = np.asarray(cv2.GaussianBlur(comb, (0, 0), 1.0), np.float32)
-    slopes = [np.asarray(cv2.Sobel(even, cv2.CV_32F, *axis), np.float32) for axis in ((1, 0), (0, 1))]
-    falls = -np.column_stack([sample_at(slope, ring[:, 0], ring[:, 1]) for slope in slopes])
-    outward = falls / np.maximum(np.hypot(falls[:, :1], falls[:, 1:]), 1e-6)
-    there = ring[:, None] + _ACROSS_PX[:, None] * outward[:, None]
-    sure = sample_at(even, there[..., 0], there[..., 1])
+def outward(comb: Float32s, points: Float64s) -> Float64s:
+    """Which way a map of comb, (h, w), falls at points, (N, 2): unit vectors, (N, 2)."""
+    slopes = [np.asarray(cv2.Sobel(comb, cv2.CV_32F, *axis), np.float32) for axis in ((1, 0), (0, 1))]
+    falls = -np.column_stack([sample_at(slope, points[:, 0], points[:, 1]) for slope in slopes])
+    return np.asarray(falls / np.maximum(np.hypot(falls[:, :1], falls[:, 1:]), 1e-6), np.float64)
+
+
+def _on_border(ring: Ring, ways: Float64s, comb: Float32s) -> Ring:
+    """The pixels at a block's border, (N, 2), each moved that way to where an even map falls through half."""
+    there = ring[:, None] + _ACROSS_PX[:, None] * ways[:, None]
+    sure = sample_at(comb, there[..., 0], there[..., 1])
     ends = (sure[:, 1:] <= _SURE) & (sure[:, :-1] > _SURE)
     first, row = np.argmax(ends, axis=1), np.arange(len(ring))
     before, after = sure[row, first], sure[row, first + 1]
     far = _ACROSS_PX[first] + np.diff(_ACROSS_PX)[first] * (before - _SURE) / np.maximum(before - after, 1e-6)
-    return np.asarray(ring + np.where(ends.any(axis=1), far, 0.5)[:, None] * outward, np.float64)
+    return np.asarray(ring + np.where(ends.any(axis=1), far, 0.5)[:, None] * ways, np.float64)
 
 
 def _evened(ring: Ring) -> Ring:

@@ -11,9 +11,8 @@ import numpy as np
 from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s
 from contour.geometry.rings import Contour
-from contour.image.opencv import box_mean, deep, grown, opened, pieces_and_areas, shrunk_to, within
-from contour.image.pixel_sampling import sample_at
-from contour.segmentation.comb_outline import comb_outline
+from contour.image.opencv import box_mean, deep, grown, opened, pieces_and_areas, sized
+from contour.segmentation.comb_outline import comb_outline, outward, without_walls
 from contour.segmentation.glare import glare
 from contour.segmentation.network import (
     LIGHT_PITCH_PX,
@@ -56,29 +55,34 @@ _OVER = "no block found: a network sees no comb with nothing over its edge"
 _DARK, _WALL = 12.0, 230.0
 # The border of comb is told every so many samples, across its slope over so many; shorter ones are specks.
 _BORDER_PX, _EVEN_PX, _SHORTEST_PX = 4, 2.0, 40
-# What is surer than this is a wall, no place in a cell is so many pitches from one; and the sum of waves along walls.
-_SEEN_WALL, _ROOM, _ALONG_WALLS = 0.3, 0.65, -0.8
+# No place in a cell is so many pitches from a wall; and the sum of waves along walls.
+_ROOM, _ALONG_WALLS = 0.65, -0.8
 
 
 @dataclass(frozen=True, eq=False)
 class CombPicture:
-    """The comb in a picture: `drawn` with light walls, all else dark, (H, W), uint8, and what it was drawn from, with
-    the border of comb. `seen` is what a network tells of it, (h, w), in the picture's `light`, (H, W); `over`: whether
-    it sees what may be a thing over the edge.
+    """The comb in a picture: `drawn` with light walls, all else dark, (H, W), uint8. `seen` is what a network tells of
+    the picture's `light`, (H, W), at another size, (h, w), `whole` how surely there is comb, with ink on it; `over`:
+    whether it sees what may be a thing over the edge.
     """
 
-    drawn: Bytes
-    source: Source
+    picture: Bytes
     light: Bytes
     pitch_px: float
     seen: Segments
+    whole: Float32s
+    drawn: Bytes
     over: bool
 
     def walled(self) -> Source:
-        """What it was drawn from, with the border of comb. Raises NoBlockFound where a thing may lie over that."""
+        """What it was drawn from, for ends of walls to tell. Raises NoBlockFound where a thing may lie over them."""
         if self.over:
             raise NoBlockFound(_OVER)
-        return self.source
+        return Source(self.picture)
+
+    def bordered(self) -> Source:
+        """What it was drawn from, with the border of comb. Raises NoBlockFound where a thing may lie over that."""
+        return replace(self.walled(), border=self._in_picture(_border(self.whole)))
 
     def outlined(self) -> Source:
         """What it was drawn from, with the outline that two networks tell. Raises NoBlockFound where they do not agree,
@@ -88,14 +92,18 @@ class CombPicture:
         covers = comb_and_covers(self.light, self.pitch_px)
         other, cover = (np.asarray(grown(one, shape), np.float32) for one in covers)
         thing = np.asarray(box_mean(cover, _MEAN_PX) > _LEAST_COVER, np.bool_)
-        if _something_over(comb > _SURE, thing, self.source.picture):
+        if _something_over(comb > _SURE, thing, self.picture):
             raise NoBlockFound(_OVER)
-        light = (grown if comb.size > self.light.size else shrunk_to)(self.light, shape)
-        contour, apart = comb_outline(light, self.seen, other)
-        size = np.array(shape[::-1]) / self.light.shape[::-1]
-        exterior, *holes = ((ring + 0.5) / size - 0.5 for ring in contour.rings)
-        outline = Outline(Contour(exterior, tuple(holes)), self.pitch_px, apart * self.pitch_px)
-        return Source(self.source.picture, outline=outline)
+        contour, apart = comb_outline(sized(self.light, shape), self.seen, other)
+        exterior, *holes = map(self._in_picture, contour.rings)
+        return Source(
+            self.picture, outline=Outline(Contour(exterior, tuple(holes)), self.pitch_px, apart * self.pitch_px)
+        )
+
+    def _in_picture(self, samples: Float64s) -> Float64s:
+        """Places in the picture of places in what the network tells, (N, 2)."""
+        size = np.array(self.light.shape[::-1]) / self.whole.shape[::-1]
+        return np.asarray((samples + 0.5) * size - 0.5, np.float64)
 
 
 def comb_picture(picture: Bytes) -> CombPicture | None:
@@ -125,10 +133,7 @@ def comb_picture(picture: Bytes) -> CombPicture | None:
     thing = np.asarray(box_mean(found.thing, _MEAN_PX) > _LEAST_THING, np.bool_)
     whole = replace(found, comb=_without_gaps(found.comb, thing))
     over = _something_over(whole.comb > _SURE, thing, picture)
-    drawn = _drawn(whole)
-    sized = (grown if drawn.size < light.size else shrunk_to)(drawn, light.shape)
-    border = (_border(whole.comb) + 0.5) * (np.array(light.shape[::-1]) / drawn.shape[::-1]) - 0.5
-    return CombPicture(sized, Source(picture, border), light, pitch_px, found, over)
+    return CombPicture(picture, light, pitch_px, found, whole.comb, sized(_drawn(whole), light.shape), over)
 
 
 def _pitches(light: Bytes) -> list[tuple[float, tuple[slice, slice]]]:
@@ -216,13 +221,11 @@ def _border(comb: Float32s) -> Float64s:
     every = [ring[::_BORDER_PX, 0] for ring in rings if len(ring) > _SHORTEST_PX]
     points = np.concatenate([np.empty((0, 2)), *every])
     even = cv2.GaussianBlur(sure.astype(np.float32), (0, 0), _EVEN_PX)
-    slopes = [np.asarray(cv2.Sobel(even, cv2.CV_32F, *axis), np.float32) for axis in ((1, 0), (0, 1))]
-    falls = -np.column_stack([sample_at(slope, points[:, 0], points[:, 1]) for slope in slopes])
-    outward = falls / np.maximum(np.hypot(falls[:, :1], falls[:, 1:]), 1e-6)
-    within = points - _EVEN_PX * outward
-    far = dark_beyond(np.asarray(255 - sure, np.uint8), within, outward, midway=127.5, reach=2.0 * _EVEN_PX)
+    ways = outward(np.asarray(even, np.float32), points)
+    inner = points - _EVEN_PX * ways
+    far = dark_beyond(np.asarray(255 - sure, np.uint8), inner, ways, midway=127.5, reach=2.0 * _EVEN_PX)
     found = np.isfinite(far) & (far > 0.0)
-    return np.asarray(within[found] + far[found, None] * outward[found], np.float64)
+    return np.asarray(inner[found] + far[found, None] * ways[found], np.float64)
 
 
 def _drawn(seen: Segments) -> Bytes:
@@ -230,7 +233,7 @@ def _drawn(seen: Segments) -> Bytes:
     walls of its own.
     """
     comb = seen.comb > _SURE
-    bare = comb & (within(seen.wall > _SEEN_WALL, _ROOM * PITCH_PX) == 0)
+    bare = comb & without_walls(seen.wall, _ROOM)
     filled = opened(bare.astype(np.uint8), _SPECK_PX) > 0
     wall = np.where(filled, _lattice(comb.shape), seen.wall) if filled.any() else seen.wall
     return (np.where(comb, _WALL * wall, np.float32(0.0)) + _DARK).astype(np.uint8)

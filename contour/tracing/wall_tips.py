@@ -18,7 +18,7 @@ from contour.errors import NoBlockFound, ParameterError
 from contour.geometry.arrays import Bytes, Float64s
 from contour.geometry.rectifier import Rectifier
 from contour.geometry.ring_lengths import RingLengths
-from contour.geometry.rings import Contour, Ring, oriented, oriented_contour, perimeter, signed_area
+from contour.geometry.rings import Contour, Ring, oriented_contour, perimeter, signed_area
 from contour.image.opencv import grey
 from contour.material.floor_edge import floor_edge
 from contour.outline.uncertainty import uncertainty
@@ -182,8 +182,9 @@ def _told(outline: Outline, light: Bytes, picture: Bytes) -> Trace:
     shows something beside it that is no table, nor a shadow.
     """
     pitch_px = outline.pitch_px
+    # Its witnesses run with the material on their left in pixels.
     rings = tuple(
-        _told_ring(oriented(ring, number == 0), pitch_px) for number, ring in enumerate(outline.contour.rings)
+        _told_ring(ring, pitch_px) for ring in oriented_contour(outline.contour, counter_clockwise=True).rings
     )
     _check_beyond(picture, BlockEvidence(rings, pitch_px, 0.0, "bright", 0.0, 0.0, 0.0, 0.0))
     # As any other is traced, with the material on its left seen with y up.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -48,10 +47,8 @@ class Look(NamedTuple):
         on_stage("network")
         if drawn is None:
             raise NoBlockFound("no block found: a network sees no comb")
-        if self.by == "networks":
-            return drawn.drawn, drawn.outlined()
-        source = drawn.walled()
-        return drawn.drawn, source if self.by == "border" else replace(source, border=None)
+        told = {"ends": drawn.walled, "border": drawn.bordered, "networks": drawn.outlined}[self.by]
+        return drawn.drawn, told()
 
     def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
         """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""

@@ -58,7 +58,7 @@ def is_drawn(picture: np.ndarray) -> bool:
     drawn = comb_picture(picture)
     assert drawn is not None
     with contextlib.suppress(NoBlockFound):
-        return drawn.walled().border is not None
+        return drawn.bordered().border is not None
     return False
 
 
@@ -72,7 +72,7 @@ def farthest_from_walls(drawn: CombPicture | None, rendered: Rendered) -> float:
 
 def border_of(drawn: CombPicture | None) -> Float64s:
     assert drawn is not None
-    border = drawn.walled().border
+    border = drawn.bordered().border
     assert border is not None
     return border
 

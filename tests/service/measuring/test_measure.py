@@ -319,6 +319,8 @@ def test_where_something_lies_over_an_edge_that_is_drawn_networks_are_asked_and_
         def walled(self) -> Source:
             return Source(rendered.picture)
 
+        bordered = walled
+
         def outlined(self) -> Source:
             return Source(rendered.picture, outline=outline)
 

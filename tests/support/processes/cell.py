@@ -15,7 +15,7 @@ class Cell:
     """A service and a controller, each of which may be killed and started again.
 
     camera, calibration: without either it sees drawn combs, small ones; where only the camera is told, the calibration
-    is that of the samples.
+    is that of the samples. timeout_s: three seconds, as a busy machine's processes may be still for one.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class Cell:
         more: str = "",
         recipe: int = 0,
         scenario: str = "",
-        timeout_s: float = 0.5,
+        timeout_s: float = 3.0,
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
         self._trigger_every += ("--recipe", str(recipe))

@@ -43,7 +43,6 @@ def cell(tmp_path_factory: pytest.TempPathFactory, bare: BareCell) -> Iterator[t
         calibration=folder / "calibration.yaml",
         trigger_every_s=None,
         more=f"page: {{port: {port}, token_file: tokens}}\ntable: {{file: table.npz}}\n",
-        timeout_s=3,  # the probe asks for a longer one where a single read takes a third of it, as on a busy machine
     )
     try:
         yield started, Client(port)

@@ -14,7 +14,7 @@ def test_what_the_probe_would_change_goes_into_the_configuration_and_its_comment
     token_file(tmp_path)
     more = f"page: {{port: {port}, token_file: tokens}}  # for the panel\n"
     link = ", word_order: little"
-    cell = Cell(tmp_path, triggers="[]", trigger_every_s=None, link=link, more=more, timeout_s=3)
+    cell = Cell(tmp_path, triggers="[]", trigger_every_s=None, link=link, more=more)
     client, config = Client(port), tmp_path / "config.yaml"
     try:
         until(lambda: "page: http" in cell.service.text, what="the page")

@@ -10,10 +10,14 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from benchmarks.fifth_hand.scene import KINDS as FIFTH_KINDS
+from benchmarks.fifth_hand.scene import scene as fifth_scene
 from benchmarks.fourth_hand.scene import KINDS as FOURTH_KINDS
 from benchmarks.fourth_hand.scene import scene as fourth_scene
 from benchmarks.other_hand.scene import KINDS as OTHER_KINDS
 from benchmarks.other_hand.scene import scene as other_scene
+from benchmarks.sixth_hand.scene import KINDS as SIXTH_KINDS
+from benchmarks.sixth_hand.scene import scene as sixth_scene
 from benchmarks.third_hand.scene import KINDS as THIRD_KINDS
 from benchmarks.third_hand.scene import scene as third_scene
 from contour.geometry.arrays import Bytes, Float32s, median
@@ -36,9 +40,15 @@ KINDS = (*STRUCTURED * 3, *_OTHERS)
 _TOGETHER, SEAM_PITCHES = 0.2, 0.55
 _OWN_TOGETHER, _OTHERS_TOGETHER = ("pushed_together", "pushed_together", "offcut"), ("pair", "pair", "offcut")
 # So many are drawn by another hand; and so many of the things that lie over an edge do so on a table with structure.
-_BY_ANOTHER, _ON_STRUCTURED, _BY_MORE = 0.5, 0.5, 2.0 / 3.0
+_BY_ANOTHER, _ON_STRUCTURED, _BY_MORE = 0.5, 0.5, 0.8
 _THINGS = ("tape", "clamp", "hand_or_cable")
 _OTHER_THINGS = ("tape", "clamp", "hand", "cable")
+_MORE_HANDS = (
+    (THIRD_KINDS, third_scene),
+    (FOURTH_KINDS, fourth_scene),
+    (FIFTH_KINDS, fifth_scene),
+    (SIXTH_KINDS, sixth_scene),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +70,8 @@ class Example:
 
 
 def example(seed: int, pitch_px: float = PITCH_PX, *, more_hands: bool = False) -> Example:
-    """The example of this seed, the same for the same, with cells of about that pitch; with `more_hands` two of three
-    are drawn by hands who drew many things that lie over a block, and what looks like these.
+    """The example of this seed, the same for the same, with cells of about that pitch; with `more_hands` four of
+    five are drawn by hands who drew many things that lie over a block, and what looks like these.
     """
     rng = np.random.default_rng([seed, 77])
     if more_hands and rng.random() < _BY_MORE:
@@ -127,9 +137,8 @@ def _by_another(rng: np.random.Generator, seed: int) -> _Drawn:
 
 
 def _by_one_more(rng: np.random.Generator, seed: int) -> _Drawn:
-    third = rng.random() < 0.5
-    kind = str(rng.choice(THIRD_KINDS if third else FOURTH_KINDS))
-    one = third_scene(kind, seed) if third else fourth_scene(kind, seed)
+    kinds, draw = _MORE_HANDS[int(rng.integers(len(_MORE_HANDS)))]
+    one = draw(str(rng.choice(kinds)), seed)
     wall, comb, thing = (np.asarray(part, np.float32) for part in (one.walls, one.comb, one.hidden))
     return _Drawn(one.picture, one.pitch_px, wall, [comb], thing)
 

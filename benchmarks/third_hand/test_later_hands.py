@@ -1,4 +1,4 @@
-"""Pictures that a third and a fourth hand draw, and what they say of themselves."""
+"""Pictures that a third hand and those after it draw, and what they say of themselves."""
 
 from __future__ import annotations
 
@@ -7,17 +7,34 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.fifth_hand.scene import KINDS as FIFTH_KINDS
+from benchmarks.fifth_hand.scene import scene as fifth_scene
 from benchmarks.fourth_hand.scene import KINDS as FOURTH_KINDS
 from benchmarks.fourth_hand.scene import scene as fourth_scene
 from benchmarks.other_hand.drawings import within
+from benchmarks.sixth_hand.scene import KINDS as SIXTH_KINDS
+from benchmarks.sixth_hand.scene import scene as sixth_scene
 from benchmarks.third_hand.scene import KINDS as THIRD_KINDS
 from benchmarks.third_hand.scene import Scene
 from benchmarks.third_hand.scene import scene as third_scene
 
-SCENES = {"third": third_scene, "fourth": fourth_scene}
-KINDS = {"third": THIRD_KINDS, "fourth": FOURTH_KINDS}
-CLEAR = {"third": ("lit_holes", "cables_beside"), "fourth": ("bare", "cloth_beside")}
-COVERED = {"third": ("over_clamp", "over_clear_tape"), "fourth": ("over_hose", "over_tape_clear")}
+SCENES = {"third": third_scene, "fourth": fourth_scene, "fifth": fifth_scene, "sixth": sixth_scene}
+KINDS = {"third": THIRD_KINDS, "fourth": FOURTH_KINDS, "fifth": FIFTH_KINDS, "sixth": SIXTH_KINDS}
+CLEAR = {
+    "third": ("lit_holes", "cables_beside"),
+    "fourth": ("bare", "cloth_beside"),
+    "fifth": ("holes_deep", "things_near"),
+    "sixth": ("holes_lit", "beside_forms"),
+}
+COVERED = {
+    "third": ("over_clamp", "over_clear_tape"),
+    "fourth": ("over_hose", "over_tape_clear"),
+    "fifth": ("over_glove", "over_hole_plug"),
+    "sixth": ("over_tool", "over_sheet_film"),
+}
+LAST = {"third": "over_pen", "fourth": "over_sleeve", "fifth": "over_hole_plug", "sixth": "over_small"}
+# The fifth tells a wall from 0.45 of a pixel on, and comb from half of one: some pixels of the edge are wall alone.
+PAST_EDGE = {"third": 0.0, "fourth": 0.0, "fifth": 1e-4, "sixth": 0.0}
 DRAWN = [(hand, kind) for hand in SCENES for kind in (*CLEAR[hand], *COVERED[hand])]
 
 
@@ -38,7 +55,7 @@ def test_something_hides_the_block_in_kinds_that_say_so_and_in_no_others(hand: s
 def test_comb_lies_within_the_rings_and_walls_in_it(hand: str, kind: str) -> None:
     one = seen(hand, kind)
     assert np.mean(one.comb != (within(one.comb.shape, one.rings) > 0)) < 0.002  # along the edge
-    assert not (one.walls & ~one.comb).any()
+    assert np.mean(one.walls & ~one.comb) <= PAST_EDGE[hand]
     assert 0.0 < one.walls.mean() < one.comb.mean()
 
 
@@ -65,7 +82,7 @@ def test_about_half_of_the_kinds_have_something_over_the_block(hand: str) -> Non
     assert len(set(KINDS[hand])) == len(KINDS[hand])
 
 
-@pytest.mark.parametrize(("hand", "last"), [("third", "over_pen"), ("fourth", "over_sleeve")])
+@pytest.mark.parametrize(("hand", "last"), LAST.items())
 def test_a_kind_that_is_none_is_refused(hand: str, last: str) -> None:
     with pytest.raises(ValueError, match=rf"'over_moon' is no kind: expected one of .*{last}"):
         SCENES[hand]("over_moon", 1)

@@ -55,7 +55,7 @@ def scene(kind: str, seed: int) -> Scene:
     canvas *= light_field(rng, shape, glare)[..., None]
     canvas *= np.float32(metered(rng, canvas, inside))
     picture = expose(rng, canvas, rng.uniform(*plan.noise), colour=rng.random() < 0.5)
-    return Scene(picture, rings, style.pitch, hidden, (tops > 0.45) & ~hidden, inside)
+    return Scene(picture, rings, style.pitch, hidden, (tops > 0.45) & ~hidden & inside, inside)
 
 
 def _comb_style(rng: Rng, plan: Plan, table_light: float) -> CombStyle:

@@ -8,10 +8,12 @@ import cv2
 import numpy as np
 
 from contour.errors import NoBlockFound
+from contour.geometry.agreement import distances_to
 from contour.geometry.arrays import Bools, Bytes, Complexes, Float32s, Float64s, Indices, Int32s, Int64s, median
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Contour, Ring, signed_area
 from contour.image.opencv import opened, pieces_and_areas, within
+from contour.image.pixel_grid import drawn
 from contour.image.pixel_sampling import sample_at
 from contour.segmentation.network import PITCH_PX, Segments
 
@@ -50,6 +52,17 @@ def comb_outline(light: Bytes, seen: Segments, other: Float32s) -> tuple[Contour
         raise NoBlockFound(f"no block found: two networks see its border up to {min(far, 99.0):.1f} cells apart")
     _check_walls(light, seen.wall, block)
     return _outline(block, seen.comb), float(np.quantile(apart, 0.95))
+
+
+def farthest_from(outline: Contour, comb: Float32s) -> float:
+    """How far from an outline the border of the comb that lies in it is at most, pitches: samples, (h, w)."""
+    pieces, _ = _pieces(comb)
+    within_it = np.bincount(pieces[drawn(outline.rings, comb.shape, 1.0) > 0], minlength=2)
+    within_it[0] = 0
+    block, _ = _whole(pieces == int(within_it.argmax()) if within_it.any() else np.zeros(comb.shape, np.bool_))
+    edges = cv2.findContours(block.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)[0]
+    places = np.concatenate([np.empty((0, 2)), *(edge[:, 0] for edge in edges)])
+    return float(distances_to(places, outline).max(initial=0.0 if len(places) else math.inf)) / PITCH_PX
 
 
 def _block_of(comb: Float32s) -> Bools:

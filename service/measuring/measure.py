@@ -258,6 +258,7 @@ class Measurer:
         checked = checked_trace(
             picture, settings, region, rectifier, look.relief, source, times=look.times, on_stage=watch.lap
         )
+        look.check(checked.trace.contour)
         if look.network:
             checked = replace(checked, trace=checked.trace.less_sure(_NETWORK_PITCHES))
         traced = checked.trace

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contour.errors import NoBlockFound
+from contour.geometry.rings import Contour
+from contour.image.pixel_grid import pixels_of
 from contour.relief.relief import Relief
 from contour.segmentation.comb_picture import CombPicture
 from contour.tracing.trace import OnStage
@@ -49,6 +51,13 @@ class Look(NamedTuple):
             raise NoBlockFound("no block found: a network sees no comb")
         told = {"ends": drawn.walled, "border": drawn.bordered, "networks": drawn.outlined}[self.by]
         return drawn.drawn, told()
+
+    def check(self, outline: Contour) -> None:
+        """Raise NoBlockFound where networks see the border of comb elsewhere than along an outline, pixels as taken."""
+        drawn = None if self.draw is None or self.by == "networks" else self.draw()
+        if drawn is not None:
+            exterior, *holes = (pixels_of(ring, self.times) for ring in outline.rings)
+            drawn.check(Contour(exterior, tuple(holes)))
 
     def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
         """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""

@@ -15,6 +15,8 @@ from contour.calibration.position_uncertainty import PositionUncertainty
 from contour.edge.stretches import Stretch
 from contour.errors import ParameterError, PictureError
 from contour.geometry.rings import Contour, area, farthest, hausdorff, perimeter
+from contour.segmentation import comb_picture
+from contour.segmentation.network import comb_and_covers
 from contour.synthetic import render
 from contour.tracing import tracing
 from contour.tracing.trace import Trace, TraceSettings
@@ -324,6 +326,9 @@ def test_where_something_lies_over_an_edge_that_is_drawn_networks_are_asked_and_
         def outlined(self) -> Source:
             return Source(rendered.picture, outline=outline)
 
+        def check(self, _outline: Contour) -> None:
+            """Networks see nothing else."""
+
     monkeypatch.setattr(measure, "comb_picture", lambda _picture: Drawn())
     monkeypatch.setattr(measure, "checked_trace", checked)
     seen = measured(rendered)
@@ -412,7 +417,8 @@ def test_a_seam_between_two_blocks_that_no_wall_tells_is_seen_by_a_second_opinio
 def test_what_lies_over_an_edge_shows_in_the_picture_beside_what_a_network_draws(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A tape, black beside glare: no thing to the network, which draws what it leaves of the comb."""
+    """A tape, black beside glare: no thing to the network, which draws what it leaves of the comb, and to no other."""
+    monkeypatch.setattr(comb_picture, "comb_and_covers", lambda *of: comb_and_covers(*of) * np.float32([[[1]], [[0]]]))
     rendered = render(shop_floor_scene("glare", 8_300_007).scene)
     assert measured(rendered).findings
     monkeypatch.setattr(

@@ -13,7 +13,7 @@ from contour.errors import NoBlockFound
 from contour.geometry.agreement import distances_to, places_along
 from contour.geometry.arrays import Bytes, Float32s
 from contour.geometry.rings import Contour
-from contour.segmentation.comb_outline import comb_outline
+from contour.segmentation.comb_outline import comb_outline, farthest_from
 from contour.segmentation.network import PITCH_PX, Segments
 
 SIDE = 480
@@ -54,6 +54,19 @@ def test_an_outline_with_its_corners_and_its_hole_is_told() -> None:
     off = distances_to(places_along(outline, 1.0), truth) / PITCH_PX, distances_to(places_along(truth, 1.0), outline)
     assert np.quantile(off[0], 0.95) < 0.06
     assert max(off[0].max(), off[1].max() / PITCH_PX) < 0.3
+
+
+@pytest.mark.parametrize("ring", [SQUARE, np.add(SQUARE, (12.0, 0.0))])
+def test_how_far_from_an_outline_a_network_sees_the_border_is_told(ring: np.ndarray) -> None:
+    another = np.array([[440.0, 440.0], [475.0, 440.0], [475.0, 475.0], [440.0, 475.0]])
+    away = abs(float((ring - SQUARE).max()))
+    assert farthest_from(Contour(ring), comb_of(SQUARE, another)) * PITCH_PX == pytest.approx(away, abs=3.0)
+
+
+def test_a_slot_that_an_outline_leaves_out_is_told_and_no_comb_is_infinitely_far() -> None:
+    slot = np.array([[200.0, 60.0], [240.0, 60.0], [240.0, 200.0], [200.0, 200.0]])
+    assert farthest_from(Contour(SQUARE), comb_of(SQUARE, slot)) * PITCH_PX == pytest.approx(130.0, abs=3.0)
+    assert farthest_from(Contour(SQUARE), np.zeros((SIDE, SIDE), np.float32)) == math.inf
 
 
 def test_how_far_networks_see_the_border_apart_is_told() -> None:

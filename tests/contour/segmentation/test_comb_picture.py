@@ -128,6 +128,17 @@ def test_an_outline_is_told_all_around() -> None:
     assert max(off.max(), distances_to(places_along(truth, 1.0), outline).max() / rendered.pitch_px) < 0.5
 
 
+def test_an_outline_elsewhere_than_networks_see_the_border_is_refused() -> None:
+    rendered = told_scene()
+    drawn = comb_picture(rendered.picture)
+    assert drawn is not None
+    drawn.check(rendered.truth_px)
+    aside = (0.7 * rendered.pitch_px, 0.0)
+    moved = Contour(rendered.truth_px.exterior + aside, tuple(hole + aside for hole in rendered.truth_px.holes))
+    with pytest.raises(NoBlockFound, match=r"a network sees the border of comb up to 0\.\d cells from the outline"):
+        drawn.check(moved)
+
+
 @pytest.mark.parametrize("kind", ["undisturbed", "wood", "brushed", "slots", "old_cuts", "expanded", "cork", "ribbed"])
 def test_on_an_empty_table_nothing_is_drawn(kind: str) -> None:
     scene = shop_floor_scene(kind, 95_000_003, alone=True).scene
@@ -198,7 +209,7 @@ def test_what_lies_away_from_the_block_does_not_matter(monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize(
     ("first", "other", "told"),
-    [(0.1, 0.1, True), (0.4, 0.1, True), (0.1, 0.4, True), (0.4, 0.4, False), (0.1, 0.6, False)],
+    [(0.1, 0.0, True), (0.4, 0.0, True), (0.1, 0.4, True), (0.4, 0.4, False), (0.1, 0.6, False)],
 )
 def test_a_thing_at_the_edge_is_one_where_both_networks_see_it_or_the_one_that_knows_more_surely_does(
     monkeypatch: pytest.MonkeyPatch, first: float, other: float, told: bool

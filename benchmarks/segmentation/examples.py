@@ -43,12 +43,13 @@ _OWN_TOGETHER, _OTHERS_TOGETHER = ("pushed_together", "pushed_together", "offcut
 _BY_ANOTHER, _ON_STRUCTURED, _BY_MORE = 0.5, 0.5, 0.8
 _THINGS = ("tape", "clamp", "hand_or_cable")
 _OTHER_THINGS = ("tape", "clamp", "hand", "cable")
-_MORE_HANDS = (
-    (THIRD_KINDS, third_scene),
-    (FOURTH_KINDS, fourth_scene),
-    (FIFTH_KINDS, fifth_scene),
-    (SIXTH_KINDS, sixth_scene),
-)
+LATER_HANDS = {
+    "third": (THIRD_KINDS, third_scene),
+    "fourth": (FOURTH_KINDS, fourth_scene),
+    "fifth": (FIFTH_KINDS, fifth_scene),
+    "sixth": (SIXTH_KINDS, sixth_scene),
+}
+"""Kinds and scenes of hands that drew many things that lie over a block, and what looks like these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +138,7 @@ def _by_another(rng: np.random.Generator, seed: int) -> _Drawn:
 
 
 def _by_one_more(rng: np.random.Generator, seed: int) -> _Drawn:
-    kinds, draw = _MORE_HANDS[int(rng.integers(len(_MORE_HANDS)))]
+    kinds, draw = list(LATER_HANDS.values())[int(rng.integers(len(LATER_HANDS)))]
     one = draw(str(rng.choice(kinds)), seed)
     wall, comb, thing = (np.asarray(part, np.float32) for part in (one.walls, one.comb, one.hidden))
     return _Drawn(one.picture, one.pitch_px, wall, [comb], thing)

@@ -7,19 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks.fifth_hand.scene import KINDS as FIFTH_KINDS
-from benchmarks.fifth_hand.scene import scene as fifth_scene
-from benchmarks.fourth_hand.scene import KINDS as FOURTH_KINDS
-from benchmarks.fourth_hand.scene import scene as fourth_scene
 from benchmarks.other_hand.drawings import within
-from benchmarks.sixth_hand.scene import KINDS as SIXTH_KINDS
-from benchmarks.sixth_hand.scene import scene as sixth_scene
-from benchmarks.third_hand.scene import KINDS as THIRD_KINDS
+from benchmarks.segmentation.examples import LATER_HANDS
 from benchmarks.third_hand.scene import Scene
-from benchmarks.third_hand.scene import scene as third_scene
 
-SCENES = {"third": third_scene, "fourth": fourth_scene, "fifth": fifth_scene, "sixth": sixth_scene}
-KINDS = {"third": THIRD_KINDS, "fourth": FOURTH_KINDS, "fifth": FIFTH_KINDS, "sixth": SIXTH_KINDS}
 CLEAR = {
     "third": ("lit_holes", "cables_beside"),
     "fourth": ("bare", "cloth_beside"),
@@ -33,12 +24,17 @@ COVERED = {
     "sixth": ("over_tool", "over_sheet_film"),
 }
 LAST = {"third": "over_pen", "fourth": "over_sleeve", "fifth": "over_hole_plug", "sixth": "over_small"}
-DRAWN = [(hand, kind) for hand in SCENES for kind in (*CLEAR[hand], *COVERED[hand])]
+DRAWN = [(hand, kind) for hand in LATER_HANDS for kind in (*CLEAR[hand], *COVERED[hand])]
+
+
+def drawn(hand: str, kind: str, seed: int) -> Scene:
+    _, scene = LATER_HANDS[hand]
+    return scene(kind, seed)
 
 
 @cache
 def seen(hand: str, kind: str) -> Scene:
-    return SCENES[hand](kind, 1)
+    return drawn(hand, kind, 1)
 
 
 @pytest.mark.parametrize(("hand", "kind"), DRAWN)
@@ -66,21 +62,22 @@ def test_each_picture_is_what_it_is_said_to_be(hand: str, kind: str) -> None:
     assert all(ring.shape[1:] == (2,) and ring.dtype == np.float64 for ring in one.rings)
 
 
-@pytest.mark.parametrize("hand", SCENES)
+@pytest.mark.parametrize("hand", LATER_HANDS)
 def test_the_same_seed_draws_the_same_picture_and_another_does_not(hand: str) -> None:
     kind = CLEAR[hand][0]
-    one, again, other = seen(hand, kind), SCENES[hand](kind, 1), SCENES[hand](kind, 2)
+    one, again, other = seen(hand, kind), drawn(hand, kind, 1), drawn(hand, kind, 2)
     assert np.array_equal(one.picture, again.picture)
     assert not np.array_equal(one.picture, other.picture)
 
 
-@pytest.mark.parametrize("hand", SCENES)
+@pytest.mark.parametrize("hand", LATER_HANDS)
 def test_about_half_of_the_kinds_have_something_over_the_block(hand: str) -> None:
-    assert 0.4 < np.mean([kind.startswith("over_") for kind in KINDS[hand]]) < 0.6
-    assert len(set(KINDS[hand])) == len(KINDS[hand])
+    kinds, _ = LATER_HANDS[hand]
+    assert 0.4 < np.mean([kind.startswith("over_") for kind in kinds]) < 0.6
+    assert len(set(kinds)) == len(kinds)
 
 
 @pytest.mark.parametrize(("hand", "last"), LAST.items())
 def test_a_kind_that_is_none_is_refused(hand: str, last: str) -> None:
     with pytest.raises(ValueError, match=rf"'over_moon' is no kind: expected one of .*{last}"):
-        SCENES[hand]("over_moon", 1)
+        drawn(hand, "over_moon", 1)

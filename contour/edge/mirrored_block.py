@@ -145,13 +145,11 @@ def _found(
         rings = visible_rings(picture, looked, look, rectifier)
     except NoBlockFound:
         return None
-    exterior, *holes = (one.fitted.ring[::-1].copy() for one in rings)
-    return _judged(walls, Contour(exterior, tuple(holes)), seen)
+    return _judged(walls, Contour.of(one.fitted.ring[::-1].copy() for one in rings), seen)
 
 
 def _coarse(seen: BlockEvidence) -> Contour:
-    exterior, *holes = (ring.coarse[::-1].copy() for ring in seen.rings)
-    return Contour(exterior, tuple(holes))
+    return Contour.of(ring.coarse[::-1].copy() for ring in seen.rings)
 
 
 def _looked(picture: Bytes, walls: SeenWalls) -> Looked:

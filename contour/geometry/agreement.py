@@ -79,8 +79,7 @@ def distances_to(points: Float64s, contour: Contour) -> Float64s:
 
 def rectified_edges(contour: Contour, rectifier: Rectifier, step: float = 4.0) -> Contour:
     """The contour whose edges are straight in rectified coordinates, densified there, in raw pixels."""
-    exterior, *holes = (rectifier.unrectify(densified(rectifier.rectify(ring), step)) for ring in contour.rings)
-    return Contour(exterior, tuple(holes))
+    return Contour.of(rectifier.unrectify(densified(rectifier.rectify(ring), step)) for ring in contour.rings)
 
 
 def intersection_over_union(one: Contour, other: Contour) -> float:

@@ -6,6 +6,7 @@ person sees as counter-clockwise is the negative one.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +45,12 @@ class Contour:
 
     exterior: Ring
     holes: tuple[Ring, ...] = ()
+
+    @classmethod
+    def of(cls, rings: Iterable[Ring]) -> Contour:
+        """The contour of rings, exterior first, as `rings` has them."""
+        exterior, *holes = rings
+        return cls(exterior, tuple(holes))
 
     @property
     def rings(self) -> tuple[Ring, ...]:

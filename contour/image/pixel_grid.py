@@ -27,13 +27,13 @@ def coarse_step(pitch_px: float) -> int:
     return max(1, round(pitch_px / _SAMPLES_PER_PITCH))
 
 
-def pixels_of(samples: Float64s | Int64s, step: float) -> Float64s:
-    """Places in pixels of places in samples, any shape."""
+def pixels_of(samples: Float64s | Int64s, step: float | Float64s) -> Float64s:
+    """Places in pixels of places in samples, any shape; of (N, 2) the step may be one each across and down."""
     return np.asarray((samples + 0.5) * step - 0.5, np.float64)
 
 
-def samples_of(pixels: Float64s, step: float) -> Float64s:
-    """Places in samples of places in pixels, any shape."""
+def samples_of(pixels: Float64s, step: float | Float64s) -> Float64s:
+    """Places in samples of places in pixels, any shape; of (N, 2) the step may be one each across and down."""
     return np.asarray((pixels + 0.5) / step - 0.5, np.float64)
 
 

@@ -119,8 +119,7 @@ def check_can_be_laid(name: str, shape: Contour) -> None:
 
 def _simpler(shape: Contour) -> Contour:
     """The shape with as few vertices as tell candidates apart."""
-    exterior, *holes = (ring[simplify_indices(ring, _ROUGH_SHAPE_MM)] for ring in shape.rings)
-    return Contour(exterior, tuple(holes))
+    return Contour.of(ring[simplify_indices(ring, _ROUGH_SHAPE_MM)] for ring in shape.rings)
 
 
 def _checked(part: Contour, block: Contour, placement: Placement) -> Placement:

@@ -251,8 +251,7 @@ def _samples(part: Contour, step: float) -> Float64s:
 
 
 def _simpler(shape: Contour) -> Contour:
-    exterior, *holes = (ring[simplify_indices(ring, _ROUGH_MM / 2)] for ring in shape.rings)
-    return Contour(exterior, tuple(holes))
+    return Contour.of(ring[simplify_indices(ring, _ROUGH_MM / 2)] for ring in shape.rings)
 
 
 def _angles(turns: Turns, part: Contour, block: Contour) -> list[float]:

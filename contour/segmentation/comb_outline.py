@@ -156,7 +156,7 @@ def _outline(block: Bools, comb: Float32s) -> Contour:
     ways = np.split(outward(even, np.concatenate(pixels)), np.cumsum([len(ring) for ring in pixels])[:-1])
     rings = [_with_corners(_evened(_on_border(*ring, even))) for ring in zip(pixels, ways, strict=True)]
     rings.sort(key=lambda ring: -abs(signed_area(ring)))
-    return Contour(rings[0], tuple(rings[1:]))
+    return Contour.of(rings)
 
 
 def outward(comb: Float32s, points: Float64s) -> Float64s:

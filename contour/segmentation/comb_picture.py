@@ -13,6 +13,7 @@ from contour.errors import NoBlockFound
 from contour.geometry.arrays import Bools, Bytes, Float32s, Float64s
 from contour.geometry.rings import Contour
 from contour.image.opencv import box_mean, deep, grown, opened, pieces_and_areas, sized
+from contour.image.pixel_grid import pixels_of, samples_of
 from contour.segmentation.comb_outline import comb_outline, farthest_from, outward, without_walls
 from contour.segmentation.glare import glare
 from contour.segmentation.network import (
@@ -86,7 +87,7 @@ class CombPicture:
 
     def bordered(self) -> Source:
         """What it was drawn from, with the border of comb. Raises NoBlockFound where a thing may lie over that."""
-        return replace(self.walled(), border=self._in_picture(_border(self.whole)))
+        return replace(self.walled(), border=pixels_of(_border(self.whole), self._step))
 
     def outlined(self) -> Source:
         """What it was drawn from, with the outline that two networks tell. Raises NoBlockFound where they do not agree,
@@ -96,17 +97,14 @@ class CombPicture:
             raise NoBlockFound(_OVER)
         shape = self.whole.shape
         contour, apart = comb_outline(sized(self.light, shape), self.seen, self._covers[0])
-        exterior, *holes = map(self._in_picture, contour.rings)
-        return Source(
-            self.picture, outline=Outline(Contour(exterior, tuple(holes)), self.pitch_px, apart * self.pitch_px)
-        )
+        outline = Contour.of(pixels_of(ring, self._step) for ring in contour.rings)
+        return Source(self.picture, outline=Outline(outline, self.pitch_px, apart * self.pitch_px))
 
     def check(self, outline: Contour) -> None:
         """Raise NoBlockFound where a network sees the border of comb elsewhere than along an outline in the picture."""
-        size = np.array(self.light.shape[::-1]) / self.whole.shape[::-1]
-        exterior, *holes = ((ring + 0.5) / size - 0.5 for ring in outline.rings)
+        sampled = Contour.of(samples_of(ring, self._step) for ring in outline.rings)
         for comb, most in ((self.whole, _FROM_FIRST), (self._covers[0], _FROM_OTHER)):
-            far = farthest_from(Contour(exterior, tuple(holes)), comb)
+            far = farthest_from(sampled, comb)
             if far > most:
                 away = f"up to {min(far, 99.0):.1f} cells from the outline"
                 raise NoBlockFound(f"no block found: a network sees the border of comb {away}")
@@ -122,17 +120,22 @@ class CombPicture:
         """Whether what may be a thing, or glare, lies over the edge of the comb, or in a hole of it."""
         return self._lies(_things(self.seen)) or self._lies(self._covers[1] > _SURE_COVER)
 
-    def _lies(self, thing: Bools) -> bool:
-        """Whether such things, or glare, (h, w), lie at the edge of the comb, or in a hole of it."""
+    @cached_property
+    def _edge(self) -> tuple[Bools, Bools]:
+        """The edge of the comb and of its holes, and where glare is, (h, w) each."""
         block, _ = _large((self.whole > _SURE).astype(np.uint8))
         edge = cv2.morphologyEx(block.astype(np.uint8), cv2.MORPH_GRADIENT, np.ones((_EDGE_PX, _EDGE_PX), np.uint8)) > 0
-        there = edge & (thing | glare(self.picture, block, PITCH_PX))
-        return int(pieces_and_areas(there.astype(np.uint8), 8)[1].max()) > _FEW_PX
+        return np.asarray(edge, np.bool_), glare(self.picture, block, PITCH_PX)
 
-    def _in_picture(self, samples: Float64s) -> Float64s:
-        """Places in the picture of places in what the network tells, (N, 2)."""
-        size = np.array(self.light.shape[::-1]) / self.whole.shape[::-1]
-        return np.asarray((samples + 0.5) * size - 0.5, np.float64)
+    def _lies(self, thing: Bools) -> bool:
+        """Whether such things, or glare, (h, w), lie at the edge of the comb, or in a hole of it."""
+        edge, lit = self._edge
+        return int(pieces_and_areas((edge & (thing | lit)).astype(np.uint8), 8)[1].max()) > _FEW_PX
+
+    @property
+    def _step(self) -> Float64s:
+        """How many pixels of the picture a sample of what the network tells is across and down, (2,)."""
+        return np.asarray(np.array(self.light.shape[::-1]) / self.whole.shape[::-1], np.float64)
 
 
 def comb_picture(picture: Bytes) -> CombPicture | None:

@@ -94,8 +94,7 @@ class CameraModel:
 
     def project_contour(self, contour: Contour, z_mm: float, step_mm: float = 1.0) -> Contour:
         """The contour as seen at height z, in pixels: straight edges in millimetres are densified first."""
-        exterior, *holes = (self.project(densified(ring, step_mm), z_mm) for ring in contour.rings)
-        return Contour(exterior, tuple(holes))
+        return Contour.of(self.project(densified(ring, step_mm), z_mm) for ring in contour.rings)
 
 
 def camera_above(

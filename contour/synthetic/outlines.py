@@ -96,8 +96,7 @@ def moved(contour: Contour, shift: Point, angle_deg: float = 0.0) -> Contour:
     """The contour turned about the origin, then shifted."""
     c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
     turn = np.array([[c, s], [-s, c]])
-    exterior, *holes = (ring @ turn + np.array(shift) for ring in contour.rings)
-    return Contour(exterior, tuple(holes))
+    return Contour.of(ring @ turn + np.array(shift) for ring in contour.rings)
 
 
 def broken_off(contour: Contour, start: float, end: float, depth: float, seed: int, pieces: int = 4) -> Contour:

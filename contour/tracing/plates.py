@@ -196,8 +196,7 @@ def onto_webs(material: MaterialEdge, outline: Contour, pitch_px: float) -> Cont
     rings = [densified(ring, 1.0) for ring in material.contour.rings]
     border, ahead = np.concatenate(rings), np.concatenate([np.roll(ring, -1, axis=0) - ring for ring in rings])
     side = -float(np.sign(signed_area(outline.exterior)))
-    exterior, *holes = (_on_webs(ring, border, ahead, pitch_px, side) for ring in outline.rings)
-    return Contour(exterior, tuple(holes))
+    return Contour.of(_on_webs(ring, border, ahead, pitch_px, side) for ring in outline.rings)
 
 
 def _on_webs(ring: Ring, border: Float64s, ahead: Float64s, pitch_px: float, side: float) -> Ring:

@@ -87,12 +87,11 @@ class Trace:
 
     def reduced(self, times: int) -> Trace:
         """The trace in the picture that the traced one shows so many times as large."""
-        exterior, *holes = (samples_of(ring, times) for ring in self.contour.rings)
         opening = self.opening_px and (*place_of(self.opening_px[:2], times), self.opening_px[2] / times)
         return replace(
             self,
             pitch_px=self.pitch_px and self.pitch_px / times,
-            contour=Contour(exterior, tuple(holes)),
+            contour=Contour.of(samples_of(ring, times) for ring in self.contour.rings),
             light=shrunk(self.light, times),
             uncertainty_px=self.uncertainty_px and self.uncertainty_px / times,
             others=tuple(piece.reduced(times) for piece in self.others),

@@ -56,8 +56,7 @@ class Look(NamedTuple):
         """Raise NoBlockFound where networks see the border of comb elsewhere than along an outline, pixels as taken."""
         drawn = None if self.draw is None or self.by == "networks" else self.draw()
         if drawn is not None:
-            exterior, *holes = (pixels_of(ring, self.times) for ring in outline.rings)
-            drawn.check(Contour(exterior, tuple(holes)))
+            drawn.check(Contour.of(pixels_of(ring, self.times) for ring in outline.rings))
 
     def may_show_more(self, reasons: set[Reason], *, nowhere: bool) -> bool:
         """Whether it is worth a look after a first one was refused for these reasons, or saw cells nowhere."""

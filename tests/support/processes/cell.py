@@ -15,7 +15,7 @@ class Cell:
     """A service and a controller, each of which may be killed and started again.
 
     camera, calibration: without either it sees drawn combs, small ones; where only the camera is told, the calibration
-    is that of the samples. timeout_s: three seconds, as a busy machine's processes may be still for one.
+    is that of the samples. A reply may take three seconds, as a busy machine's processes may be still for one.
     """
 
     def __init__(
@@ -32,7 +32,6 @@ class Cell:
         more: str = "",
         recipe: int = 0,
         scenario: str = "",
-        timeout_s: float = 3.0,
     ) -> None:
         self._trigger_every = () if trigger_every_s is None else ("--trigger-every", str(trigger_every_s))
         self._trigger_every += ("--recipe", str(recipe))
@@ -47,7 +46,7 @@ class Cell:
         (folder / "config.yaml").write_text(
             f"camera: {camera}\n"
             f"calibration: {{file: {calibration or SAMPLES / 'calibration.yaml'}}}\n"
-            f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: {timeout_s}, ack_timeout_s: 1{link}}}\n"
+            f"controller: {{kind: modbus-tcp, port: {self.port}, timeout_s: 3, ack_timeout_s: 1{link}}}\n"
             f"triggers: {triggers}\n"
             f"service: {service}\n"
             f"journal: {journal}\n"

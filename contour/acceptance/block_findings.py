@@ -11,6 +11,7 @@ from contour.acceptance.trace_check import CheckedTrace
 from contour.geometry.ring_lengths import RingLengths
 from contour.geometry.rings import Ring, area, perimeter
 from contour.image.region import Region
+from contour.narrow_features.arms import torn
 from contour.segmentation.second_opinion import Doubt, SecondOpinion
 from contour.tracing.trace import Trace
 from contour.walls.comb_likeness import unlike_comb
@@ -344,9 +345,7 @@ def vague(traced: Trace | None) -> Finding | None:
             (around(x, y, SHOWN_PITCHES * traced.pitch_px),),
         )
     cells = traced.uncertainty_px / traced.pitch_px
-    # The edge of material is seen without its cells: there a share of the block tells as well what is gross.
-    gross = _SURE_WITHIN_SHARE * area(traced.contour) ** 0.5 if traced.edge in ("cells", "mixed") else 0.0
-    if traced.uncertainty_px <= max(_SURE_WITHIN_PITCHES * traced.pitch_px, gross):
+    if cells <= _SURE_WITHIN_PITCHES or _sure_of_material(traced, traced.uncertainty_px, traced.pitch_px):
         return _vague_ring(traced, traced.pitch_px)
     return Finding(
         Refusal.UNCERTAINTY_TOO_LARGE,
@@ -354,6 +353,13 @@ def vague(traced: Trace | None) -> Finding | None:
         "are allowed: walls end far away from it. Look at the overlay; check light and table, and that no straight "
         "light lines or cables lie in view.",
     )
+
+
+def _sure_of_material(traced: Trace, uncertainty_px: float, pitch_px: float) -> bool:
+    """Whether the edge of material, which is seen without its cells, is sure to a share of the block, and not torn."""
+    gross_px = _SURE_WITHIN_SHARE * area(traced.contour) ** 0.5
+    closed = traced.edge in ("cells", "mixed")
+    return closed and uncertainty_px <= gross_px and not torn(traced.contour, pitch_px)
 
 
 def _vague_ring(traced: Trace, pitch_px: float) -> Finding | None:

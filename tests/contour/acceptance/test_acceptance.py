@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from contour.acceptance.acceptance import View, judge, judge_without_block
+from contour.acceptance.block_findings import vague
 from contour.acceptance.disagreement import Disagreement
 from contour.acceptance.error_budget import ErrorBudget
 from contour.acceptance.findings import Finding, Limits, Refusal, closed, runs_where
@@ -18,6 +19,7 @@ from contour.polygon.polygon import Polygon
 from contour.tracing.trace import Trace
 from contour.walls.comb_likeness import Comb
 from contour.walls.pieces import Piece
+from tests.support.pictures.narrow_shapes import BLOCK, contour, dent
 from tests.support.pictures.rings import SQUARE
 
 FRAME = View((640, 480))
@@ -214,6 +216,15 @@ def test_a_contour_that_is_not_sure_within_a_quarter_of_a_cell_is_refused_whatev
     (finding,) = judge(GOOD, FRAME, LIMITS, traced=traced(uncertainty_px=7.2))
     assert finding.refusal == Refusal.UNCERTAINTY_TOO_LARGE
     assert "sure within 7.2 px only, 0.3 cells, 0.25 are allowed" in finding.text
+
+
+@pytest.mark.parametrize(("deep", "refused"), [(0.5, False), (1.5, True)])
+def test_material_is_sure_to_a_share_of_the_block_unless_its_edge_is_torn(deep: float, refused: bool) -> None:
+    whole = traced(contour=contour(BLOCK - dent(0.6, deep)), pitch_px=19.0, uncertainty_px=4.85)
+    for edge in ("cells", "mixed"):
+        finding = vague(replace(whole.trace, edge=edge))
+        assert [finding is None, vague(replace(whole.trace, edge="cut")) is None] == [not refused, False]
+        assert finding is None or "0.26 cells, 0.25 are allowed" in finding.text
 
 
 def test_a_corner_that_may_as_well_be_round_is_refused_with_its_place() -> None:

@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from contour.geometry.rings import Contour
+from contour.narrow_features.arms import torn
 from contour.narrow_features.feature import NarrowFeature
 from contour.narrow_features.narrow_feature import narrow_feature
 from tests.support.pictures.narrow_shapes import BLOCK, PITCH, chip, contour, dent
@@ -325,3 +326,10 @@ def test_what_hangs_on_a_block_by_a_corner_of_its_own_is_found(side: float, lies
 def test_a_bone_is_held_by_its_middle() -> None:
     ends = shapely.box(100, 100, 300, 500) | shapely.box(500, 100, 700, 500)
     assert found(ends | shapely.box(250, 230, 550, 370)) is None
+
+
+@pytest.mark.parametrize("turn_deg", [0.0, 33.0])
+@pytest.mark.parametrize(("width", "depth", "is_torn"), [(0.6, 1.4, True), (0.6, 0.5, False), (1.6, 1.4, False)])
+def test_what_goes_in_narrow_and_deep_is_torn(width: float, depth: float, is_torn: bool, turn_deg: float) -> None:
+    assert torn(contour(BLOCK - dent(width, depth), turn_deg), PITCH) == is_torn
+    assert not torn(contour(BLOCK | chip(width, depth), turn_deg), PITCH)

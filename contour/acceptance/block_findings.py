@@ -293,9 +293,9 @@ def _hole_left_out(hole: Doubt, pitch_px: float) -> Finding:
     return _disagreement_at(
         (x, y),
         0.5 * wide * pitch_px,
-        f"Within the contour, near ({x:.0f}, {y:.0f}) px, there are no cells over {wide:.1f} cells, and it is as light "
-        "as the table: a hole that was not traced, or something that lies on the block. Look at the overlay; take it "
-        "away, or set max_disagreement_pitches: 0 for blocks with filled cells.",
+        f"Within the contour, near ({x:.0f}, {y:.0f}) px, there are no cells over {wide:.1f} cells: a hole or a slot "
+        "that was not traced, or something that lies on the block. Look at the overlay; take it away, or set "
+        "max_disagreement_pitches: 0 for blocks with filled cells.",
     )
 
 

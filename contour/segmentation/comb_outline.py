@@ -27,6 +27,9 @@ _APART, _BARE, _SEEN_WALL, _TOGETHER, _EVEN_PITCHES, _WALL_PITCHES = 0.45, 0.7, 
 # Walls surer than this part cells, none of which is so many times as large as most: of 45 right outlines two have one
 # that is, rows of crushed cells, and all of five that left out a slot of two cells.
 _PARTS, _LARGEST = 0.24, 2.5
+# Walls that hardly show part none of them, where all of such a room, but for its rim, is comb so surely: of nine slots
+# and holes that were left out none is by 0.2, of eight right outlines with such a room half are.
+_ALL_COMB, _RIM_PX = 0.4, 3
 # A place is not asked about walls nearer to the border than that, pitches, nor light that changes by less, grey levels.
 _WITHIN, _LEAST_LIGHT = 0.6, 1.0
 # Places along a ring, pitches; over how many of them at each side its noise is averaged; and how far from the pixels at
@@ -35,8 +38,9 @@ _STEP, _EVEN, _ACROSS_PX = 0.125, 3, np.arange(-1.5, 2.01, 0.25)
 # Sides of a corner are straight so far from it, pitches, up to so much, and turn by that at least; they meet so near.
 # Networks round corners off, and a rounding looks like one: halfway to where the sides meet is wrong by half of that.
 _NEAR, _FAR, _STRAIGHT, _TURN, _MEET = 0.75, 2.0, 0.05, math.radians(25.0), 0.8
-# Where sides that turn by more meet farther away, but no farther than that, a tip was left out.
-_POINTED, _TIP = math.radians(60.0), 3.0
+# Where sides that turn by more meet farther away, but no farther than that, a tip was left out; not where they are that
+# far apart still, as at the round end of a notch.
+_POINTED, _TIP, _BLUNT = math.radians(60.0), 3.0, 0.95
 
 
 def comb_outline(light: Bytes, seen: Segments, other: Float32s) -> tuple[Contour, float]:
@@ -50,7 +54,7 @@ def comb_outline(light: Bytes, seen: Segments, other: Float32s) -> tuple[Contour
     far = float(apart.max(initial=0.0))
     if far > _APART:
         raise NoBlockFound(f"no block found: two networks see its border up to {min(far, 99.0):.1f} cells apart")
-    _check_walls(light, seen.wall, block)
+    _check_walls(light, seen.wall, seen.comb, block)
     return _outline(block, seen.comb), float(np.quantile(apart, 0.95))
 
 
@@ -115,15 +119,17 @@ def _apart(one: Bools, other: Bools) -> Float32s:
     return np.asarray(both / np.float32(PITCH_PX), np.float32)
 
 
-def _check_walls(light: Bytes, wall: Float32s, block: Bools) -> None:
+def _check_walls(light: Bytes, wall: Float32s, comb: Float32s, block: Bools) -> None:
     """Raise NoBlockFound where a block shows no walls, or none where walls are drawn."""
     inner = cv2.distanceTransform(block.astype(np.uint8), cv2.DIST_L2, 5)
     bare, asked = (inner > _BARE * PITCH_PX) & without_walls(wall, _BARE), inner > _WITHIN * PITCH_PX
     if bare.any() or not asked.any():
         raise NoBlockFound("no block found: a network sees comb where it sees no walls")
-    rooms = pieces_and_areas((block & (wall < _PARTS)).astype(np.uint8), 4)[1]
-    cells = rooms[rooms > _SPECK_PX**2]
-    if not len(cells) or cells.max() > _LARGEST * median(cells):
+    rooms, area = pieces_and_areas((block & (wall < _PARTS)).astype(np.uint8), 4)
+    cells = area[area > _SPECK_PX**2]
+    unsure = cv2.erode((rooms > 0).astype(np.uint8), np.ones((_RIM_PX, _RIM_PX), np.uint8)) > 0
+    unsure &= comb < _ALL_COMB
+    if not len(cells) or (area[rooms[unsure]] > _LARGEST * median(cells)).any():
         raise NoBlockFound("no block found: a network sees comb with cells missing, or with a hole too small to tell")
     together = _together(light.astype(np.float32), wall)[asked]
     least = float((together * np.sign(np.median(together))).min())
@@ -199,7 +205,8 @@ def _with_corners(ring: Ring) -> Ring:
     meet = one + way * ((other - one).conj() * next_way).imag / across
     away = np.abs(meet - path)
     straight = np.maximum(off, next_off) < _STRAIGHT * PITCH_PX
-    if (straight & (np.abs(turn) > _POINTED) & (away > _MEET * PITCH_PX) & (away < _TIP * PITCH_PX)).any():
+    narrow = 2.0 * away / np.maximum(np.tan(0.5 * np.abs(turn)), 1e-6) < _BLUNT * PITCH_PX
+    if (straight & narrow & (np.abs(turn) > _POINTED) & (away > _MEET * PITCH_PX) & (away < _TIP * PITCH_PX)).any():
         raise NoBlockFound("no block found: a network tells too little of a tip of its border")
     corner = (np.abs(turn) > _TURN) & straight & (away < _MEET * PITCH_PX)
     corners, kept = path.copy(), np.ones(len(path), np.bool_)

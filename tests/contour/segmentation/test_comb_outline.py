@@ -82,8 +82,10 @@ def without_walls(told: Segments) -> None:
     told.wall[150:200, 150:200] = 0.0
 
 
-def without_two_cells(told: Segments) -> None:
+def without_two_cells(told: Segments, sure: float = 0.2) -> None:
+    """Walls are lost between cells of which the network is no surer than that that they are comb."""
     told.wall[206:214, 200:236] = 0.0
+    told.comb[208:212, 203:233] = sure
 
 
 REFUSED: dict[str, Callable[[Segments], None]] = {
@@ -99,6 +101,12 @@ def test_comb_that_is_in_doubt_is_refused(why: str) -> None:
     REFUSED[why](told)
     with pytest.raises(NoBlockFound, match=why):
         comb_outline(light, told, told.comb)
+
+
+def test_cells_between_which_walls_hardly_show_are_not_missing_where_they_surely_are_comb() -> None:
+    light, told = seen(SQUARE)
+    without_two_cells(told, 0.6)
+    assert comb_outline(light, told, told.comb)[1] == 0.0
 
 
 def test_another_border_by_the_other_network_is_refused() -> None:
@@ -129,6 +137,14 @@ def test_a_tip_that_a_network_leaves_out_is_refused() -> None:
     light, told = seen(POINTED)
     with pytest.raises(NoBlockFound, match="tip of its border"):
         comb_outline(light, told, told.comb)
+
+
+def test_the_round_end_of_a_notch_is_no_tip() -> None:
+    """Sides that meet a pitch and a half beyond it, and are more than a pitch apart there."""
+    ring = np.insert(np.delete(POINTED, 3, 0), 3, [[300.0, 214.0], [286.0, 235.0], [300.0, 256.0]], 0)
+    light, told = seen(ring)
+    outline, _ = comb_outline(light, told, told.comb)
+    assert distances_to(places_along(outline, 1.0), Contour(ring)).max() < 0.5 * PITCH_PX
 
 
 def test_comb_that_goes_on_to_the_last_pixels_is_refused() -> None:

@@ -133,6 +133,24 @@ def test_a_hole_that_was_not_traced_is_seen_and_what_is_of_another_light_than_th
             assert np.hypot(*(np.array(hole.place_px) - (x, y))) < pitch
 
 
+def test_a_slot_as_wide_as_a_cell_that_was_not_traced_is_seen_and_a_line_of_ink_is_none() -> None:
+    rendered = scene_of("undisturbed", 95_100_001)
+    picture, truth, pitch = rendered.picture, rendered.truth_px, rendered.pitch_px
+    block = area_coverage(truth.rings, *picture.shape[1::-1]) > 0.5
+    x, y = divmod(int(cv2.distanceTransform(block.astype(np.uint8), cv2.DIST_L2, 5).T.argmax()), picture.shape[0])
+    level = float(np.median(picture[~block]))
+    for wide, told in ((1.3, True), (0.4, False)):
+        there = picture.copy()
+        half_px = round(2.5 * pitch), round(0.5 * wide * pitch)
+        slot = slice(y - half_px[1], y + half_px[1]), slice(x - half_px[0], x + half_px[0])
+        there[slot] = np.random.default_rng(1).normal(level, 3.0, there[slot].shape).clip(0, 255)
+        hole = second_opinion(there, truth, pitch, nowhere).hole
+        assert (hole is not None) == told
+        if hole is not None:
+            assert hole.pitches == pytest.approx(5.0, abs=1.0)
+            assert np.hypot(*(np.array(hole.place_px) - (x, y))) < pitch
+
+
 @pytest.mark.parametrize("kind", ["undisturbed", "light_table"])
 def test_a_corner_beyond_comb_is_seen_unless_it_is_known_what_lies_there(kind: str) -> None:
     rendered = scene_of(kind, 95_100_001)

@@ -45,7 +45,7 @@ def no_comb(traced: CheckedTrace | None) -> Finding | None:
     blur_px = 0.0 if traced.quality is None else traced.quality.blur_px
     trace, comb = traced.trace, traced.trace.comb
     shown = comb.lattice and shows_table(trace.light, trace.contour, comb.pitch_px, dark=not comb.bright)
-    why = unlike_comb(comb, blur_px, cut=trace.edge not in ("cells", "mixed"), shown=shown)
+    why = unlike_comb(comb, blur_px, cut=not trace.closed, shown=shown)
     return Finding(Refusal.NO_BLOCK_FOUND, f"No block found: {why}.") if why else None
 
 
@@ -358,8 +358,7 @@ def vague(traced: Trace | None) -> Finding | None:
 def _sure_of_material(traced: Trace, uncertainty_px: float, pitch_px: float) -> bool:
     """Whether the edge of material, which is seen without its cells, is sure to a share of the block, and not torn."""
     gross_px = _SURE_WITHIN_SHARE * area(traced.contour) ** 0.5
-    closed = traced.edge in ("cells", "mixed")
-    return closed and uncertainty_px <= gross_px and not torn(traced.contour, pitch_px)
+    return traced.closed and uncertainty_px <= gross_px and not torn(traced.contour, pitch_px)
 
 
 def _vague_ring(traced: Trace, pitch_px: float) -> Finding | None:

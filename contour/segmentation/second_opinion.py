@@ -246,19 +246,20 @@ def _hole(sides: _Sides, none: Bytes, grid: _Grid) -> Doubt | None:
 
 
 def _opening(light: Bytes, pitch_px: float, sides: _Sides, known: Bools, grid: _Grid) -> Doubt | None:
-    """The largest opening, narrower than that, that was left out of the block in a part of a picture, (H, W)."""
+    """The largest opening in the block, of any width, without comb and without what would fill it; light: that of the
+    part of the picture that the grid lies over, (H, W).
+    """
     shape = sides.deep.shape
     comb, thing = (np.asarray(sized(plane, shape), np.float32) for plane in comb_and_covers(light, pitch_px))
     bare = (sides.deep > _WITHIN[0] * LIGHT_PITCH_PX) & (comb < _SURE)
     pieces, area = pieces_and_areas(bare.astype(np.uint8), 8)
-    means = [np.bincount(pieces.ravel(), one.ravel()) / np.maximum(area, 1) for one in (thing, known, sides.comb)]
-    filled, told, seen = means
+    filled, told, seen = (
+        np.bincount(pieces.ravel(), plane.ravel()) / np.maximum(area, 1) for plane in (thing, known, sides.comb)
+    )
     open_there = (area > _OPENING * LIGHT_PITCH_PX**2) & (filled < _FILLS) & (told < _SURE) & (seen < _SURE)
     if not open_there.any():
         return None
-    rows, columns = np.nonzero(pieces == int(np.where(open_there, area, 0).argmax()))
-    long = float(np.hypot(np.ptp(rows), np.ptp(columns))) / LIGHT_PITCH_PX
-    return Doubt(long, grid.place(float(np.median(columns)), float(np.median(rows))))
+    return _extent(pieces == np.where(open_there, area, 0).argmax(), grid)
 
 
 def _widest(room: Float32s, grid: _Grid) -> Doubt:
@@ -326,6 +327,13 @@ def _longest(part: Bools, wide: float, least: float, grid: _Grid) -> Doubt | Non
     return Doubt(long, grid.place(columns.mean(), rows.mean()))
 
 
+def _extent(piece: Bools, grid: _Grid) -> Doubt:
+    """How long a piece is from corner to corner, and where its middle lies."""
+    rows, columns = np.nonzero(piece)
+    long = float(np.hypot(np.ptp(rows), np.ptp(columns))) / LIGHT_PITCH_PX
+    return Doubt(long, grid.place(float(np.median(columns)), float(np.median(rows))))
+
+
 def _seam(deep: Float32s, comb: Float32s, seam: Float32s, light: Bytes, grid: _Grid) -> Doubt | None:
     """The longest part of a seam that parts the block, well within its outline, into pieces of many cells, and is no
     lighter than these: adhesive in a splice is, and a row of cells that were pressed together.
@@ -344,9 +352,7 @@ def _seam(deep: Float32s, comb: Float32s, seam: Float32s, light: Bytes, grid: _G
     if np.bincount(of_whole[large], minlength=count).max() < 2:
         return None
     lines, lengths = pieces_and_areas(line.astype(np.uint8), 8)
-    rows, columns = np.nonzero(lines == lengths.argmax())
-    long = float(np.hypot(np.ptp(rows), np.ptp(columns))) / LIGHT_PITCH_PX
-    return Doubt(long, grid.place(float(np.median(columns)), float(np.median(rows))))
+    return _extent(lines == lengths.argmax(), grid)
 
 
 def _fills(block: Bools, comb: Float32s, line: Bools, light: Bytes) -> bool:

@@ -78,6 +78,11 @@ class Trace:
     wide: EdgePart | None = None
     parted: Piece | None = None
 
+    @property
+    def closed(self) -> bool:
+        """Whether its border closes cells, all of them or some."""
+        return self.edge in ("cells", "mixed")
+
     def less_sure(self, pitches: float) -> Trace:
         """The same, known so much less well all along."""
         more = pitches * (self.pitch_px or 0.0)

@@ -1,8 +1,8 @@
-// A modbus-serial server that holds registers: node modbus_serial_server.js PORT REGISTERS
+// A modbus-serial server that holds registers: node modbus_serial_server.js REGISTERS
 "use strict";
 const { ServerTCP } = require("modbus-serial");
 
-const [port, size] = process.argv.slice(2).map(Number);
+const size = Number(process.argv[2]);
 const registers = new Uint16Array(size);
 
 function held(address) {
@@ -16,6 +16,7 @@ const vector = {
     registers[held(address)] = value;
   },
 };
-const server = new ServerTCP(vector, { host: "127.0.0.1", port, unitID: 1 });
-server.on("initialized", () => console.log(`ready ${port}`));
+// Any port that is free; by the number 0 it takes its own, 502.
+const server = new ServerTCP(vector, { host: "127.0.0.1", port: "0", unitID: 1 });
+server.on("initialized", () => console.log(`ready ${server._server.address().port}`));
 server.on("socketError", () => {}); // a client that goes away is no fault

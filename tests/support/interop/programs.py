@@ -6,7 +6,6 @@ import contextlib
 import functools
 import os
 import re
-import socket
 import subprocess
 import sys
 import tempfile
@@ -139,11 +138,8 @@ def pymodbus(
 def modbus_serial(registers: int = 10_000) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """A server of npm's modbus-serial on loopback, and its port."""
     node = need_program("node", NODE_INSTALL)
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
     script = HERE / "modbus_serial_server.js"
-    with running(node, script, str(port), str(registers), NODE_PATH=str(node_modules())) as started:
+    with running(node, script, str(registers), NODE_PATH=str(node_modules())) as started:
         yield started
 
 
